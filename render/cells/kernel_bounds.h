@@ -27,22 +27,6 @@ static inline double kernel_corners_most(kernel_corners v)
     return most;
 }
 
-typedef struct kernel_domain {
-    double centre[3], corners[3][8];
-} kernel_domain;
-
-static const kernel_domain kernel_box_domain = {
-    {0.5, 0.5, 0.5},
-    {{KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
-     {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
-     {KERNEL_LOW, KERNEL_LOW, KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}};
-
-static const kernel_domain kernel_wedge_domain = {
-    {1.0 / 3, 1.0 / 3, 0.5},
-    {{KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},
-     {KERNEL_LOW, KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW, KERNEL_WIDE},
-     {KERNEL_LOW, KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}};
-
 /* Derivatives of the products r s, r q, s q, r s q at the centre and the corners, there the extreme ones. */
 typedef struct kernel_slopes {
     double centre[4][3];
@@ -51,11 +35,12 @@ typedef struct kernel_slopes {
 
 static inline void kernel_domain_slopes(int type, kernel_slopes *out)
 {
-    const kernel_domain *domain = type == GRID_WEDGE ? &kernel_wedge_domain : &kernel_box_domain;
+    const kernel_domain *domain = kernel_domain_of(type);
     const double *c = domain->centre;
     kernel_corners r[3];
     memset(out, 0, sizeof *out);
-    for (int a = 0; a < 3; a++) memcpy(&r[a], domain->corners[a], sizeof r[a]);
+    for (int n = 0; n < 8; n++)
+        for (int a = 0; a < 3; a++) r[a][n] = domain->corners[n][a];
     if (type == GRID_PYRAMID) {
         for (int a = 0; a < 3; a++) {
             out->centre[0][a] = a == 2 ? -c[a] : c[a];
@@ -155,7 +140,8 @@ static inline double kernel_bounds_error(const double e[8], int type)
 {
     const kernel_domain *domain = type == GRID_WEDGE ? &kernel_wedge_domain : &kernel_box_domain;
     kernel_corners r[3];
-    for (int a = 0; a < 3; a++) memcpy(&r[a], domain->corners[a], sizeof r[a]);
+    for (int n = 0; n < 8; n++)
+        for (int a = 0; a < 3; a++) r[a][n] = domain->corners[n][a];
     if (type == GRID_PYRAMID) r[0] *= r[2], r[1] *= r[2];
     const kernel_corners m = type == GRID_PYRAMID ? r[0] * r[1] / r[2] : r[0] * r[1];
     const kernel_corners at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + m * e[4] +

@@ -30,53 +30,27 @@ typedef struct kernel_bounds_lanes {
     kernel_half_mask is_solid;
 } kernel_bounds_lanes;
 
-/* A domain's corners (kernel_bounds.h), and which slopes there are along each axis: slope_count of them, each first met
- * at a corner, and which one a corner has. Of a hex a slope depends on the two other coordinates; of a wedge on the
- * last alone, and along the last on the two others; of a pyramid on the same coordinate alone. */
+/* Which slopes there are at the corners of a domain (kernel_domain_of()), along each axis: slope_count of them, each
+ * first met at a corner, and which one a corner has. Of a hex a slope depends on the two other coordinates; of a wedge
+ * on the last alone, and along the last on the two others; of a pyramid on the same coordinate alone. */
 typedef struct kernel_slope_table {
     int corner_count, slope_count[3];
     signed char first[3][4], at[3][8];
-    double centre[3], corners[8][3];
 } kernel_slope_table;
 
 static const kernel_slope_table kernel_slope_tables[3] = {
     {8,
      {4, 4, 4},
      {{0, 2, 4, 6}, {0, 4, 1, 5}, {0, 1, 2, 3}},
-     {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}},
-     {0.5, 0.5, 0.5},
-     {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-      {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
-      {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
-      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
-      {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-      {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
-      {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
-      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}},
+     {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}}},
     {6,
      {2, 2, 3},
      {{0, 3}, {0, 3}, {0, 1, 2}},
-     {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}},
-     {1.0 / 3, 1.0 / 3, 0.5},
-     {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-      {KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW},
-      {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},
-      {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-      {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
-      {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}}},
+     {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
     {8,
      {2, 2, 2},
      {{0, 1}, {0, 2}, {0, 4}},
-     {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}},
-     {0.5, 0.5, 0.5},
-     {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-      {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
-      {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
-      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
-      {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-      {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
-      {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
-      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}},
+     {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}}},
 };
 
 /* At corners, by the number of the slope. */
@@ -114,7 +88,7 @@ SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int 
  * at the centre. */
 SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
 {
-    const double *centre = kernel_slope_tables[kernel_shape_number(type)].centre;
+    const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
     kernel_half out = {0};
     if (type == GRID_PYRAMID) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
@@ -147,7 +121,7 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
 /* kernel_bounds_bend(). */
 SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
-    const double *centre = kernel_slope_tables[kernel_shape_number(type)].centre;
+    const double *centre = kernel_domain_of(type)->centre;
     const kernel_half zero = {0};
     kernel_half m[3][3], cofactor[3][3], position[3][8];
     for (int i = 0; i < 3; i++) {
@@ -181,7 +155,7 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_half gradient[3],
                                             kernel_half e[8], kernel_half *size)
 {
-    const double *centre = kernel_slope_tables[kernel_shape_number(type)].centre;
+    const double *centre = kernel_domain_of(type)->centre;
     kernel_half df[3];
     *size = (kernel_half){0};
     for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(type, b->exact[3], a, centre);
@@ -203,7 +177,7 @@ SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
     kernel_half most = {0};
     for (int n = 0; n < table->corner_count; n++) {
-        const double *corner = table->corners[n], k = type == GRID_PYRAMID ? corner[2] : 1;
+        const double *corner = kernel_domain_of(type)->corners[n], k = type == GRID_PYRAMID ? corner[2] : 1;
         const double r[3] = {corner[0] * k, corner[1] * k, corner[2]}, m = r[0] * r[1] / k;
         kernel_half at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
         if (type != GRID_WEDGE) at += m * e[4];
@@ -223,7 +197,7 @@ SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int ty
     for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
     for (int a = 0; a < 3; a++)
         for (int n = 0; n < table->slope_count[a]; n++) {
-            const double *r = table->corners[(int)table->first[a][n]];
+            const double *r = kernel_domain_of(type)->corners[(int)table->first[a][n]];
             out->df[a][n] = kernel_half_slope(type, field, a, r);
             out->de[a][n] = kernel_half_slope(type, e, a, r);
             for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_half_bend(type, b->bent[i], a, r);

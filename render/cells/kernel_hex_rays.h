@@ -80,7 +80,7 @@ SIMD_INLINE void kernel_poly_sides_of(const kernel_placed_polys *h, const kernel
         if (shape->faces[face].count == 4) kernel_poly_side(h, p, shape->edge_count + face, s);
 }
 
-/* Are the sides of a face's edges around negative? */
+/* Tells on which rays the sides of a face's edges, taken around it, are negative. */
 SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_poly_sides *s, vm around[4])
 {
     for (int i = 0; i < shape->faces[face].count; i++) {
@@ -89,19 +89,15 @@ SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const ke
     }
 }
 
-/* Rays that cross one of a quad's two triangles. side is that of its diagonal, which is from the loop's vertex 1 where
- * turn is set. */
-SIMD_INLINE vm kernel_quad_once_of(const vm around[4], vm turn, vm side)
+/* kernel_halves_once() of a quad whose diagonal is from the loop's vertex 1 where turn is set, else from vertex 0. */
+SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
 {
-    /* From the diagonal's begin. */
     vm from[4];
     for (int i = 0; i < 4; i++) from[i] = vm_or(vm_and(turn, around[(i + 1) & 3]), vm_andnot(around[i], turn));
-    const vm half0 = vm_andnot(vm_xor(from[1], side), vm_xor(from[0], from[1]));
-    const vm half1 = vm_not(vm_or(vm_xor(side, from[2]), vm_xor(from[2], from[3])));
-    return vm_xor(half0, half1);
+    return kernel_halves_once(from, side);
 }
 
-/* Vertices as rays see them. */
+/* Projects the vertices along the rays. */
 SIMD_INLINE void kernel_poly_project(const kernel_placed_polys *h, const kernel_hex_packet *p, int count, vf x[8],
                                      vf y[8])
 {
@@ -116,14 +112,13 @@ SIMD_INLINE void kernel_poly_faces(const kernel_placed_polys *h, const kernel_he
                                    kernel_hex_crossed *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
+    kernel_hex_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
     kernel_poly_sides sides;
-    vm one = vm_none(), two = one, bends = one;
     vf x[8], y[8];
     kernel_poly_sides_of(h, p, type, &sides);
-    out->alone = vm_not(vf_lt(kernel_hex_take(h->doubt, p->lane), sides.least));
+    vm alone = vm_not(vf_lt(kernel_hex_take(h->doubt, p->lane), sides.least));
     kernel_poly_project(h, p, grid_type_vertices(type), x, y);
     const vi turned = vi_from_bits(kernel_hex_take((const float *)(const void *)h->turned, p->lane));
-    vf first = vf_set(0), last = first;
     for (int face = 0; face < shape->face_count; face++) {
         vm around[4], once;
         kernel_face_sides(shape, face, &sides, around);
@@ -133,19 +128,12 @@ SIMD_INLINE void kernel_poly_faces(const kernel_placed_polys *h, const kernel_he
             const vm turn = vm_sign(turned << (31 - face));
             const vm outside = vm_and(p->active, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
             const signed char *loop = shape->faces[face].vertices;
-            once = vm_and(p->active, kernel_quad_once_of(around, turn, sides.negative[shape->edge_count + face]));
-            bends = vm_or(bends, kernel_hex_bends(x, y, loop, outside, around[0], around[3]));
+            once = vm_and(p->active, kernel_halves_once_turned(around, turn, sides.negative[shape->edge_count + face]));
+            alone = vm_or(alone, kernel_hex_bends(x, y, loop, outside, around[0], around[3]));
         }
-        out->alone = vm_or(out->alone, vm_and(two, once));
-        two = vm_or(two, vm_and(one, once));
-        first = vf_select(vm_andnot(once, one), vf_set((float)face), first);
-        last = vf_select(once, vf_set((float)face), last);
-        one = vm_or(one, once);
+        kernel_hex_count_face(&count, face, once);
     }
-    out->alone = vm_and(p->active, vm_or(out->alone, bends));
-    out->two = vm_andnot(two, out->alone);
-    out->first = vi_from_vf(first);
-    out->last = vi_from_vf(last);
+    kernel_hex_count_end(&count, p->active, alone, out);
 }
 
 /* The place where rays cross a face, as kernel_quad_crossings() or kernel_triangle_crossing() finds it. */

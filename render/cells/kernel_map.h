@@ -52,7 +52,7 @@ typedef struct kernel_map {
         (c)[7] = ((v)[6] - (v)[5] - (v)[7] + (v)[4]) - (c)[4];                                                         \
     } while (0)
 
-/* Of a wedge and of a pyramid those that are not 0. */
+/* A wedge's and a pyramid's coefficients that are not 0. */
 #define KERNEL_WEDGE_FIT(c, v)                                                                                         \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
@@ -72,28 +72,26 @@ typedef struct kernel_map {
         (c)[4] = (v)[0] - (v)[1] + (v)[2] - (v)[3];                                                                    \
     } while (0)
 
+#define KERNEL_FIT(type, c, v)                                                                                         \
+    do {                                                                                                               \
+        if ((type) != GRID_HEX) memset(c, 0, 8 * sizeof *(c));                                                         \
+        if ((type) == GRID_HEX)                                                                                        \
+            KERNEL_HEX_FIT(c, v);                                                                                      \
+        else if ((type) == GRID_WEDGE)                                                                                 \
+            KERNEL_WEDGE_FIT(c, v);                                                                                    \
+        else                                                                                                           \
+            KERNEL_PYRAMID_FIT(c, v);                                                                                  \
+    } while (0)
+
 SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[GRID_MAX_CELL_VERTICES])
 {
-    double c[8] = {0};
-    if (type == GRID_HEX)
-        KERNEL_HEX_FIT(c, v);
-    else if (type == GRID_WEDGE)
-        KERNEL_WEDGE_FIT(c, v);
-    else
-        KERNEL_PYRAMID_FIT(c, v);
-    memcpy(out, c, sizeof c);
+    KERNEL_FIT(type, out, v);
 }
 
 /* The same of as many cells as there are doubles in a vector. */
 SIMD_INLINE void kernel_half_fit(int type, kernel_half c[8], const kernel_half v[8])
 {
-    if (type != GRID_HEX) memset(c, 0, 8 * sizeof *c);
-    if (type == GRID_HEX)
-        KERNEL_HEX_FIT(c, v);
-    else if (type == GRID_WEDGE)
-        KERNEL_WEDGE_FIT(c, v);
-    else
-        KERNEL_PYRAMID_FIT(c, v);
+    KERNEL_FIT(type, c, v);
 }
 
 SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, const float *v, float origin,
@@ -440,6 +438,36 @@ typedef struct kernel_bounds {
 #define KERNEL_LOW -KERNEL_DOMAIN_RIM
 #define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
 #define KERNEL_WIDE (1 + 2 * KERNEL_DOMAIN_RIM)
+
+/* The domain's middle and corners. A wedge's last two corners repeat others. */
+typedef struct kernel_domain {
+    double centre[3], corners[8][3];
+} kernel_domain;
+
+static const kernel_domain kernel_box_domain = {{0.5, 0.5, 0.5},
+                                                {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
+                                                 {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
+                                                 {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
+                                                 {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
+                                                 {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
+                                                 {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
+                                                 {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
+                                                 {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}};
+
+static const kernel_domain kernel_wedge_domain = {{1.0 / 3, 1.0 / 3, 0.5},
+                                                  {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
+                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW},
+                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},
+                                                   {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
+                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
+                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH},
+                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
+                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}}};
+
+SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
+{
+    return type == GRID_WEDGE ? &kernel_wedge_domain : &kernel_box_domain;
+}
 /* Rays' directions: (x, y, 1), and up to spread off that in both. */
 typedef struct kernel_beam {
     float x, y, spread;

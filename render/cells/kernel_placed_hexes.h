@@ -488,15 +488,35 @@ static __attribute__((noinline)) void kernel_placed_poly_cell(const kernel_place
     c->least[0] = type == GRID_HEX ? (float)INFINITY : h->least_of_all[n];
 }
 
-/* A face's edges around, and whether they are the other way. */
-static const signed char kernel_hex_around[KERNEL_HEX_FACES][4][2] = {
-    {{8, 0}, {7, 1}, {11, 1}, {3, 0}},  {{1, 0}, {10, 0}, {5, 1}, {9, 1}}, {{0, 0}, {9, 0}, {4, 1}, {8, 1}},
-    {{11, 0}, {6, 1}, {10, 1}, {2, 0}}, {{3, 1}, {2, 1}, {1, 1}, {0, 1}},  {{4, 0}, {5, 0}, {6, 0}, {7, 0}}};
-
 /* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */
 typedef struct kernel_hex_crossed {
     vm two, alone;
     vi first, last;
 } kernel_hex_crossed;
+
+/* The faces that rays have crossed so far. */
+typedef struct kernel_hex_count {
+    vm one, two, more;
+    vf first, last;
+} kernel_hex_count;
+
+SIMD_INLINE void kernel_hex_count_face(kernel_hex_count *c, int face, vm once)
+{
+    const vf number = vf_set((float)face);
+    c->more = vm_or(c->more, vm_and(c->two, once));
+    c->two = vm_or(c->two, vm_and(c->one, once));
+    c->first = vf_select(vm_andnot(once, c->one), number, c->first);
+    c->last = vf_select(once, number, c->last);
+    c->one = vm_or(c->one, once);
+}
+
+/* alone: the rays that are for the cell alone, whatever they cross. */
+SIMD_INLINE void kernel_hex_count_end(const kernel_hex_count *c, vm rays, vm alone, kernel_hex_crossed *out)
+{
+    out->alone = vm_and(rays, vm_or(alone, c->more));
+    out->two = vm_andnot(c->two, out->alone);
+    out->first = vi_from_vf(c->first);
+    out->last = vi_from_vf(c->last);
+}
 
 #endif

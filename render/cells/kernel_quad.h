@@ -418,6 +418,15 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
+/* Returns the rays that cross one of a quad's two triangles, but not both. around has the sides of its edges, taken
+ * around from the begin of its diagonal, whose side is the other. */
+SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
+{
+    const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
+    const vm half1 = vm_not(vm_or(vm_xor(side, around[2]), vm_xor(around[2], around[3])));
+    return vm_xor(half0, half1);
+}
+
 /* Returns the rays that may still meet a quad's patch twice once the discriminant is known: all of them but where it is
  * below zero by more than float32's roundings, which are less than a millionth of its terms. */
 static __attribute__((noinline)) vm kernel_hex_bends_yet(const vf x[8], const vf y[8], const signed char *loop, vm rays,

@@ -20,8 +20,7 @@ typedef struct kernel_shape {
     struct {
         int count;
         signed char vertices[4];
-        signed char sides[4]
-                         [2]; /* the edges around, from each vertex to the next, and whether they are the other way */
+        signed char sides[4][2]; /* edges from each vertex to the next, and whether they are the other way */
     } faces[6];
     float corners[GRID_MAX_CELL_VERTICES][3]; /* the cell's own coordinates of its vertices */
 } kernel_shape;

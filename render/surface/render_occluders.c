@@ -105,14 +105,7 @@ static void bounds_of(const subject *s, double low[3], double high[3])
 /* Returns the distance from a hit within which the cell hides nothing (kernel_occlusion_beyond()), in tree space. */
 static double reach_of(const subject *s, double contact)
 {
-    double low[3], high[3], volume = 1, longest = 0;
-    if (!(contact > 0)) return 0;
-    bounds_of(s, low, high);
-    for (int a = 0; a < 3; a++) {
-        volume *= high[a] - low[a];
-        longest = fmax(longest, high[a] - low[a]);
-    }
-    return contact * (volume > 0 ? cbrt(volume) : longest);
+    return contact > 0 ? contact * kernel_size_of((const double(*)[3])s->places.items, s->count) : 0;
 }
 
 static bool add_vertex(subject *s, const double world[3], double value)

@@ -86,8 +86,9 @@ SIMD_INLINE vm kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *l
 /* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vm rays, kernel_hex_crossed *out)
 {
-    vm negative[KERNEL_HEX_EDGES], one = vm_none(), two = one, alone = one;
-    vf least = vf_set(INFINITY), first = vf_set(0), last = first;
+    kernel_hex_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
+    vm negative[KERNEL_HEX_EDGES], alone = vm_none();
+    vf least = vf_set(INFINITY);
     for (int n = 0; n < KERNEL_HEX_EDGES; n++)
         negative[n] = kernel_local_edge(s, kernel_shapes[0].edges[n][0], kernel_shapes[0].edges[n][1], &least);
     for (int face = 0; face < KERNEL_HEX_FACES; face++) {
@@ -95,25 +96,15 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vm rays, ke
         const vm side = kernel_local_edge(s, loop[0], loop[2], &least);
         vm around[4];
         for (int i = 0; i < 4; i++) {
-            const signed char *edge = kernel_hex_around[face][i];
-            around[i] = edge[1] ? vm_not(negative[edge[0]]) : negative[edge[0]];
+            const signed char *edge = kernel_shapes[0].faces[face].sides[i];
+            around[i] = edge[1] ? vm_not(negative[(int)edge[0]]) : negative[(int)edge[0]];
         }
-        const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
-        const vm half1 = vm_not(vm_or(vm_xor(side, around[2]), vm_xor(around[2], around[3])));
-        const vm once = vm_and(rays, vm_xor(half0, half1));
         const vm outside = vm_and(rays, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
         alone = vm_or(alone, kernel_hex_bends(s->at[0], s->at[1], loop, outside, around[0], around[3]));
-        alone = vm_or(alone, vm_and(two, once));
-        two = vm_or(two, vm_and(one, once));
-        first = vf_select(vm_andnot(once, one), vf_set((float)face), first);
-        last = vf_select(once, vf_set((float)face), last);
-        one = vm_or(one, once);
+        kernel_hex_count_face(&count, face, vm_and(rays, kernel_halves_once(around, side)));
     }
     alone = vm_or(alone, vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), least)));
-    out->alone = vm_and(rays, alone);
-    out->two = vm_andnot(two, out->alone);
-    out->first = vi_from_vf(first);
-    out->last = vi_from_vf(last);
+    kernel_hex_count_end(&count, rays, alone, out);
 }
 
 /* A number of each ray's own vertex. */
