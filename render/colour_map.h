@@ -37,7 +37,7 @@ const char *colour_map_name(colour_map map);
 /* The map's table (colour_count × 3 floats, linear light, evenly spaced, static), or NULL where none has this name. */
 const float *colour_map_table(const char *name, int *colour_count);
 
-/* One sRGB component in [0, 1] to linear light, and back. */
+/* Converts one sRGB component in [0, 1] to linear light, and back. */
 float colour_linear_from_srgb(float srgb);
 float colour_srgb_from_linear(float linear);
 

@@ -13,7 +13,7 @@ typedef enum colour_space { COLOUR_RGB, COLOUR_HSV, COLOUR_LAB, COLOUR_DIVERGING
 /* The colour at `share` of the way from a to b, both sRGB in [0, 1], in linear light, in [0, 1]. */
 void colour_between(colour_space space, const double a[3], const double b[3], double share, float linear[3]);
 
-/* One component, in double. */
+/* Converts one component in double. */
 double colour_linear_of(double srgb);
 double colour_srgb_of(double linear);
 
@@ -22,10 +22,10 @@ typedef struct colour_point {
     double srgb[3]; /* in [0, 1] */
 } colour_point;
 
-/* How many entries an even table through the points (2 or more) should have: 256 or a few more where they are even, so
- * that each is an entry; else 1025, between which a step of two points at one place is drawn out. */
+/* Returns how many entries an even table through the points (2 or more) should have: 256 or a few more where points are
+ * even, so that each is an entry; else 1025, between two of which a step of two points at one place is drawn out. */
 int colour_points_entries(const colour_point *points, int count);
-/* Fill the table (entries × 3, linear light), from the first point to the last. */
+/* Fills the table (entries × 3, linear light), from the first point to the last. */
 void colour_points_fill(const colour_point *points, int count, colour_space space, float *table, int entries);
 
 #endif

@@ -110,7 +110,7 @@ typedef struct render_field {
     const mmbvh_ranges *ranges;
 } render_field;
 
-/* How crossings are found in a cell along a ray. Tets have at most one, which both find exactly. */
+/* The method that finds crossings in a cell along a ray. Tets have at most one, which both find exactly. */
 typedef enum render_root {
     RENDER_NEUBAUER, /* root_steps of regula falsi; two crossings of one interval are missed, of three one is found */
     RENDER_ROBUST    /* every crossing, isolated and then polished: render/kernel_roots.h */
@@ -205,15 +205,15 @@ typedef struct render_volume_layer {
 typedef struct render_part {
     const grid *cells;
     const mmbvh *tree; /* over cells; its origin and scale are the space's */
-    /* For layers with edges: loops of vertices. loops[cell]: 0 where every edge between the cell's vertices in the
+    /* Loops of vertices, for layers with edges. loops[cell] is 0 where every edge between the cell's vertices in the
      * surface is drawn; else it is one triangle of a polygon, whose corner count is at loops[loops[cell]] and whose
      * corners follow. NULL: there are no polygons. */
     const int64_t *loops;
 } render_part;
 
-/* How rays find isosurfaces and the cells of samples: the same picture to the last bit, at different speed. By tiles of
- * 16 x 16 rays wherever that can be had; packets are taken instead where segments are to be cut by transparent
- * surfaces. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most; by samples and
+/* The way that rays find isosurfaces and the cells of samples. The picture is the same to the last bit; the speed
+ * differs. Tiles of 16 x 16 rays serve where they can; packets are taken instead where transparent surfaces cut
+ * segments. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most; by samples and
  * without surfaces tiles and packets round the values of cells with quads in different ways, 2e-6 at most. */
 typedef enum render_traversal {
     RENDER_BINNED,  /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
@@ -223,9 +223,9 @@ typedef enum render_traversal {
     RENDER_SPMD     /* every lane on its own */
 } render_traversal;
 
-/* How volumes are integrated: by samples (thesis, 4.4), whose error goes with the step, or by segments, exact where the
- * field is linear along the ray (tets) and of second order in the parts of cells elsewhere. Segments of several volumes
- * are made with separate_samples alone: without it several volumes are sampled. */
+/* The method that integrates volumes: samples (thesis, 4.4), whose error goes with the step, or segments, which are
+ * exact where the field is linear along the ray (tets) and of second order in the pieces of cells elsewhere. Segments
+ * of several volumes are made with separate_samples alone: without it several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 
 /* Error allowed to mixed segments where no max_error is given. */
@@ -332,8 +332,8 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
-/* As render_frame(), but gives the fragments away a tile at a time. Every pixel of the camera lies in one of the tiles,
- * and tiles without fragments are given too. As many threads call take as the job has. */
+/* Draws as render_frame() does, but gives the fragments away a tile at a time. Every pixel of the camera lies in one of
+ * the tiles, and tiles without fragments are given too. As many threads call take as the job has. */
 insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
                                  render_statistics *statistics, base_error *error);
 

@@ -67,7 +67,7 @@ static float error_at(float t)
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
 }
 
-/* Where what is known of a run ends, for compositing to tell what overlaps it (kernel_segments.h). */
+/* Ends each fragment of a run by its error earlier, so that compositing finds its overlaps (kernel_segments.h). */
 static void shorten(const render_folding *folding, fragment *items, int64_t count)
 {
     for (int64_t i = 0; i < count && folding->has_segments; i++)
@@ -79,7 +79,7 @@ static bool shows(const fragment *f)
     return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
 }
 
-/* One run, stretch by stretch; returns where out goes on. */
+/* Folds one run, stretch by stretch; returns the end of what it wrote. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;

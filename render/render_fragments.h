@@ -1,4 +1,4 @@
-/* Where the threads of a frame put their fragments: into one list, in any order.
+/* The threads of a frame put their fragments into one list, in any order.
  *
  * As long as the list has room, threads take pieces of it and write there: nothing is copied, and a caller who keeps
  * the list from frame to frame pays for its memory once. Without room a thread goes on in memory of its own, which is

@@ -1,5 +1,5 @@
-/* One frame: tiles dealt to threads. They are small (16 × 16 pixels) and handed out a few at a time, because a
- * picture's middle costs far more than its border. */
+/* A frame is drawn by tiles that are dealt to threads. Tiles are small (16 × 16 pixels) and handed out a few at a time,
+ * because a picture's middle costs far more than its border. */
 #include <math.h>
 #include <omp.h>
 #include <string.h>
@@ -189,7 +189,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     return has_memory;
 }
 
-/* One at every other pixel, where most of them are traced: memory that is not written to is none. */
+/* Expects a fragment at every other pixel where most pixels are traced: memory that is never written costs nothing. */
 static int64_t expected_fragments(const render_job *job)
 {
     return job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;

@@ -24,7 +24,7 @@ enum { RENDER_MAX_SAMPLES = 64 };
 /* Scaled units, of which a scene is about one. */
 #define RENDER_LIFT 4e-6
 
-/* As an unlit fragment has it. */
+/* A hit as an unlit fragment has it. */
 typedef struct render_hit {
     uint32_t pixel;
     float t, normal[2];

@@ -25,7 +25,7 @@ static float above(double v)
     return (double)f < v ? nextafterf(f, INFINITY) : f;
 }
 
-/* One more interval, or the last one made longer; returns how many there are. */
+/* Adds an interval, or makes the last one longer; returns how many there are. */
 static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
 {
     if (count && intervals[count - 1].high >= below(low)) {

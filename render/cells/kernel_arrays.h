@@ -208,7 +208,7 @@ SIMD_INLINE kernel_whole kernel_numbers_take(const kernel_numbers *c, vi index)
     return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
 }
 
-/* As above, where it is known beforehand whether all numbers are narrow. */
+/* Compares as above, where it is known beforehand whether all numbers are narrow. */
 SIMD_INLINE vm kernel_taken_lt(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
 {
     return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
@@ -305,7 +305,7 @@ SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const u
     kernel_numbers_take_raw(&p->values, vertex, out);
 }
 
-/* One number. */
+/* Returns the number at that index. */
 SIMD_INLINE double kernel_numbers_one(const kernel_numbers *c, int64_t index)
 {
     double wide;

@@ -149,8 +149,8 @@ static inline double kernel_bounds_error(const double e[8], int type)
     return sqrt(kernel_corners_most(at * at));
 }
 
-/* How far a face's value may be from the field on the ray: what a face gives is on its patch at the coordinates that it
- * says, and beside the ray by the rounding of places, by no more than this across and along. */
+/* Bounds how far a face's value may be from the field on the ray. The value is that of the patch at the coordinates
+ * found, and that point lies beside the ray by the rounding of places: by no more than this across and along. */
 static inline float kernel_bounds_jump(const kernel_bounds *b, const kernel_map *map, const kernel_beam *beam)
 {
     const double across = 2e-6 * ((double)map->reach[0] + (double)map->reach[1] + (double)beam->offset +

@@ -63,7 +63,7 @@ SIMD_INLINE kernel_half kernel_half_all(double x)
     return (kernel_half){0} + x;
 }
 
-/* As a float32 has it. */
+/* Rounds to float32. */
 SIMD_INLINE kernel_half kernel_half_rounded(kernel_half v)
 {
     return kernel_half_widen(kernel_half_narrow(v));

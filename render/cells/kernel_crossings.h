@@ -1,5 +1,5 @@
-/* Where a packet's rays meet a cell's faces: the edge functions on the rays, from the cell's lines (kernel_cell.h);
- * then tets, then cells that have quads. */
+/* Crossings of a packet's rays with a cell's faces: the edge functions on the rays, from the cell's lines
+ * (kernel_cell.h), then the crossings of tets, then those of cells that have quads. */
 #ifndef RENDER_KERNEL_CROSSINGS_H
 #define RENDER_KERNEL_CROSSINGS_H
 
@@ -231,7 +231,7 @@ SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sum
     return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
 }
 
-/* As kernel_tet_choose(), with edges projected again on the rays whose weights are not good enough. */
+/* Chooses as kernel_tet_choose() does, with edges projected again for rays whose weights are not good enough. */
 static __attribute__((noinline, cold)) kernel_ends
 kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
@@ -450,7 +450,7 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     return true;
 }
 
-/* As below, for a quad that has collapsed to a triangle. */
+/* Finds the crossings as below, for a quad that has collapsed to a triangle. */
 static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
                                                                       kernel_crossing *out)
 {

@@ -145,7 +145,7 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
  *
  * Terms round by the order of a cell's vertices, which differs between codes and ranks. So they are turned to begin at
  * the vertex that is least by its place, then along its edges in the order of places, as kernel_cell_turn() does by
- * coordinates. Places are the same on all ranks. Vertices in one place keep their order: such cells are not for lanes. */
+ * coordinates. Places are the same on all ranks. Vertices in one place keep their order; such cells do not go in lanes. */
 
 SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
 {
@@ -160,7 +160,8 @@ SIMD_INLINE vm kernel_local_is_before(vf (*const at)[8], int i, int j)
     return kernel_local_before(a, b);
 }
 
-/* What is known of the vertices: lists[0] to lists[2] are their places, and all lists are turned. */
+/* Exchanges vertices i and j in those lanes. lists[0] to lists[2] are the vertices' places; further lists are exchanged
+ * with them. */
 SIMD_INLINE void kernel_local_swap(vf (*lists)[8], int count, vm lanes, int i, int j)
 {
     for (int n = 0; n < count; n++) {
@@ -246,7 +247,7 @@ SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
         kernel_pyramid_turn(at, lists);
 }
 
-/* How far r is inside of the cell's border; less than 0 outside. */
+/* Returns how far r lies inside of the cell's border; it is less than 0 outside. */
 SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 {
     if (type == GRID_HEX) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
@@ -332,9 +333,9 @@ SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inver
     }
 }
 
-/* How near to the border is too near: crossings of faces (kernel_quad.h) are off by 3e-7 of the cell's size and by half
- * a unit in the last place of their depth, projected vertices by some units of their places across the ray, and r here
- * by 2e-6 that Newton's method leaves and by as many units of a place. */
+/* Finds how near to the border is too near. Crossings of faces (kernel_quad.h) are off by 3e-7 of the cell's size and
+ * by half a unit in the last place of their depth, projected vertices by some units of their places across the ray, and
+ * r here by 2e-6 that Newton's method leaves and by as many units of a place. */
 SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf inverse[3][3], kernel_local_cells *out)
 {
     vf size[3], most = vf_set(0);
@@ -390,7 +391,7 @@ SIMD_INLINE vf kernel_local_take(const float *of, vi lane)
     return vf_permute(vf_load(of), lane);
 }
 
-/* Where points are: each lane's in the cell of a lane. */
+/* Points, one a lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
     kernel_bend bend;     /* at r */

@@ -88,7 +88,7 @@ SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[G
     KERNEL_FIT(type, out, v);
 }
 
-/* The same of as many cells as there are doubles in a vector. */
+/* Fits the polynomials of as many cells as there are doubles in a vector. */
 SIMD_INLINE void kernel_half_fit(int type, kernel_half c[8], const kernel_half v[8])
 {
     KERNEL_FIT(type, c, v);
@@ -271,7 +271,7 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map_lanes
     return open;
 }
 
-/* How far r is out of the cell's domain. */
+/* Returns how far r is out of the cell's domain. */
 SIMD_INLINE vf kernel_map_beyond(const vf r[3])
 {
     vf most = vf_set(0);
@@ -333,7 +333,7 @@ SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
     return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
 }
 
-/* How much of the interval lies before t: 0 .. 1. */
+/* Returns the share of the interval that lies before t, in [0, 1]. */
 SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
 {
     const vf length = i->t_out - i->t_in;

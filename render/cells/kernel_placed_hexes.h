@@ -115,7 +115,7 @@ SIMD_INLINE void kernel_turned_hex(kernel_turned_polys *h, bool is_narrow)
     }
 }
 
-/* Of a wedge: the triangle of the least vertex first, that vertex first in it, then its lesser neighbour there. */
+/* Turns a wedge: its least vertex comes first, then the lesser neighbour of that in its triangle. */
 SIMD_INLINE void kernel_turned_wedge(kernel_turned_polys *h, bool is_narrow)
 {
     vm over = vm_none();
@@ -131,7 +131,7 @@ SIMD_INLINE void kernel_turned_wedge(kernel_turned_polys *h, bool is_narrow)
     kernel_turned_swap(h, is_narrow, swap, 4, 5);
 }
 
-/* Of a pyramid: the base's least vertex first, then its lesser neighbour there; the apex stays. */
+/* Turns a pyramid: the base's least vertex comes first, then its lesser neighbour in the base; the apex stays. */
 SIMD_INLINE void kernel_turned_pyramid(kernel_turned_polys *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
@@ -244,7 +244,7 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* What kernel_poly_lines() has of all lines: the largest bound, and kernel_line_blur()'s. */
+/* The largest bound of kernel_poly_lines() over all lines, and that of kernel_line_blur(). */
 typedef struct kernel_lanes_blur {
     vf doubt, error, extent;
 } kernel_lanes_blur;
@@ -322,7 +322,7 @@ typedef struct kernel_lanes_order {
     vm first[3], last[3];
 } kernel_lanes_order;
 
-/* Of a triangle's three sides, by their opposite corners: those of k, i and j are ij, jk and ik. */
+/* Orders a triangle's three sides, which are named by their opposite corners: those of k, i and j are ij, jk and ik. */
 SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposite[3], vf out[3])
 {
     out[0] = vf_select(o->last[0], opposite[0], vf_select(o->last[1], opposite[1], opposite[2]));

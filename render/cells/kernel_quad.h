@@ -368,8 +368,8 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* Where rays of once, each quad's own, which meet the triangles once, meet the patch: count quads at once, each of
- * whose steps waits for the one before. */
+/* Finds where rays meet the patches of count quads: once[n] has the rays that meet quad n's triangles once. Quads are
+ * taken together because each step of one waits for its step before. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], kernel_quad_place *out)
 {
     kernel_patch patch[2];

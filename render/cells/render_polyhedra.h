@@ -52,7 +52,7 @@ static inline bool quad_collapses(const double *const corners[4])
 
 typedef struct polyhedron_store polyhedron_store;
 
-/* One thread's. NULL where memory ran out. */
+/* Makes the store of one thread. Returns NULL where memory ran out. */
 polyhedron_store *polyhedra_create(void);
 void polyhedra_free(polyhedron_store *store);
 

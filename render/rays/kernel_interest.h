@@ -15,7 +15,7 @@ SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float lo
     return false;
 }
 
-/* As kernel_interest_meets(), for a range in each lane. */
+/* Tests as kernel_interest_meets() does, a range in each lane. */
 SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf low, vf high)
 {
     vm meets = vm_none();
@@ -24,7 +24,7 @@ SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf l
     return meets;
 }
 
-/* As kernel_interest_meets(), for a cell of so many values in each lane. */
+/* Tests as kernel_interest_meets() does, a cell of count values in each lane. */
 SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf *v, int count)
 {
     vf low = v[0], high = v[0];

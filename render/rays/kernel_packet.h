@@ -48,9 +48,9 @@ typedef struct kernel_packet {
     /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* For volumes: what clips leave of the ray; -inf and +inf without them. */
+    /* The part of the ray that clips leave for volumes; -inf and +inf without clips. */
     vf clip_in, clip_out;
-    /* Where volumes have clips of their own: what surfaces have left of the rays. */
+    /* The part of the rays that surfaces leave, kept where volumes have clips of their own. */
     vm all_active;
     vf surface_near, surface_far;
 } kernel_packet;

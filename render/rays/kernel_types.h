@@ -128,7 +128,7 @@ typedef struct kernel_interest {
     float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
 } kernel_interest;
 
-/* How values become places in a colour table whose scale s is not linear: place = s(value) * slope + shift. */
+/* Maps values to places in a colour table whose scale s is not linear: place = s(value) * slope + shift. */
 typedef struct kernel_scale {
     render_scale kind;
     float threshold; /* below it s is linear (symlog), or no more than at it (log) */

@@ -1,4 +1,4 @@
-/* How far apart two faces may be that are one. */
+/* The largest distance between two faces that are one in truth. */
 #ifndef RENDER_FACE_ERROR_H
 #define RENDER_FACE_ERROR_H
 
