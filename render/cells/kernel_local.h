@@ -145,7 +145,7 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
  *
  * Terms round by the order of a cell's vertices, which differs between codes and ranks. So they are turned to begin at
  * the vertex that is least by its place, then along its edges in the order of places, as kernel_cell_turn() does by
- * coordinates. Places are the same on all ranks. Vertices in one place keep their order; such cells do not go in lanes. */
+ * coordinates. Places are the same on all ranks. Vertices in one place keep their order; lanes leave such cells out. */
 
 SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
 {
