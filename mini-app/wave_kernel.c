@@ -1,17 +1,17 @@
 /* Godunov's scheme for acoustics on any cells, of second order by values at vertices.
  *
- * p_t = -K div u        p' = p - dt K/V sum_f A_f u*_f        over the faces f of a cell u_t = -1/rho grad p   u' = u -
- * dt/(rho V) sum_f A_f n_f p*_f
+ *     p_t = -K div u        p' = p - dt K/V sum_f A_f u*_f        over the faces f of a cell
+ *     u_t = -1/rho grad p   u' = u - dt/(rho V) sum_f A_f n_f p*_f
  *
  * p* and u* solve Riemann's problem between the two sides a, b of a face, each with its own impedance Z = rho c:
  *
- * p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
+ *     p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
  *
  * The reconstruction needs no gradients. Let P_v be the state at a vertex, from the cells around it, P_f and P_c its
  * means over a face's and a cell's vertices. The linear function through them, moved to the cell's own mean q, is at
  * the face
  *
- * q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
+ *     q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
  *
  * (q_t from Green's theorem with P_f: the step from the old time to the middle of the new). P_f is common to both
  * sides, so ranks exchange four jumps a cell and nothing else. In one dimension this is Fromm's scheme. In the scheme

@@ -2,6 +2,7 @@
  * alone can meet (memory) is agreed on before the next collective call, so that all end together. */
 #include <stdio.h>
 
+#include "wave_mesh_create.h"
 #include "wave_pictures.h"
 #include "wave_report.h"
 

@@ -20,11 +20,6 @@ wave_medium wave_medium_layered(const wave_lattice *lattice)
     return medium;
 }
 
-wave_medium wave_medium_uniform(double speed, double density)
-{
-    return (wave_medium){.count = 1, .bottom = {-INFINITY}, .speed = {speed}, .density = {density}};
-}
-
 uint8_t wave_medium_layer(const wave_medium *medium, double z)
 {
     int layer = 0;

@@ -30,7 +30,6 @@ typedef struct wave_source {
 
 /* Four layers, stiffer and heavier with depth. */
 wave_medium wave_medium_layered(const wave_lattice *lattice);
-wave_medium wave_medium_uniform(double speed, double density);
 
 uint8_t wave_medium_layer(const wave_medium *medium, double z);
 

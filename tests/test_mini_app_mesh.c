@@ -10,7 +10,8 @@
 #include <cmocka.h>
 
 #include "wave_geometry.h"
-#include "wave_mesh.h"
+#include "wave_faces.h"
+#include "wave_mesh_create.h"
 
 static const int sizes[][3] = {{1, 1, 1}, {2, 3, 2}, {5, 4, 8}, {7, 7, 7}};
 
@@ -138,7 +139,7 @@ static void faces_that_do_not_meet_are_counted(void **state)
     free(mesh.neighbours);
     connectivity[0] = connectivity[1];
     mesh.face_count = mesh.unmatched = 0;
-    assert_true(wave_mesh_find_neighbours(&mesh));
+    assert_true(wave_faces_find_neighbours(&mesh));
     assert_true(mesh.unmatched > 0);
     wave_mesh_free(&mesh);
 }

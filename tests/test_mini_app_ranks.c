@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "wave_mesh_create.h"
 #include "wave_solver.h"
 
 enum { STEPS = 12 };

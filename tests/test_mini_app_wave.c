@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "wave_options.h"
+#include "wave_mesh_create.h"
 #include "wave_solver.h"
 
 typedef struct model {
@@ -18,9 +19,11 @@ typedef struct model {
     wave_solver solver;
 } model;
 
+/* Speed and density are 1 everywhere. */
 static wave_setup plain_setup(int order)
 {
-    return (wave_setup){.real_bytes = 8, .reflecting = true, .order = order, .medium = wave_medium_uniform(1, 1)};
+    const wave_medium uniform = {.count = 1, .bottom = {-INFINITY}, .speed = {1}, .density = {1}};
+    return (wave_setup){.real_bytes = 8, .reflecting = true, .order = order, .medium = uniform};
 }
 
 static void make_model(model *m, const int size[3], wave_cells cells, double jitter, const wave_setup *setup)

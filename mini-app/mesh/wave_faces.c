@@ -1,9 +1,9 @@
 /* Finds the cell beyond each face. Faces are hashed by their vertex ids, and every face of an own cell must have
  * exactly one other cell, or lie on a wall of the box. The table holds (cell, face) of faces seen once. The second cell
  * is joined to the first, and the entry stays, marked, so that a third is noticed. */
-#include <stdlib.h>
+#include "wave_faces.h"
 
-#include "wave_mesh.h"
+#include <stdlib.h>
 
 typedef struct face_entry {
     uint64_t hash;
@@ -128,7 +128,7 @@ static bool make_face_offsets(wave_mesh *mesh)
     return true;
 }
 
-bool wave_mesh_find_neighbours(wave_mesh *mesh)
+bool wave_faces_find_neighbours(wave_mesh *mesh)
 {
     int64_t capacity = 64;
     if (!make_face_offsets(mesh)) return false;

@@ -1,4 +1,4 @@
-/* How cubes are cut, so that the cells of neighbours always share whole faces:
+/* Cubes are cut so that the cells of neighbours always share whole faces:
  *
  *   tets      six around the diagonal 000-111 (Kuhn): every face of the cube is split from its least to its greatest
  *             corner
@@ -8,8 +8,7 @@
  *             diagonal instead: these cubes are the transition between all others.
  *
  * Mixed, from below: hexes, one layer of pyramid cubes, tets, wedges (their z faces meet split as both want), another
- * layer of pyramid cubes, hexes; a third of the hexes are pyramid cubes too.
- */
+ * layer of pyramid cubes, hexes; a third of the hexes are pyramid cubes too. */
 #include "wave_lattice.h"
 
 #include <stddef.h>

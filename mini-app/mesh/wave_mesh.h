@@ -42,9 +42,6 @@ typedef struct wave_mesh {
     int32_t send_count;
 } wave_mesh;
 
-/* False where memory ran out, or one rank's part is too large for 32-bit local numbers; *mesh is then zeroed. */
-bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes, wave_mesh *mesh);
-
 void wave_mesh_free(wave_mesh *mesh);
 
 static inline int wave_mesh_type(const wave_mesh *mesh, int32_t cell)
@@ -66,8 +63,5 @@ static inline int64_t wave_mesh_first_face(const wave_mesh *mesh, int32_t cell)
     if (mesh->face_offsets) return mesh->face_offsets[cell];
     return (int64_t)cell * wave_cell_shape_of(mesh->uniform_type)->face_count;
 }
-
-/* Fill neighbours, face_offsets and unmatched. Called by wave_mesh_create(). */
-bool wave_mesh_find_neighbours(wave_mesh *mesh);
 
 #endif

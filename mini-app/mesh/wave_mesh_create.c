@@ -1,0 +1,345 @@
+/* Makes one rank's part.
+ *
+ *     own cubes ──> own cells ──> own vertices          (by rising cube id)
+ *     the 26 cubes around each ──> foreign cubes, by (owner, cube) ──> those of their cells that touch an own vertex
+ *     own cells with a corner that a foreign cube has too ──> sends to its owner, by (owner, cell)
+ *
+ * Every corner of a cube is a vertex of one of its cells, whatever they are, so "shares a corner with a cube of rank B"
+ * is "shares a vertex with a cell of rank B", and A's list of sends to B is B's list of receives from A, in the same
+ * order of cell ids. */
+#include "wave_mesh_create.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "wave_faces.h"
+#include "wave_map.h"
+
+typedef struct pair {
+    int32_t rank;
+    int64_t value;
+} pair;
+
+typedef struct pair_list {
+    pair *items;
+    int64_t count, capacity;
+} pair_list;
+
+typedef struct maker {
+    wave_mesh *mesh;
+    wave_map vertex_map;
+    pair_list own, foreign, sends;
+    int64_t cell_capacity, connectivity_capacity, vertex_capacity;
+} maker;
+
+static bool list_add(pair_list *list, int32_t rank, int64_t value)
+{
+    if (list->count == list->capacity) {
+        int64_t capacity = list->capacity ? 2 * list->capacity : 256;
+        pair *items = realloc(list->items, (size_t)capacity * sizeof *items);
+        if (!items) return false;
+        list->items = items;
+        list->capacity = capacity;
+    }
+    list->items[list->count++] = (pair){rank, value};
+    return true;
+}
+
+static int by_rank_and_value(const void *a, const void *b)
+{
+    const pair *x = a, *y = b;
+    if (x->rank != y->rank) return x->rank < y->rank ? -1 : 1;
+    return (x->value > y->value) - (x->value < y->value);
+}
+
+static void list_sort_unique(pair_list *list)
+{
+    int64_t kept = 0;
+    if (list->count == 0) return;
+    qsort(list->items, (size_t)list->count, sizeof(pair), by_rank_and_value);
+    for (int64_t i = 1; i < list->count; ++i) {
+        if (by_rank_and_value(&list->items[i], &list->items[kept]) != 0) list->items[++kept] = list->items[i];
+    }
+    list->count = kept + 1;
+}
+
+static bool find_own_cubes(maker *m)
+{
+    const wave_partition *p = &m->mesh->partition;
+    int low[3], high[3], at[3];
+    wave_partition_box(p, m->mesh->rank, low, high);
+    for (at[2] = low[2]; at[2] < high[2]; ++at[2]) {
+        for (at[1] = low[1]; at[1] < high[1]; ++at[1]) {
+            for (at[0] = low[0]; at[0] < high[0]; ++at[0]) {
+                if (wave_partition_owner(p, at) != m->mesh->rank) continue;
+                if (!list_add(&m->own, m->mesh->rank, wave_lattice_cube(&p->lattice, at))) return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* The owners of a cube and of the 26 around it, -1 outside the lattice. True where any is another rank. */
+static bool owners_around(const wave_mesh *mesh, int64_t cube, int owner[3][3][3])
+{
+    const wave_lattice *lattice = &mesh->partition.lattice;
+    int ijk[3];
+    bool foreign = false;
+    wave_lattice_cube_ijk(lattice, cube, ijk);
+    for (int n = 0; n < 27; ++n) {
+        int at[3] = {ijk[0] + n % 3 - 1, ijk[1] + n / 3 % 3 - 1, ijk[2] + n / 9 - 1};
+        int *o = &owner[n / 9][n / 3 % 3][n % 3];
+        *o = wave_lattice_holds(lattice, at) ? wave_partition_owner(&mesh->partition, at) : -1;
+        foreign = foreign || (*o >= 0 && *o != mesh->rank);
+    }
+    return foreign;
+}
+
+static bool add_foreign_cubes(maker *m, int64_t cube, int owner[3][3][3])
+{
+    const wave_lattice *lattice = &m->mesh->partition.lattice;
+    int ijk[3];
+    wave_lattice_cube_ijk(lattice, cube, ijk);
+    for (int n = 0; n < 27; ++n) {
+        int at[3] = {ijk[0] + n % 3 - 1, ijk[1] + n / 3 % 3 - 1, ijk[2] + n / 9 - 1};
+        int o = owner[n / 9][n / 3 % 3][n % 3];
+        if (o < 0 || o == m->mesh->rank) continue;
+        if (!list_add(&m->foreign, o, wave_lattice_cube(lattice, at))) return false;
+    }
+    return true;
+}
+
+/* Add a send, unless there is one of this cell to the rank; this cell's are the last ones in the list. */
+static bool add_send(maker *m, int rank, int32_t cell)
+{
+    for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
+        if (m->sends.items[i].rank == rank) return true;
+    }
+    return list_add(&m->sends, rank, cell);
+}
+
+/* Every rank with a cube at one of the cell's lattice vertices needs the cell. */
+static bool add_sends(maker *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
+{
+    const wave_lattice *lattice = &m->mesh->partition.lattice;
+    int ijk[3], at[3];
+    wave_lattice_cube_ijk(lattice, cube, ijk);
+    for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
+        if (!wave_lattice_vertex_ijk(lattice, c->vertex[i], at)) continue;
+        for (int n = 0; n < 8; ++n) {
+            int o = owner[at[2] - ijk[2] + (n >> 2)][at[1] - ijk[1] + (n >> 1 & 1)][at[0] - ijk[0] + (n & 1)];
+            if (o < 0 || o == m->mesh->rank) continue;
+            if (!add_send(m, o, cell)) return false;
+        }
+    }
+    return true;
+}
+
+static bool grow_array(void **array, size_t bytes, int64_t capacity)
+{
+    void *larger = realloc(*array, (size_t)capacity * bytes);
+    if (!larger) return false;
+    *array = larger;
+    return true;
+}
+
+static bool reserve_cell(maker *m)
+{
+    wave_mesh *mesh = m->mesh;
+    if (mesh->cells == INT32_MAX - 1) return false;
+    if (mesh->cells == m->cell_capacity) {
+        m->cell_capacity = m->cell_capacity ? 2 * m->cell_capacity : 256;
+        if (!grow_array((void **)&mesh->cell_ids, sizeof(int64_t), m->cell_capacity)) return false;
+        if (!grow_array((void **)&mesh->types, 1, m->cell_capacity)) return false;
+        if (!grow_array(&mesh->offsets, (size_t)mesh->index_bytes, m->cell_capacity + 1)) return false;
+    }
+    if (mesh->connectivity_count + 8 > m->connectivity_capacity) {
+        m->connectivity_capacity = m->connectivity_capacity ? 2 * m->connectivity_capacity : 1024;
+        if (mesh->index_bytes == 4 && m->connectivity_capacity > INT32_MAX) return false;
+        if (!grow_array(&mesh->connectivity, (size_t)mesh->index_bytes, m->connectivity_capacity)) return false;
+    }
+    return true;
+}
+
+static void put_index(const wave_mesh *mesh, void *array, int64_t at, int64_t value)
+{
+    if (mesh->index_bytes == 8) {
+        ((int64_t *)array)[at] = value;
+    } else {
+        ((int32_t *)array)[at] = (int32_t)value;
+    }
+}
+
+static bool add_vertex(maker *m, int64_t id, int32_t *local)
+{
+    wave_mesh *mesh = m->mesh;
+    *local = wave_map_insert(&m->vertex_map, id, mesh->vertices);
+    if (*local < 0) return false;
+    if (*local < mesh->vertices) return true;
+    if (mesh->vertices == m->vertex_capacity) {
+        m->vertex_capacity = m->vertex_capacity ? 2 * m->vertex_capacity : 256;
+        if (!grow_array((void **)&mesh->vertex_ids, sizeof(int64_t), m->vertex_capacity)) return false;
+        if (!grow_array((void **)&mesh->walls, 1, m->vertex_capacity)) return false;
+    }
+    mesh->vertex_ids[mesh->vertices] = id;
+    mesh->walls[mesh->vertices] = wave_lattice_walls(&mesh->partition.lattice, id);
+    mesh->vertices++;
+    return true;
+}
+
+static bool add_cell(maker *m, const wave_cell *c, int64_t id)
+{
+    wave_mesh *mesh = m->mesh;
+    if (!reserve_cell(m)) return false;
+    mesh->cell_ids[mesh->cells] = id;
+    mesh->types[mesh->cells] = c->type;
+    for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
+        int32_t local;
+        if (!add_vertex(m, c->vertex[i], &local)) return false;
+        put_index(mesh, mesh->connectivity, mesh->connectivity_count++, local);
+    }
+    put_index(mesh, mesh->offsets, ++mesh->cells, mesh->connectivity_count);
+    return true;
+}
+
+static bool make_own_cells(maker *m)
+{
+    wave_cell cells[WAVE_CELLS_PER_CUBE];
+    int owner[3][3][3];
+    for (int64_t i = 0; i < m->own.count; ++i) {
+        int64_t cube = m->own.items[i].value;
+        int count = wave_lattice_cells(&m->mesh->partition.lattice, cube, cells);
+        bool foreign = owners_around(m->mesh, cube, owner);
+        if (foreign && !add_foreign_cubes(m, cube, owner)) return false;
+        for (int c = 0; c < count; ++c) {
+            if (foreign && !add_sends(m, cube, m->mesh->cells, &cells[c], owner)) return false;
+            if (!add_cell(m, &cells[c], cube * WAVE_CELLS_PER_CUBE + c)) return false;
+        }
+    }
+    m->mesh->own_cells = m->mesh->cells;
+    m->mesh->own_vertices = m->mesh->vertices;
+    list_sort_unique(&m->foreign);
+    list_sort_unique(&m->sends);
+    return true;
+}
+
+static bool touches_own(const maker *m, const wave_cell *c)
+{
+    for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
+        int32_t local = wave_map_find(&m->vertex_map, c->vertex[i]);
+        if (local >= 0 && local < m->mesh->own_vertices) return true;
+    }
+    return false;
+}
+
+static bool make_halo_cells(maker *m)
+{
+    wave_mesh *mesh = m->mesh;
+    wave_cell cells[WAVE_CELLS_PER_CUBE];
+    int64_t links = 0;
+    for (int64_t i = 0; i < m->foreign.count; ++i) {
+        links += i == 0 || m->foreign.items[i].rank != m->foreign.items[i - 1].rank;
+    }
+    mesh->links = calloc((size_t)links + 1, sizeof *mesh->links);
+    if (!mesh->links) return false;
+    for (int64_t i = 0; i < m->foreign.count; ++i) {
+        int32_t rank = m->foreign.items[i].rank;
+        int64_t cube = m->foreign.items[i].value;
+        int count = wave_lattice_cells(&mesh->partition.lattice, cube, cells);
+        if (mesh->link_count == 0 || mesh->links[mesh->link_count - 1].rank != rank) {
+            mesh->links[mesh->link_count++] = (wave_link){.rank = rank, .receive_begin = mesh->cells};
+        }
+        for (int c = 0; c < count; ++c) {
+            if (!touches_own(m, &cells[c])) continue;
+            if (!add_cell(m, &cells[c], cube * WAVE_CELLS_PER_CUBE + c)) return false;
+        }
+        mesh->links[mesh->link_count - 1].receive_end = mesh->cells;
+    }
+    return true;
+}
+
+static bool make_sends(maker *m)
+{
+    wave_mesh *mesh = m->mesh;
+    int64_t at = 0;
+    if (m->sends.count > INT32_MAX) return false;
+    mesh->send_count = (int32_t)m->sends.count;
+    mesh->sends = malloc(((size_t)m->sends.count + 1) * sizeof *mesh->sends);
+    if (!mesh->sends) return false;
+    for (int l = 0; l < mesh->link_count; ++l) {
+        mesh->links[l].send_begin = (int32_t)at;
+        for (; at < m->sends.count && m->sends.items[at].rank == mesh->links[l].rank; ++at) {
+            mesh->sends[at] = (int32_t)m->sends.items[at].value;
+        }
+        mesh->links[l].send_end = (int32_t)at;
+    }
+    return true;
+}
+
+static void sort_by_id(const wave_mesh *mesh, int32_t *cells, int64_t count)
+{
+    for (int64_t i = 1; i < count; ++i) {
+        int32_t cell = cells[i];
+        int64_t at = i;
+        for (; at > 0 && mesh->cell_ids[cells[at - 1]] > mesh->cell_ids[cell]; --at) cells[at] = cells[at - 1];
+        cells[at] = cell;
+    }
+}
+
+/* Lists the cells around the own vertices. Each vertex's are sorted by cell id, so that sums over them round alike on
+ * every rank that has the vertex. */
+static bool make_around(wave_mesh *mesh)
+{
+    int32_t v[8];
+    mesh->around_offsets = calloc((size_t)mesh->own_vertices + 2, sizeof *mesh->around_offsets);
+    mesh->around = malloc(((size_t)mesh->connectivity_count + 1) * sizeof *mesh->around);
+    if (!mesh->around_offsets || !mesh->around) return false;
+    int64_t *begin = mesh->around_offsets + 1;
+    for (int64_t i = 0; i < mesh->connectivity_count; ++i) {
+        int64_t vertex = wave_mesh_index(mesh, mesh->connectivity, i);
+        if (vertex < mesh->own_vertices) mesh->around_offsets[vertex + 1]++;
+    }
+    int64_t total = 0;
+    for (int32_t i = 0; i < mesh->own_vertices; ++i) {
+        int64_t count = begin[i];
+        begin[i] = total;
+        total += count;
+    }
+    for (int32_t c = 0; c < mesh->cells; ++c) {
+        int count = wave_mesh_cell(mesh, c, v)->vertex_count;
+        for (int i = 0; i < count; ++i) {
+            if (v[i] < mesh->own_vertices) mesh->around[begin[v[i]]++] = c;
+        }
+    }
+    for (int32_t i = 0; i < mesh->own_vertices; ++i) {
+        sort_by_id(mesh, mesh->around + mesh->around_offsets[i], mesh->around_offsets[i + 1] - mesh->around_offsets[i]);
+    }
+    return true;
+}
+
+static void drop_what_a_uniform_mesh_needs_not(wave_mesh *mesh)
+{
+    mesh->uniform_type = wave_lattice_uniform_type(&mesh->partition.lattice);
+    if (!mesh->uniform_type) return;
+    free(mesh->types);
+    free(mesh->offsets);
+    mesh->types = NULL;
+    mesh->offsets = NULL;
+}
+
+bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes, wave_mesh *mesh)
+{
+    *mesh = (wave_mesh){.partition = *partition, .rank = rank, .index_bytes = index_bytes};
+    maker m = {.mesh = mesh};
+    bool ok = find_own_cubes(&m) && reserve_cell(&m);
+    if (ok) put_index(mesh, mesh->offsets, 0, 0);
+    ok = ok && make_own_cells(&m) && make_halo_cells(&m) && make_sends(&m);
+    wave_map_free(&m.vertex_map);
+    free(m.own.items);
+    free(m.foreign.items);
+    free(m.sends.items);
+    if (ok) drop_what_a_uniform_mesh_needs_not(mesh);
+    ok = ok && make_around(mesh) && wave_faces_find_neighbours(mesh);
+    if (!ok) wave_mesh_free(mesh);
+    return ok;
+}
