@@ -17,7 +17,7 @@
 
 enum {
     MMBVH_MAX_LEAF = 7,
-    MMBVH_MAX_DEPTH = 80 /* of a leaf, where the root has 1; so many entries are enough for a traversal's stack */
+    MMBVH_MAX_DEPTH = 80 /* of a leaf, where the root has depth 1; a traversal's stack needs no more entries */
 };
 
 typedef struct mmbvh_node {

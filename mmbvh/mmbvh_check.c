@@ -179,7 +179,7 @@ static insitu_status check_inner(walk *w, int64_t index)
 
 static insitu_status check_nodes(walk *w)
 {
-    /* The right child of every pair on the way down waits here. */
+    /* The right child of each pair on the way down, to be visited later. */
     struct {
         int64_t index;
         int depth;

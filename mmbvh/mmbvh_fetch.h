@@ -11,8 +11,8 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* How a cell's vertices are found. Cells may all be tets, one after the other, or all hexes, or all of another type, or
- * each has a type of its own. */
+/* The way in which a cell's vertices are found. Cells are all tets, one after the other, or all hexes, or all of
+ * another type, or each has a type of its own. */
 typedef enum fetch_shape { FETCH_TETS, FETCH_HEXES, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
 
 static inline fetch_shape fetch_grid_shape(const grid *g)

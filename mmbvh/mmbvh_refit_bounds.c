@@ -7,7 +7,8 @@
 
 enum {
     PREFETCH_CELLS = 48,
-    VISIBLE_NODES = 16 /* of a run where not all are swept; looking for nodes that show nothing does not pay in fewer */
+    VISIBLE_NODES = 16 /* in a run of a sweep that leaves nodes out; in shorter runs looking for nodes that show nothing
+                          does not pay */
 };
 
 static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *misfits, double *grown)
@@ -42,6 +43,15 @@ sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source)
     sweep s = {.tree = tree, .source = source, .run = run_bounds};
     sweep_bounds_as_floats(&s);
     return s;
+}
+
+sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges)
+{
+    sweep both;
+    if (sweep_both_as_floats(ranges, source, &both)) return both;
+    both = sweep_of_bounds(tree, source);
+    both.then = ranges;
+    return both;
 }
 
 /* Finds the bounds of all the tree's cells, in the source's coordinates. */

@@ -175,16 +175,12 @@ void sweep_bounds_as_floats(sweep *bounds)
     bounds->run_max = PART_NODES;
 }
 
-sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges)
+bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both)
 {
-    if (source->read_spans && sweep_reads_floats(ranges)) {
-        sweep both = *ranges;
-        both.source = source;
-        both.run = run_both_table[fetch_grid_shape(source->g)][source->g->connectivity.is_wide];
-        both.run_max = PART_NODES;
-        return both;
-    }
-    sweep bounds = sweep_of_bounds(tree, source);
-    bounds.then = ranges;
-    return bounds;
+    if (!source->read_spans || !sweep_reads_floats(ranges)) return false;
+    *both = *ranges;
+    both->source = source;
+    both->run = run_both_table[fetch_grid_shape(source->g)][source->g->connectivity.is_wide];
+    both->run_max = PART_NODES;
+    return true;
 }

@@ -25,7 +25,7 @@ struct selector {
     uint64_t *bits;
 };
 
-/* Whether a cell's values are finite, and whether their range meets an interval. */
+/* Tells whether a cell's values are finite, and whether their range meets an interval. */
 typedef struct finding {
     bool is_finite, meets;
 } finding;

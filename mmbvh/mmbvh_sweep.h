@@ -60,6 +60,9 @@ bool sweep_reads_floats(const sweep *ranges);
  * the same tree. If either cannot be read as floats, they run one after the other. */
 sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
 
+/* Makes the sweep that does both sweeps' work in one pass. Returns false if either cannot be read as floats. */
+bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both);
+
 /* Returns how many threads options ask for. */
 int sweep_threads(const mmbvh_options *options);
 

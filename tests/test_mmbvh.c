@@ -35,14 +35,6 @@ static mmbvh build_by(const lattice *l, const grid_field *field, int threads)
     return tree;
 }
 
-static mmbvh_statistics assert_proved(const mmbvh *tree, const grid *g, const grid_field *field)
-{
-    mmbvh_statistics statistics = {0};
-    base_error error = {0};
-    if (mmbvh_check(tree, g, field, &statistics, &error)) fail_msg("%s", error.message);
-    return statistics;
-}
-
 /* The box of a cell, in the tree's coordinates, in double. */
 static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double lower[3], double upper[3])
 {

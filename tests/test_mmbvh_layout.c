@@ -25,14 +25,6 @@ static mmbvh build(const lattice *l, mmbvh_layout layout, mmbvh_builder builder)
     return tree;
 }
 
-static mmbvh_statistics assert_proved(const mmbvh *tree, const grid *g, const grid_field *field)
-{
-    mmbvh_statistics statistics = {0};
-    base_error error = {0};
-    if (mmbvh_check(tree, g, field, &statistics, &error)) fail_msg("%s", error.message);
-    return statistics;
-}
-
 /* Boxes at random in a grid at random: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. The stored
  * box holds the given one; its lower bound is off by a step and one for rounding, its extent by 1/256 and a sixteenth
  * of a step (mmbvh_compact.h). */

@@ -23,6 +23,14 @@ static inline node_view view_node(const mmbvh *tree, int64_t index)
     return v;
 }
 
+static inline mmbvh_statistics assert_proved(const mmbvh *tree, const grid *g, const grid_field *field)
+{
+    mmbvh_statistics statistics = {0};
+    base_error error = {0};
+    if (mmbvh_check(tree, g, field, &statistics, &error)) fail_msg("%s", error.message);
+    return statistics;
+}
+
 static inline size_t node_size(const mmbvh *tree)
 {
     return tree->compact ? sizeof *tree->compact : sizeof *tree->nodes;

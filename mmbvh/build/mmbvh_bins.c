@@ -99,7 +99,7 @@ void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, 
     }
 }
 
-/* Half the surface areas of three boxes, in lanes 0 to 2. */
+/* Returns half the surface areas of three boxes, in lanes 0 to 2. */
 static inline vec4 half_areas(const lanes boxes[3])
 {
     const lanes x = item_extent(boxes[0]), y = item_extent(boxes[1]), z = item_extent(boxes[2]);

@@ -12,8 +12,8 @@
 
 enum {
     BINS_MAX = 16,
-    BINS_SAMPLED = 2048, /* with so many items or more, */
-    BINS_STRIDE = 7      /* one item of so many tells as well where to split */
+    BINS_SAMPLED = 2048, /* of so many items or more */
+    BINS_STRIDE = 7      /* one in so many is taken into the bins; it tells as well where to split */
 };
 
 /* Maps twice the centroid, less TOP, to a bin on each axis. Lanes 4 to 6 repeat 0 to 2, for two items at a time. */

@@ -15,7 +15,7 @@
 enum {
     CHUNK_MIN = 16384,
     CHUNKS_MAX = 64,
-    PARALLEL_MIN = 8 * CHUNK_MIN /* fewer items make one task, which is long enough for a thread */
+    PARALLEL_MIN = 8 * CHUNK_MIN /* a node of fewer items is one task */
 };
 
 /* A node before it is split. */

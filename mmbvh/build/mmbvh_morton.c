@@ -9,7 +9,7 @@
 
 enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
-    DIGIT_BITS = 11, /* a core's cache can hold the ends of so many streams */
+    DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
     DIGITS = 1 << DIGIT_BITS,
     SORT_CHUNKS = 4, /* per thread, so that others can take those of a delayed one */
     SORT_CHUNKS_MAX = 64,

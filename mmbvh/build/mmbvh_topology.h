@@ -73,7 +73,7 @@ int64_t topology_node_count(const topology *t);
  */
 void topology_write(topology *t, const mmbvh *tree, int threads);
 
-/* NULL is fine. */
+/* t may be NULL. */
 void topology_free(topology *t);
 
 #endif
