@@ -1,4 +1,4 @@
-/* Which instruction sets this machine has. */
+/* Finds which instruction sets this machine has. */
 #ifndef BASE_CPU_H
 #define BASE_CPU_H
 

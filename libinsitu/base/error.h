@@ -1,5 +1,5 @@
-/* How a room reports an error: a status and one message, filled by the function that decides and passed up unchanged.
- */
+/* A room reports an error as a status and one message. The function that finds the error fills them in, and they are
+ * passed up unchanged. */
 #ifndef BASE_ERROR_H
 #define BASE_ERROR_H
 

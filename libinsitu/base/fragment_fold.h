@@ -42,8 +42,8 @@ static inline int32_t fragment_stretch(float t)
 /* Folds fragments of one stretch to one. They are in order, with no surface among them; count >= 1. */
 fragment fragment_fold(const fragment *sorted, int64_t count);
 
-/* The same on a rank that has all there is from depth begin to end: only halves that lie between are folded. out may be
- * sorted itself; returns how many fragments it gets. */
+/* Folds on a rank that has all of the pixel's fragments from depth begin to end: only halves that lie between these
+ * depths are folded. out may be sorted itself. Returns how many fragments out gets. */
 int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out);
 
 #endif

@@ -20,7 +20,7 @@ enum {
     GRID_WEDGE = 13,
     GRID_PYRAMID = 14,
     GRID_POLYHEDRON = 42,
-    GRID_MAX_CELL_VERTICES = 8 /* of the types of a fixed number of vertices: all but polyhedra and polygons */
+    GRID_MAX_CELL_VERTICES = 8 /* of a type that fixes the number: all types but polyhedra and polygons */
 };
 
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
@@ -115,7 +115,7 @@ static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertic
     return count;
 }
 
-/* May there be polyhedra? */
+/* Tells whether the grid may have polyhedra. */
 static inline bool grid_has_faces(const grid *g)
 {
     return g->face_offsets.data != 0;
@@ -135,7 +135,8 @@ static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *firs
     *end = grid_array_index(&g->face_offsets, face + 1);
 }
 
-/* A walk over the vertices of a cell of any type. A polyhedron's come as often as its faces have them. */
+/* A walk over the vertices of a cell of any type. A polyhedron's vertex comes once for each of its faces that has it.
+ */
 typedef struct grid_walk {
     const grid *cells;
     bool is_polyhedron;
@@ -194,13 +195,13 @@ static inline bool grid_is_shell(const grid *g, int64_t cell)
     return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
 }
 
-/* Neither a ghost nor flat: trees hold such cells. */
+/* Tells whether the cell is neither a ghost nor flat. Trees hold such cells. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
 }
 
-/* The same or a shell: pictures may show such cells. */
+/* Tells whether the cell is drawn or is a shell. Pictures may show such cells. */
 static inline bool grid_is_seen(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));
@@ -229,8 +230,8 @@ static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
     return !f->own || isfinite(grid_field_value(f->own, cell));
 }
 
-/* The values at the cell's vertices (or the cell's own, count times). False where one is NaN or infinite: such a
- * cell is not drawn. */
+/* Reads the values at the cell's vertices, or the cell's own value count times. Returns false where one is NaN or
+ * infinite: such a cell is not drawn. */
 static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count,
                                     double *values)
 {

@@ -7,10 +7,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* bytes of 64-byte aligned memory, or NULL. 0 bytes gives a pointer that may be freed. */
+/* Returns 64-byte aligned memory, or NULL. A block of 0 bytes is a pointer that may be freed. */
 void *base_alloc(size_t bytes);
 
-/* The same, zeroed. */
+/* As base_alloc(), with all bytes 0. */
 void *base_calloc(size_t count, size_t size);
 
 /* base_reserve() gives room for bytes that are not counted yet, since memory that is not written to takes none.
@@ -18,10 +18,11 @@ void *base_calloc(size_t count, size_t size);
 void *base_reserve(size_t bytes);
 void base_use(void *block, size_t bytes);
 
-/* Grow or shrink, contents kept; on failure NULL and the old block stays. NULL block: base_alloc. */
+/* Grows or shrinks a block and keeps its contents. Returns NULL on failure, and the old block stays. For a NULL block
+ * it is base_alloc(). */
 void *base_realloc(void *block, size_t bytes);
 
-/* NULL is fine. */
+/* block may be NULL. */
 void base_free(void *block);
 
 /* A copy of a C string, or NULL. */

@@ -69,7 +69,7 @@ static void add_text(table_line *line, const char *text, char end)
     add_bytes(line, &end, 1);
 }
 
-/* Empty is Spec D's word for what is not there. */
+/* In Spec D an empty field says that there is no value. */
 static void add_nothing(table_line *line)
 {
     add_bytes(line, ",", 1);

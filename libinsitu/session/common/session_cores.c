@@ -1,5 +1,6 @@
-/* Ranks that are bound to no cores share all, ranks of a socket or a container those of it, and a rank bound to its own
- * cores has these for itself. What they may run on tells all these apart, whoever has bound them. */
+/* Ranks that are bound to no cores share all cores. Ranks that are bound to a socket or a container share its cores,
+ * and a rank that is bound to cores of its own has them for itself. The cores that each rank may run on tell these
+ * cases apart, whoever has bound the ranks. */
 #define _GNU_SOURCE 1
 #include "session_cores.h"
 
@@ -20,7 +21,8 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
     return share > 1 ? (int)share : 1;
 }
 
-/* Marks the cores of OpenMP's places. Where there are any, OpenMP has bound this thread to the first of them already. */
+/* Marks the cores of OpenMP's places. Where there are any, OpenMP has bound this thread to the first of them already.
+ */
 static void find_places(int32_t may_run[MOST_CORES])
 {
     for (int place = 0; place < omp_get_num_places(); place++) {

@@ -1,4 +1,4 @@
-/* How many of its node's cores a rank has for itself. */
+/* Counts how many of its node's cores a rank has for itself. */
 #ifndef SESSION_CORES_H
 #define SESSION_CORES_H
 
@@ -10,8 +10,8 @@
  * down, and at least 1. Local. */
 int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores);
 
-/* The same for this rank, and the ranks of its node. Collective over node. Where the system does not say on which cores
- * a rank may run, it has a share of as many as OpenMP counts. */
+/* Finds this rank's share among the ranks of its node. Where the system does not say on which cores a rank may run, the
+ * cores that OpenMP counts are divided by the ranks. Collective over node. */
 int session_cores_of_rank(MPI_Comm node);
 
 #endif

@@ -16,11 +16,12 @@ void session_guard_begin(session_guard *guard);
 /* Give it back, exception flags too. */
 void session_guard_end(const session_guard *guard);
 
-/* The same for the other threads of teams of this size, between the calls above. Threads that OpenMP starts for it are
- * born under the caller's own environment, as if the caller had needed them first. */
+/* Gives the default environment to the other threads of teams of this size. Call it between the two calls above.
+ * Threads that OpenMP starts for it begin under the caller's own environment, as if the caller had needed them first.
+ */
 void session_guard_begin_team(const session_guard *guard, int threads);
 
-/* Give the threads that were there at the begin their environment back. */
+/* Gives each thread that was there at the begin its environment back. */
 void session_guard_end_team(int threads);
 
 #endif

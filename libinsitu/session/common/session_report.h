@@ -45,7 +45,7 @@ typedef enum session_warning_kind {
     WARNING_PLANE,    /* a plane lies outside of the meshes that it is drawn on */
     WARNING_SCALE,    /* a field has no value that its logarithmic scale can show */
     WARNING_VIEW,     /* a camera sees no cell */
-    WARNING_GREY,     /* a surface has not the field that colours it */
+    WARNING_GREY,     /* a surface does not have the field that colours it */
     WARNING_OVERLAP,  /* cells overlap in some pixels */
     WARNING_WORDS,    /* rank 0 has no font for the words of a picture */
     WARNING_WRITER,   /* rank 0 has no thread to write pictures */
@@ -55,7 +55,7 @@ typedef enum session_warning_kind {
 /* The subject of a warning. Two warnings are the same if all of this is. */
 typedef struct session_warning {
     session_warning_kind kind;
-    const char *image, *mesh; /* NULL: of none */
+    const char *image, *mesh; /* NULL: the warning is about none */
     int number;
 } session_warning;
 
@@ -63,7 +63,7 @@ typedef struct session_warning {
 void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
-/* Was the warning told, and has it held since? Local. */
+/* Tells whether the warning was told and has held since. Local. */
 bool session_is_warned(const session_report *report, const session_warning *warning);
 
 /* Forget which warnings were told. Local. */

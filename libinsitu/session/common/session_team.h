@@ -10,13 +10,14 @@
 
 typedef struct session_team {
     MPI_Comm comm;             /* the session's own; MPI's errors are returned */
-    MPI_Comm compositing_comm; /* on which compositing alone talks */
+    MPI_Comm compositing_comm; /* used by compositing alone */
     int rank, ranks;
-    int node_ranks; /* ranks on this rank's node, itself among them */
-    int cores;      /* this rank's share of the node's (session_cores.h) */
-    int each_node_ranks; /* ranks on every node, where these lie one node after the other or round them; else 1 */
-    bool is_round_nodes; /* round them: neighbours in rank are on different nodes */
-    int threads;    /* of this rank in this step; 0 before the first */
+    int node_ranks;      /* ranks on this rank's node, itself among them */
+    int cores;           /* this rank's share of the node's (session_cores.h) */
+    int each_node_ranks; /* ranks on every node, if all nodes have as many and ranks are placed node by node or in turn;
+                            else 1 */
+    bool is_round_nodes; /* ranks are placed in turn: neighbours in rank are on different nodes */
+    int threads;         /* of this rank in this step; 0 before the first */
 } session_team;
 
 /* Duplicates the caller's communicator, twice. What was duplicated when an error came is in *out, to be freed.

@@ -139,9 +139,9 @@ static void start_trial(trial *t, int wanted)
     pthread_mutex_lock(&t->gate);
     if (!t->threads || !t->room || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
-    if (stack) pthread_attr_setstacksize(&attributes, stack); /* one that is refused here OpenMP does not take either */
+    if (stack) pthread_attr_setstacksize(&attributes, stack); /* OpenMP does not take a size that is refused here */
     sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old); /* the caller's signals are not for these */
+    pthread_sigmask(SIG_SETMASK, &all, &old); /* these threads must not take the caller's signals */
     while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, pass_gate, &t->gate) == 0)
         t->count++;
     pthread_sigmask(SIG_SETMASK, &old, NULL);

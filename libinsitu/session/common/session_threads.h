@@ -15,7 +15,7 @@
  * and SSE4.2 kernels and 142 with AVX2, 99 and 122 of a worker's; AVX-512's frames are a quarter larger. */
 enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 
-/* How many threads are known to be there, or to be possible, for the thread that called last. */
+/* The number of threads that are known to be there, or to be possible, for the thread that called last. */
 typedef struct session_threads {
     int count; /* 0: not yet tried */
     pthread_t caller;

@@ -48,7 +48,7 @@ static bool cut_near(seen_point *a, seen_point *b, double near)
     return true;
 }
 
-/* Is the box's face across this axis, at its low or high end, seen from outside? */
+/* Tells whether the box's face across this axis, at its low or high end, is seen from outside. */
 static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
@@ -295,7 +295,7 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
-/* The decorations that tell lengths. */
+/* Fills in the decorations that tell lengths. */
 static void fill_lengths(session_decorations *d, const scene_decorations *scene, const session_extent *extent,
                          const render_camera *camera)
 {

@@ -93,7 +93,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 
 /* ---- logarithmic --------------------------------------------------------------------------------------------- */
 
-/* Which numbers of a power of ten get a tick: 1, or 1, 2 and 5, of every so many powers. */
+/* The numbers of a power of ten that get a tick: 1, or 1, 2 and 5, of every so many powers. */
 typedef struct decade_choice {
     bool has_2_and_5;
     int every;

@@ -6,7 +6,7 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* A mesh over all ranks; the same on every rank. */
+/* A field of a mesh over all ranks; the same on every rank. */
 typedef struct session_catalogue_field {
     char *name;
     int component_count;

@@ -3,10 +3,6 @@
  * both orders, as tets, are not copied. */
 #include "session_cell_order.h"
 
-#include "session_topology.h"
-
-enum { ORDERS = INSITU_ORDER_DMPLEX + 1 };
-
 /* The places of VTK's vertices in the other order; NULL: the orders are the same. Each turn is its own inverse. */
 static const signed char *turn_of(insitu_vertex_order order, int type)
 {

@@ -5,15 +5,15 @@
 
 #include "session_mesh.h"
 
-/* Is there anything to be done? */
+/* Tells whether session_order_cells() has anything to do. */
 bool session_is_reordered(const insitu_mesh *given);
 
-/* The cells' vertices one cell after the other in VTK's order, in the mesh's topology. Indices are taken as they are,
- * good or not; cells with bad offsets are left in the order they have: session_check.c tells of both. Local. */
+/* Copies the cells' vertices into the mesh's topology, one cell after the other, in VTK's order. Bad indices are copied
+ * as they are, and cells with bad offsets keep their order: session_check.c reports both. Local. */
 insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error);
 
-/* Bring the entries of each cell from the caller's order into VTK's, or back: it is the same. out has so many entries,
- * cells one after the other. */
+/* Bring the entries of each cell from the caller's order into VTK's, or back: both are the same permutation. out has
+ * that many entries, one cell after the other. */
 void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
 
 #endif

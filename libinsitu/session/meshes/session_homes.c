@@ -8,7 +8,6 @@
 #include "session_agree.h"
 #include "session_mesh.h"
 #include "session_team.h"
-#include "session_topology.h"
 
 enum { MOST_SAMPLES = 1024 };
 

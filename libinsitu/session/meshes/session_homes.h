@@ -1,6 +1,6 @@
-/* Where ranks meet about what several of them have: vertices and faces on the borders between their parts of a mesh.
- * Each such thing has a home, a rank that all who have it know without a word, and that lies near them: so what a rank
- * sends to how many does not grow with the number of ranks.
+/* The homes of what several ranks have: vertices and faces on the borders between their parts of a mesh. The home of
+ * such a thing is a rank near it, which all ranks that have the thing can find without a message. So neither the mail
+ * of a rank nor the number of ranks that it writes to grows with the number of ranks.
  *
  * By coordinates, which are the same bits on all ranks: one of the ranks in whose box all its vertices lie, chosen by
  * its hash. By global ids, with which coordinates may differ in their last bits: ranks divide the ids among them. Each
@@ -43,7 +43,7 @@ void session_homes_free(session_homes *homes);
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *mesh, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 
-/* Does the point lie in another rank's box? */
+/* Tells whether the point lies in another rank's box. */
 bool session_homes_share(const session_homes *homes, const double point[3]);
 
 /* Returns the home of a thing whose vertices are at these points, at least one, in this rank's box. id is the least of

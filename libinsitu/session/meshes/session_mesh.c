@@ -6,6 +6,45 @@
 #include "memory.h"
 #include "session_agree.h"
 
+grid_array session_grid_array(const insitu_array *array)
+{
+    grid_array out = {0};
+    if (!array->data) return out;
+    out.data = array->data;
+    out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
+    out.is_wide = session_type_size(array->type) == 8;
+    out.is_integer = array->type == INSITU_INT32 || array->type == INSITU_INT64;
+    return out;
+}
+
+grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array)
+{
+    grid_array out = session_grid_array(array);
+    out.base = mesh->index_base;
+    return out;
+}
+
+bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
+                          base_error *error)
+{
+    const bool is_wide = largest > INT32_MAX;
+    const int64_t size = is_wide ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
+    const long long bytes = size * (count + 1);
+    const void *data = base_calloc((size_t)count + 1, (size_t)size);
+    if (!data) {
+        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name, bytes, what);
+        return false;
+    }
+    *out = (grid_array){data, size, is_wide, true, 0};
+    return true;
+}
+
+void session_drop_array(grid_array *array)
+{
+    base_free((void *)(uintptr_t)array->data);
+    *array = (grid_array){0};
+}
+
 void session_drop_gradients(session_scalar *scalar)
 {
     base_free(scalar->gradient_entries);
@@ -43,25 +82,20 @@ void session_drop_tree(session_mesh *mesh)
     }
 }
 
-static void free_array(const grid_array *array)
-{
-    base_free((void *)(uintptr_t)array->data);
-}
-
 void session_drop_topology(session_topology *topology)
 {
-    free_array(&topology->offsets);
-    free_array(&topology->connectivity);
+    session_drop_array(&topology->offsets);
+    session_drop_array(&topology->connectivity);
     base_free(topology->cell_types);
-    free_array(&topology->face_offsets);
-    free_array(&topology->face_connectivity);
+    session_drop_array(&topology->face_offsets);
+    session_drop_array(&topology->face_connectivity);
     *topology = (session_topology){0};
 }
 
 void session_drop_torn(session_torn *torn)
 {
-    free_array(&torn->corners);
-    for (int axis = 0; axis < 3; axis++) free_array(&torn->coordinates[axis]);
+    session_drop_array(&torn->corners);
+    for (int axis = 0; axis < 3; axis++) session_drop_array(&torn->coordinates[axis]);
     *torn = (session_torn){0};
 }
 

@@ -13,9 +13,9 @@ typedef struct session_field {
     int64_t component_stride;
     base_error problem; /* of the last insitu_set_field() */
     bool has_index;
-    bool is_copy_stale; /* it is of other values, or by another index */
-    bool is_wanted;     /* by statistics of this step; what images use has scalars */
-    bool is_filled;     /* in this step, where given.fill makes the values; or it failed: */
+    bool is_copy_stale; /* it was made of other values or by another index */
+    bool is_wanted;     /* by statistics of this step; fields of images have scalars */
+    bool is_filled;     /* given.fill has made the values in this step, unless it failed: */
     base_error fill_problem;
     insitu_patch *patches; /* given.patches, a table of ours */
     char *copy;            /* NULL until made; packed tuples, components interleaved */
@@ -47,12 +47,12 @@ typedef struct session_scalar {
     bool needs_all;     /* an image of this step may need any cell */
     int interval_count; /* else the values that this step's images show: cells with some are candidates */
     mmbvh_interval *intervals;
-    session_plane plane;       /* of distances: what they are from */
+    session_plane plane;       /* the plane that distances are from */
     float *distances;          /* at vertices, a declared copy; NULL until computed */
     double *vertex_values;     /* recentred values, a declared copy; NULL until computed */
-    grid_field own;            /* of a recentred one in use: the cells' */
-    int32_t *gradient_entries; /* a declared copy, for smooth normals of the last step that drew some: of each vertex,
-                                  which of the gradients, or -1; NULL until computed */
+    grid_field own;            /* the cells' own values, where recentred ones are in use */
+    int32_t *gradient_entries; /* each vertex's entry in gradients, or -1; NULL until computed. A declared copy, for
+                                  smooth normals of the last step that drew some */
     float (*gradients)[3];
     int64_t gradient_count;
     bool are_values_stale; /* recentred ones are to be computed again */
@@ -98,14 +98,14 @@ typedef struct session_outer {
     int64_t *connectivity, *offsets;
     unsigned char *types;
     int64_t *loops;                         /* as render_part.loops */
-    int64_t *vertex_origins, *cell_origins; /* of which vertex and cell of the whole mesh each has its values */
+    int64_t *vertex_origins, *cell_origins; /* the vertex and the cell of the whole mesh whose values each has */
     int64_t bytes;
 } session_outer;
 
 /* Arrays of the session's own that are read in place of the caller's (session_topology.h). They are made once for each
  * topology, and are declared copies. */
 typedef struct session_topology {
-    bool is_made;                     /* of the cells of now, be it that nothing had to be made */
+    bool is_made;                     /* for the present cells, even if nothing had to be made */
     bool has_own_order;               /* connectivity is read, beside the caller's offsets and types */
     bool has_own_cells;               /* those next are read, else the caller's */
     grid_array offsets, connectivity; /* no offsets: all cells are of cell_type */
@@ -113,7 +113,7 @@ typedef struct session_topology {
     int cell_type;
     bool has_own_faces;                                  /* those next are read, else the caller's */
     grid_array face_offsets, face_connectivity;          /* no data: there are no polyhedra */
-    int64_t connectivity_count, face_connectivity_count; /* of the arrays that are read, whosever they are */
+    int64_t connectivity_count, face_connectivity_count; /* of the arrays that are read, the caller's or these */
     int64_t cell_bytes, face_bytes;
     int64_t polyhedron_count; /* of the caller's */
     int64_t recognised_count; /* of them: read as tets, hexes, wedges or pyramids */
@@ -123,10 +123,10 @@ typedef struct session_topology {
  * declared copy. Corners count as the caller's connectivity has them, rows without their rests. */
 typedef struct session_torn {
     bool is_torn; /* else all is empty */
-    bool is_made; /* of the coordinates of now */
+    bool is_made; /* from the present coordinates */
     int64_t corner_count;
     grid_array shared;  /* the connectivity that is torn */
-    grid_array corners; /* of each entry of it: which corner that is. Its own inverse. */
+    grid_array corners; /* the corner of each entry of shared; the map is its own inverse */
     grid_array coordinates[3];
     int64_t bytes;
 } session_torn;
@@ -158,7 +158,7 @@ typedef struct session_mesh {
     bool are_bounds_partial; /* the full tree's bounds are of the candidates, likewise */
     double built_surface;    /* half the surface of the mesh's bounds when the tree was built */
     uint64_t candidates_key;
-    int full_tree_steps; /* that the full tree of now, or the last one, has served; 0: there was none yet */
+    int full_tree_steps; /* steps that the present full tree, or the last one, has served; 0: there was none yet */
     double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */
     int scalar_count;
     session_scalar *scalars;
@@ -173,7 +173,7 @@ typedef struct session_meshes {
     session_mesh **items;   /* by name */
     bool are_cells_changed; /* or coordinates, since the last agreed extent */
     bool are_names_changed; /* since the last agreed catalogue */
-    base_error pending;     /* of a set call that had no mesh to stay with; for one step */
+    base_error pending;     /* the error of a set call that had no mesh to keep it; for one step */
 } session_meshes;
 
 static inline int64_t session_type_size(insitu_type type)
@@ -187,6 +187,29 @@ static inline int64_t session_type_size(insitu_type type)
     }
     return 0;
 }
+
+/* An array as the rooms below read it; its indices count from 0. */
+grid_array session_grid_array(const insitu_array *array);
+
+/* As above, for an array whose indices count from the mesh's index_base. */
+grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
+
+/* Allocates count + 1 indices, all 0, of 4 bytes where largest fits into them, else of 8. Returns false where memory
+ * runs out; the error then names the mesh and what the indices are of. */
+bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
+                          base_error *error);
+
+static inline void session_put_index(const grid_array *array, int64_t i, int64_t value)
+{
+    char *p = (char *)(uintptr_t)array->data + i * array->stride;
+    if (array->is_wide)
+        *(int64_t *)(void *)p = value;
+    else
+        *(int32_t *)(void *)p = (int32_t)value;
+}
+
+/* Frees an array of the session's own. */
+void session_drop_array(grid_array *array);
 
 /* NULL: there is none of this name. */
 session_mesh *session_find_mesh(const session_meshes *meshes, const char *name);

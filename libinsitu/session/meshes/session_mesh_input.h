@@ -17,11 +17,12 @@ typedef struct session_array_rule {
     bool is_optional;
 } session_array_rule;
 
-/* Is it given, of a type and stride that it may have, and aligned? bad: the status of what is wrong beside types. */
+/* Checks that the array is given, has an allowed type and stride, and is aligned. bad: the status where anything but
+ * the type is wrong. */
 insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                   base_error *error);
 
-/* Are they read from the same place in the same way? */
+/* Tells whether both are read from the same place in the same way. */
 bool session_is_same_array(const insitu_array *a, const insitu_array *b);
 
 /* Put "mesh "name": ", and the field's name where there is one, in front of what a check said. */

@@ -99,7 +99,8 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
     return box;
 }
 
-/* Has the cell no volume at any of its corners? One turned through itself may have none in sum, and yet be there. */
+/* Tells whether the cell has no volume at any of its corners. A cell that is turned through itself may have none in
+ * sum, and still be there. */
 static bool is_flat_everywhere(int type, double points[][3])
 {
     const cell_corners of = corners_of(type);
@@ -329,7 +330,7 @@ MMBVH_INLINE void tally_bounds(mesh_tally *t, const lane_bounds *b)
         }
 }
 
-/* Are so many entries from the first on indices of vertices? By the signs of index and last - index. */
+/* Tells whether that many entries from the first on are indices of vertices, by the signs of index and last - index. */
 MMBVH_INLINE bool are_vertices(const grid *g, int64_t first, const int count, const bool wide_index)
 {
     const int64_t last = g->vertex_count - 1;
@@ -407,7 +408,7 @@ MMBVH_INLINE void tally_volumes(mesh_tally *t, lanes least, const lanes volume)
     t->drawn += LANES;
 }
 
-/* False, and nothing done, where cells are to be taken one by one. */
+/* Returns false, with nothing done, where cells are to be taken one by one. */
 MMBVH_INLINE bool run_lanes(const grid *g, int64_t cell, mesh_tally *t, lane_bounds *bounds, const fetch_shape shape,
                             const bool wide_index, const bool wide_number)
 {

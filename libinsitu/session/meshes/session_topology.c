@@ -8,13 +8,14 @@
  * alone, never by coordinates: all ranks that have the cell take it for the same, and so does every step of a mesh that
  * moves.
  *
- *      t3 ------ t2      The base is any face of the right size. The face on the other side of each of its edges
- *      /|        /|      is a side, which tells what stands above the edge's ends: t0 and t1 above a0 and a1. If
- *     / |       / |      neighbouring sides agree in what is above the vertex between them, if the one face that is
- * t0 ------ t1  |      left goes around the tops in their order, and if no two vertices are the same, then every | a3
- * -----|- a2     face has its place and every edge is one of two faces: the cell is closed, and is a hex | /       | /
- * (base of 4), or a wedge (base of 3). Sides that are triangles have one top, of a pyramid or a |/        |/ tet. The
- * faces' own directions are not asked. a0 ------ a1
+ *      t3 ------ t2
+ *      /|        /|      The base is any face of the right size. The face on the other side of each of its edges
+ *     / |       / |      is a side, which tells what stands above the edge's ends: t0 and t1 above a0 and a1. The
+ *    t0 ------ t1 |      cell is closed if neighbouring sides agree in what is above the vertex between them, if
+ *     | a3 ----|- a2     the one face that is left goes around the tops in their order, and if no two vertices are
+ *     | /      | /       the same: then every face has its place, and every edge is one of two faces. It is a hex
+ *     |/       |/        where the base has four vertices, and a wedge where it has three. Sides that are triangles
+ *     a0 ----- a1        have one top, which is that of a pyramid or a tet. The faces' own directions do not matter.
  *
  * If any cell is wrong, nothing is recognised in the mesh, so that session_check.c reports the error in the caller's
  * terms. */
@@ -26,25 +27,7 @@
 #include "session_cell_order.h"
 #include "session_tally.h"
 
-/* ---- arrays --------------------------------------------------------------------------------------------------- */
-
-grid_array session_grid_array(const insitu_array *array)
-{
-    grid_array out = {0};
-    if (!array->data) return out;
-    out.data = array->data;
-    out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
-    out.is_wide = session_type_size(array->type) == 8;
-    out.is_integer = array->type == INSITU_INT32 || array->type == INSITU_INT64;
-    return out;
-}
-
-grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array)
-{
-    grid_array out = session_grid_array(array);
-    out.base = mesh->index_base;
-    return out;
-}
+/* ---- the grid --------------------------------------------------------------------------------------------------- */
 
 static grid as_grid(const insitu_mesh *mesh)
 {
@@ -104,30 +87,9 @@ int session_given_type(const session_mesh *mesh, int64_t cell)
     return grid_cell_type(&given, cell);
 }
 
-bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
-                          base_error *error)
-{
-    const bool is_wide = largest > INT32_MAX;
-    const int64_t size = is_wide ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
-    const long long bytes = size * (count + 1);
-    const void *data = base_calloc((size_t)count + 1, (size_t)size);
-    if (!data) {
-        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name, bytes, what);
-        return false;
-    }
-    *out = (grid_array){data, size, is_wide, true, 0};
-    return true;
-}
-
-static void free_indices(grid_array *array)
-{
-    base_free((void *)(uintptr_t)array->data);
-    *array = (grid_array){0};
-}
-
 /* ---- faces' vertices out of lists ----------------------------------------------------------------------------- */
 
-/* How many vertices all faces have, -1 where a list is none. */
+/* Returns how many vertices all faces have, or -1 where a list is bad. */
 static int64_t count_listed(const session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
@@ -322,7 +284,7 @@ static int find_side(const face_ring *rings, int count, unsigned used, const int
     return -1;
 }
 
-/* Does the ring go around the tops, from any of them on and either way? */
+/* Tells whether the ring goes around the tops, from any of them on and either way. */
 static bool goes_around(const face_ring *ring, const int64_t *top, int n)
 {
     if (ring->count != n) return false;
@@ -425,7 +387,7 @@ typedef struct recognition {
     unsigned char *types;
 } recognition;
 
-/* Are the cell's entries within the connectivity, and indices of faces or vertices? */
+/* Tells whether the cell's entries lie within the connectivity and are indices of faces or vertices. */
 static bool has_good_entries(const session_mesh *mesh, int64_t cell, int type)
 {
     const grid *g = &mesh->cells;
@@ -520,15 +482,15 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
                               error))
         return error->status;
     if (!type && !session_make_indices(mesh, "recognised cells' offsets", count, r->entries, &offsets, error)) {
-        free_indices(&connectivity);
+        session_drop_array(&connectivity);
         return error->status;
     }
     if (!type) put_offsets(mesh, r, &offsets);
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (int64_t cell = 0; cell < count; cell++)
         put_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell), &connectivity);
-    free_indices(&t->offsets);
-    free_indices(&t->connectivity);
+    session_drop_array(&t->offsets);
+    session_drop_array(&t->connectivity);
     t->has_own_cells = true;
     t->offsets = offsets;
     t->connectivity = connectivity;
@@ -561,14 +523,14 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
     }
     base_free(r.types);
     if (status || r.is_faulty || r.recognised < r.polyhedra) return status;
-    free_indices(&t->face_offsets);
-    free_indices(&t->face_connectivity);
+    session_drop_array(&t->face_offsets);
+    session_drop_array(&t->face_connectivity);
     t->has_own_faces = true;
     t->face_bytes = t->face_connectivity_count = 0;
     return INSITU_OK;
 }
 
-/* May some cells be polyhedra? */
+/* Tells whether some cells may be polyhedra. */
 static bool may_have_polyhedra(const grid *g)
 {
     return g->cell_count && g->offsets.data && grid_has_faces(g) && (g->cell_types || g->cell_type == GRID_POLYHEDRON);

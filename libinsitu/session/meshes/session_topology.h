@@ -5,12 +5,6 @@
 
 #include "session_mesh.h"
 
-/* An array as the rooms below read it; its indices count from 0. */
-grid_array session_grid_array(const insitu_array *array);
-
-/* The same of one whose indices count from the mesh's index_base. */
-grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
-
 /* The vertices of a face that is given by a list of its own. */
 static inline const void *session_face_list(const insitu_mesh *mesh, int64_t face)
 {
@@ -33,19 +27,6 @@ void session_read_topology(session_mesh *mesh);
 
 /* The type that the caller gave the cell, whatever it is read as. */
 int session_given_type(const session_mesh *mesh, int64_t cell);
-
-/* Room for count indices up to largest and one more, as narrow as they can be, all 0. False where memory runs out. */
-bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
-                          base_error *error);
-
-static inline void session_put_index(const grid_array *array, int64_t i, int64_t value)
-{
-    char *p = (char *)(uintptr_t)array->data + i * array->stride;
-    if (array->is_wide)
-        *(int64_t *)(void *)p = value;
-    else
-        *(int32_t *)(void *)p = (int32_t)value;
-}
 
 /* Make what the description leaves to the library, once for each topology: cells' faces from owner and neighbour,
  * faces' vertices in one array from lists, cells' vertices in VTK's order, and tets, hexes, wedges and pyramids from

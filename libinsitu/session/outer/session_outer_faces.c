@@ -23,7 +23,7 @@ enum { LEAST_SLOTS = 1 << 10, MOST_SLOTS = 1 << 22 };
 typedef struct face_search {
     const session_mesh *mesh;
     int threads;
-    unsigned char *is_hidden; /* a byte a cell: those beyond the threshold; NULL: there is none */
+    unsigned char *is_hidden; /* a byte a cell, not 0 for those beyond the threshold; NULL: there is no threshold */
     uint64_t *hashes;         /* of the mesh's vertices */
     uint64_t *slots;
     uint64_t mask;
@@ -137,7 +137,7 @@ static bool collect_faces(face_search *s)
     return true;
 }
 
-/* Groups of equal keys, and their sizes. */
+/* Counts the groups of equal keys, and their sizes. */
 static bool count_keys(const session_key *keys, int64_t count, int64_t **groups, int64_t **sizes)
 {
     session_key_table table = {0};
@@ -168,7 +168,7 @@ static void keep_single_faces(face_search *s)
     s->count = kept;
 }
 
-/* No faces where this rank has no part of the mesh. */
+/* Finds no faces where this rank has no part of the mesh. */
 static insitu_status search_own(face_search *s, const session_outer *outer, bool by_id, base_error *error)
 {
     if (!s->mesh) return INSITU_OK;
@@ -197,8 +197,8 @@ static insitu_status search_own(face_search *s, const session_outer *outer, bool
 
 enum { KEY_WORDS = 3 };
 
-/* The home of a face whose vertices are all in other ranks' boxes; -1: it is this rank's alone. Its home is that of its
- * first vertex in an order by hashes, which all ranks have. */
+/* Returns the home of a face whose vertices are all in other ranks' boxes, or -1 where it is this rank's alone. The
+ * home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
 static int home_of(const face_search *s, const session_homes *homes, int64_t face)
 {
     const session_cell_faces faces = session_faces_of_cell(&s->mesh->cells, s->faces[face].cell);
@@ -216,7 +216,7 @@ static int home_of(const face_search *s, const session_homes *homes, int64_t fac
     return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[face]), (int64_t)key.words[0]);
 }
 
-/* The keys of faces in other ranks' boxes by their homes; order: which face each is of. */
+/* Packs the keys of faces in other ranks' boxes by their homes. order gets the face of each key. */
 static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
     int64_t *places = base_calloc((size_t)ranks + 1, sizeof *places);

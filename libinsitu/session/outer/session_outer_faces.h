@@ -6,9 +6,9 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Fill in the outer's faces. Two faces are one where their vertices are: by global ids, else where the bits of their
- * coordinates are equal; so a face that meets several smaller ones is outer, and so are these. mesh and outer NULL:
- * this rank has no part of it. homes: known. Collective, agreed. */
+/* Fills in the outer's faces. Two faces are the same if their vertices are: if these have the same global ids or,
+ * without ids, the same bits of coordinates. So a face that meets several smaller ones is outer, and so are these. mesh
+ * and outer NULL: this rank has no part of it. homes: known. Collective, agreed. */
 insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, const session_homes *homes,
                                        const session_team *team, base_error *error);
 

@@ -117,10 +117,10 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
-    int64_t *places; /* of the whole mesh's vertices among the new ones; -1: not yet there */
+    int64_t *places; /* the place among the new vertices of each of the whole mesh's; -1: it has none yet */
     float *heights;
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
-    int64_t loop_end; /* of what is filled of the loops of polygons */
+    int64_t loop_end; /* the end of what is filled of the loops of polygons */
 } outer_work;
 
 static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
@@ -138,7 +138,7 @@ static int64_t place_vertex(outer_work *w, int64_t origin, const double place[3]
     return *out;
 }
 
-/* A tet or a pyramid on a triangle or quad, with an apex that is there. */
+/* Adds a tet on a triangle, or a pyramid on a quad, whose apex is there already. */
 static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
     w->out->offsets[w->cell_count] = w->entry_count;
@@ -150,7 +150,7 @@ static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex,
     w->out->connectivity[w->entry_count++] = apex;
 }
 
-/* The same with an apex of its own; none where the face has no area. */
+/* As above, with an apex of its own. Adds nothing where the face has no area. */
 static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
 {
     double apex[3];
@@ -159,7 +159,7 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
     if (find_apex(loop, inside, apex)) add_cell_below(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
 }
 
-/* The polygon that the cells from first on are of. */
+/* Adds the loop of the polygon that the cells from first on are of. */
 static void add_loop(outer_work *w, const session_face_loop *face, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -271,7 +271,7 @@ static void add_face(outer_work *w, const session_face *face)
     add_cell(w, &loop, inside, face->cell);
 }
 
-/* The most cells and entries of connectivity; and what loops of polygons take. */
+/* Counts the most cells and entries of connectivity that there can be, and the entries of polygons' loops. */
 static void count_most(const grid *g, const session_outer *outer, int64_t *cells, int64_t *entries, int64_t *loops)
 {
     *cells = *entries = *loops = 0;
@@ -326,7 +326,7 @@ static grid describe(const outer_work *w)
     return g;
 }
 
-/* The scalar takes the heights. */
+/* Completes the mesh. Its scalar takes the heights over. */
 static bool finish(const session_mesh *whole, outer_work *w)
 {
     session_mesh *out = w->out->mesh;

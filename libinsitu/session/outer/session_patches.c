@@ -198,8 +198,8 @@ static insitu_status ask_owners(patch_faces *p, base_error *error)
 typedef struct cell_search {
     session_key_table keys;  /* of faces all of whose vertices have groups */
     int64_t *of_face;        /* its key, or -1 */
-    int64_t *given, *cells;  /* of each key: how often it is given, and how many cells have it */
-    unsigned char *is_drawn; /* by one of them */
+    int64_t *given, *cells;  /* for each key: how often it is given, and how many cells have it */
+    unsigned char *is_drawn; /* one of these cells is drawn */
     unsigned char *is_met;   /* groups that such faces have */
 } cell_search;
 

@@ -5,9 +5,9 @@
 #include "session_exchange.h"
 #include "session_mesh.h"
 
-/* Vertices that are one, on this rank. */
+/* The vertices on this rank that are the same one. */
 typedef struct session_vertex_numbers {
-    const session_key_table *keys; /* of those of drawn cells; their numbers are the groups */
+    const session_key_table *keys; /* keys of drawn cells' vertices; the keys' numbers are the groups */
     const int64_t *of_vertex;      /* the group of each vertex of mesh->cells; -1: a vertex of no drawn cell */
     bool by_id;
 } session_vertex_numbers;
@@ -19,8 +19,8 @@ typedef struct session_patch_values {
     double *values;
 } session_patch_values;
 
-/* Finite values of the field's patches, of faces of drawn cells. Told as errors: faces that are none of the mesh, that
- * two cells share, or that are given twice. Local. */
+/* Finds the finite values that the field's patches have on faces of drawn cells. Faces that the mesh does not have,
+ * that two cells share, or that are given twice are errors. Local. */
 insitu_status session_find_patch_values(const session_mesh *mesh, int field, int component,
                                         const session_vertex_numbers *numbers, session_patch_values *out,
                                         base_error *error);

@@ -14,12 +14,13 @@ bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold);
 /* Free those of thresholds that no image of this step shows: they seldom outlive the values. */
 void session_drop_thresholds(session_mesh *mesh);
 
-/* Are the faces not known, or of other values? */
+/* Tells whether the faces are not known, or were found for other values. */
 bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer);
-/* Note that the faces are of the values of now. */
+/* Notes that the faces were found for the present values. */
 void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer);
 
-/* A byte a cell, from base_alloc(): is it beyond the threshold? Values that are not numbers are. NULL: no memory. */
+/* Returns a byte a cell, from base_alloc(), which is not 0 where the cell is beyond the threshold; values that are not
+ * numbers are. NULL: no memory. */
 unsigned char *session_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads);
 
 #endif

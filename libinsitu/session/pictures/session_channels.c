@@ -47,7 +47,8 @@ static insitu_status draw_numbers(const session_frame_target *target, const rend
     return status;
 }
 
-/* The job without what a surface may be seen through or beside. surfaces: room for the job's. */
+/* Makes the job without clips, volumes and opacities, so that all that is seen are its surfaces. surfaces: room for the
+ * job's. */
 static render_job opaque_job(const render_job *job, render_surface_layer *surfaces)
 {
     render_job out = *job;
@@ -90,7 +91,7 @@ static surface_numbers number_surfaces(const scene_image *image)
     return out;
 }
 
-/* value, isovalue's number, 0, opacity become value, layer, surface. */
+/* Turns each pixel's numbers (value, isovalue's number, 0, opacity) into value, layer and surface. */
 static void name_surfaces(const scene_image *image, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image);

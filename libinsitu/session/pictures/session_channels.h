@@ -16,7 +16,7 @@ typedef struct session_channels {
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;
 
-/* Does an output of the image ask for them? */
+/* Tells whether an output of the image asks for them. */
 bool session_wants_channels(const scene_image *image);
 
 /* Draw them in two frames: the job's surfaces, all of them opaque, through the pixels' centres. taken: what the frames

@@ -10,13 +10,13 @@
 #include "render.h"
 #include "scene.h"
 
-/* Is an output of the image deep? */
+/* Tells whether an output of the image is deep. */
 bool session_wants_deep(const scene_image *image);
 
-/* A deep picture without samples. On rank 0; local. */
+/* Begins a deep picture without samples. On rank 0; local. */
 insitu_status session_begin_deep(deep_image *deep, const scene_image *image, base_error *error);
 
-/* Depths, which compositing has as the rays' t, become distances along the camera's axis. Local. */
+/* Turns depths, which compositing has as the rays' t, into distances along the camera's axis. Local. */
 void session_finish_deep(deep_image *deep, const render_space *space, int threads);
 
 /* Bytes that a deep picture of this size holds. */

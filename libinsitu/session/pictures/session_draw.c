@@ -301,7 +301,7 @@ static scene_moment moment_of(const session_drawing *d, const scene_image *image
     return scene_moment_of(image, d->cycle, d->report->numbers.time);
 }
 
-/* Rank 0: what was drawn goes to the writer, and the canvas is left without it. */
+/* On rank 0: gives what was drawn to the writer, which leaves the canvas without it. */
 static void give_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
     session_files *files = base_calloc(1, sizeof *files);
@@ -480,7 +480,7 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
     render_active_cells *active = NULL;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
-        scene_image placed = *plan->images[i]; /* where its camera is now; all else is the scene's */
+        scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
         draw_image(d, &placed, active_cells_for(plan, plan->images[i], &active), &reason);
         if (first.status == INSITU_OK) first = reason;

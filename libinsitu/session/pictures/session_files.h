@@ -18,16 +18,16 @@ typedef struct session_files {
     struct session_files *next; /* in a list of the writer's (session_writer.h) */
     const scene *scene;         /* of the image: it stays until this is written */
     session_cinema *cinema;
-    bool has_picture;  /* else the tables of databases are written, after a step's pictures */
+    bool has_picture;  /* else these are the tables of databases, written after a step's pictures */
     scene_image image; /* its camera is that of the step, its lists are the scene's */
     scene_moment moment;
     image frame;
     session_picture memory; /* of the frame */
     session_channels channels;
-    deep_image deep; /* without counts: there is none */
+    deep_image deep;                  /* without counts: there is none */
     session_decorations *decorations; /* NULL: none, and the frame has its background */
     base_error error;                 /* the first reason why a file could not be written */
-    base_error warning;               /* of status INSITU_OK: what was left out of the last file */
+    base_error warning;               /* its status is INSITU_OK; its message says what was left out of the last file */
     double ms;                        /* that writing took */
 } session_files;
 
@@ -37,7 +37,7 @@ int64_t session_files_bytes(const session_files *files);
 /* Write them all, though some fail. Local; on any thread, one set of files after the other. */
 void session_write_files(session_files *files);
 
-/* NULL is fine; the frame's memory goes too. */
+/* files may be NULL. The frame's memory is freed too. */
 void session_files_free(session_files *files);
 
 #endif

@@ -88,10 +88,10 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
         return status;
     }
     const double start = MPI_Wtime();
-    status = overlaps ? comp_composite_overlaps(&t->compositing, &fragments, t->background, job->threads, out, overlaps,
-                                                &composited, error)
-                      : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited,
-                                       error);
+    status = overlaps
+                 ? comp_composite_overlaps(&t->compositing, &fragments, t->background, job->threads, out, overlaps,
+                                           &composited, error)
+                 : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited, error);
     if (status && !composited.has_failed) *error = (base_error){0};
     if (status) status = session_agree(t->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);
@@ -194,7 +194,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
-/* Of rank 0's deep picture: the pixels' samples come anew. */
+/* Forgets the pixels' samples in rank 0's deep picture, because they are drawn again. */
 static void forget_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;

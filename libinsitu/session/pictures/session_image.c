@@ -35,7 +35,8 @@ static void *open_library(const char *path, char *why, size_t size)
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (handle) return handle;
     const char *reason = dlerror();
-    const bool is_absent = strncmp(reason, path, strlen(path)) == 0; /* else it is there, but not what it needs */
+    const bool is_absent =
+        strncmp(reason, path, strlen(path)) == 0; /* else the file is there, but something that it needs is not */
     if (!*why || !is_absent) snprintf(why, size, "%s", reason);
     return NULL;
 }

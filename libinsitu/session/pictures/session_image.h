@@ -15,8 +15,8 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
 /* Load the library ahead of the first picture, whose write reports an error. Local. Thread-safe. */
 void session_load_image_library(void);
 
-/* May pictures be written by a thread of their own (session_writer.h)? Tests that take the place of this file say no.
- */
+/* Whether pictures may be written by a thread of their own (session_writer.h). Tests that replace this file set it to
+ * false. */
 extern bool session_writes_behind;
 
 #endif

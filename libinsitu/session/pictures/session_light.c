@@ -27,7 +27,7 @@ typedef struct lighting {
     int rank, ranks;
     render_occluders *occluders; /* of this rank */
     int64_t round_hits;
-    render_box *boxes;           /* of all ranks */
+    render_box *boxes; /* of all ranks */
     int64_t count;
     int64_t *fragments; /* whose hits these are */
     render_hit *hits;
@@ -204,7 +204,7 @@ static insitu_status ask_others(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* Takes the hits of the fragments from the first on; returns where to go on. What has no rays is lit at once. */
+/* Takes the hits of the fragments from the first on, and lights those without rays at once. Returns where to go on. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};

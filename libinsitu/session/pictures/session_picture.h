@@ -22,7 +22,7 @@ void session_drop_picture(session_picture *picture);
 
 /* The pictures of the last step, for the caller: rank 0's copies. */
 typedef struct session_kept_pictures {
-    bool is_on; /* the same on every rank, because depth is then drawn for all images */
+    bool is_on; /* the same on every rank, because it makes all images have depth */
     int count;
     insitu_picture items[SCENE_MAX_PICTURES]; /* names are the scene's; pixels and depth of each are one block */
 } session_kept_pictures;

@@ -26,7 +26,7 @@ typedef struct session_writer {
     pthread_mutex_t mutex;
     pthread_cond_t has_changed; /* the queue, or is_ending, or is_loading */
     pthread_t thread;
-    bool is_running, is_refused; /* a thread was started; or could not be */
+    bool is_running, is_refused; /* a thread was started; a thread could not be started */
     bool is_loading;             /* the image library */
     bool is_ending;
     struct session_files *first, *last; /* the queue; the thread is at the first */
@@ -46,7 +46,7 @@ void session_writer_create(session_writer *writer);
  * Local. */
 void session_writer_begin(session_writer *writer, const scene *scene);
 
-/* Will session_writer_begin() start the thread for this scene, or has it? Local. */
+/* Tells whether session_writer_begin() has started the thread, or will start it for this scene. Local. */
 bool session_writer_is_behind(const session_writer *writer, const scene *scene);
 
 /* An error of handing a picture over, for the next step to tell. Local. */

@@ -52,7 +52,7 @@ typedef struct planned_surface {
     const scene_isosurface *layer;
     int first_value; /* values of the image's earlier layers */
     field_range range;
-    bool is_news; /* a value is outside what the trees hold, and that was not told */
+    bool is_news; /* a value lies outside the trees' ranges, and no warning has said so yet */
 } planned_surface;
 
 /* In a sweep over isovalues each picture has one, whose number is that in the file. */
@@ -98,9 +98,8 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
         lows[2 * i + 1] = surfaces[i].range.minus_high;
     }
     const int code = MPI_Allreduce(MPI_IN_PLACE, lows, 2 * count + 1, MPI_DOUBLE, MPI_MIN, team->comm);
-    const insitu_status status = code == MPI_SUCCESS && lows[2 * count] < 0
-                                     ? session_agree(team->comm, error)
-                                     : session_mpi(error, code, "MPI_Allreduce");
+    const insitu_status status = code == MPI_SUCCESS && lows[2 * count] < 0 ? session_agree(team->comm, error)
+                                                                            : session_mpi(error, code, "MPI_Allreduce");
     for (int i = 0; i < count; i++) surfaces[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
     return status;
 }

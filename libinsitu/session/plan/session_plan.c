@@ -326,7 +326,8 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
-    insitu_status status = basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* it may be collective */
+    insitu_status status =
+        basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* taking the values may be collective */
     if (!status) {
         if (is_whole && session_fill_fields(meshes, basis->catalogue, true, error) == INSITU_OK)
             session_copy_used(meshes, team->threads, error);

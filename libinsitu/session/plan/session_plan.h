@@ -14,7 +14,7 @@ typedef struct session_recentring {
     int component; /* as grid_field.component */
 } session_recentring;
 
-/* The same on every rank. Borrows from the scene and the catalogue. */
+/* What the due images need; the same on every rank. Borrows from the scene and the catalogue. */
 typedef struct session_plan {
     int image_count; /* that can be drawn */
     const scene_image **images;
@@ -38,7 +38,7 @@ typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* for messages */
     const session_moment *moment;
-    uint64_t let_images; /* a bit an image of the file: those that no condition holds back */
+    uint64_t let_images; /* a bit for each image of the file, set where no condition holds it back */
     const session_catalogue *catalogue;
     const session_extent *extent;
     bool is_filled; /* some field is filled on demand, on any rank */

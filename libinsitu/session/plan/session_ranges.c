@@ -39,7 +39,7 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
 
 enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 3 };
 
-/* A number that is less where the value is. */
+/* Maps values to whole numbers in the same order. */
 static uint32_t order_of(float value)
 {
     uint32_t bits;

@@ -245,7 +245,7 @@ static void write_record(const vertex_groups *groups, int64_t group, uint64_t *r
     memcpy(record + RECORD_HEAD, groups->values.values + groups->values.starts[group], (size_t)count * sizeof(double));
 }
 
-/* Shared groups sorted by their home ranks into records. */
+/* Packs the shared groups into records, sorted by home rank. */
 static bool pack_records(const session_mesh *mesh, const session_homes *homes, const vertex_groups *groups, int ranks,
                          shared_groups *shared)
 {
@@ -450,7 +450,7 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     return status;
 }
 
-/* Whose values are stale on some rank. Collective. */
+/* Finds the recentrings whose values are stale on some rank. Collective. */
 static insitu_status find_stale(const session_plan *plan, const session_meshes *meshes, const session_team *team,
                                 int *stale, base_error *error)
 {

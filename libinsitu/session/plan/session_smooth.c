@@ -110,7 +110,7 @@ bool session_is_smooth(const session_plan *plan)
 
 /* ---- which vertices ------------------------------------------------------------------------------------------ */
 
-/* The keys of the crossed cells' vertices. */
+/* Adds the keys of the crossed cells' vertices. */
 static bool add_own_keys(const smooth_item *item, const mmbvh_selection *crossed, smooth_work *work)
 {
     const grid *g = &work->mesh->cells;
@@ -148,7 +148,7 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
     return error->status;
 }
 
-/* This rank's share of the item. */
+/* Begins this rank's share of the item. */
 static insitu_status begin_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
                                 base_error *error)
 {
@@ -171,7 +171,7 @@ static bool is_in(const session_box *box, const double point[3])
     return true;
 }
 
-/* A vertex of each of this rank's keys. */
+/* Finds a vertex for each of this rank's keys. */
 static bool find_places(const smooth_work *work, bool by_id, double (**out)[3])
 {
     *out = base_alloc((size_t)(work->own_count ? work->own_count : 1) * sizeof **out);
@@ -184,7 +184,7 @@ static bool find_places(const smooth_work *work, bool by_id, double (**out)[3])
     return true;
 }
 
-/* To each rank the keys in its box. numbers: of the keys, in the order of the mail. */
+/* Writes to each rank the keys in its box. numbers gets the keys' numbers, in the order of the mail. */
 static bool write_questions(const smooth_work *work, const session_team *team, const session_homes *homes,
                             const double (*places)[3], session_mail *out, int64_t **numbers)
 {
@@ -272,7 +272,7 @@ static session_gradient_basis basis_of(const smooth_work *work, const session_ex
     return (session_gradient_basis){&work->mesh->cells, &work->values, work->entries, ldexp(1, exponent), threads};
 }
 
-/* What is added up, and the largest numbers of this rank's. */
+/* Makes the input of the sums, and finds this rank's largest numbers. */
 static bool begin_sums(const session_team *team, const session_extent *extent, bool by_id, smooth_work *work,
                        session_gradient_basis *basis, session_cell_list *list, double largest[2])
 {
@@ -292,7 +292,7 @@ static insitu_status make_sums(const session_team *team, const session_extent *e
 {
     session_cell_list list = {0};
     session_gradient_basis basis = {0};
-    double largest[3] = {0, 0, 0}; /* the last: has a rank failed? */
+    double largest[3] = {0, 0, 0}; /* the last one tells whether a rank has failed */
     if (!error->status && !begin_sums(team, extent, by_id, work, &basis, &list, largest))
         session_no_memory(error, work->keys.count * 100, "gradients at vertices");
     largest[2] = error->status != INSITU_OK;

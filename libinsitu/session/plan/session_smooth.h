@@ -12,7 +12,7 @@
 insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
                              const session_team *team, const session_extent *extent, base_error *error);
 
-/* Does an isosurface of the plan ask for it? */
+/* Tells whether an isosurface of the plan asks for smooth normals. */
 bool session_is_smooth(const session_plan *plan);
 
 #endif

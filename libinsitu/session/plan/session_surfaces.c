@@ -51,11 +51,11 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Are there faces that are not known on some rank? Where a rank has failed before, all return its error. Collective. */
+/* Finds whether faces are not known on some rank. Where a rank has failed before, all return its error. Collective. */
 static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
                                 const session_team *team, int *stale, bool *is_any, base_error *error)
 {
-    int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0}; /* has failed; has some */
+    int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0}; /* this rank has failed; this rank has stale faces */
     for (int i = 0; i < count; i++) {
         session_mesh *mesh;
         const session_outer *outer = find_own(meshes, &wishes[i], &mesh);

@@ -94,7 +94,8 @@ typedef struct opacity_points {
     scene_opacity_point items[RENDER_MAX_OPACITY_POINTS];
 } opacity_points;
 
-/* The largest difference, at 15 places between two points, of being straight by value from being straight by place. */
+/* Returns the largest difference, over 15 places between two points, between a ramp that is straight by value and one
+ * that is straight by place. */
 static double chord_error(const render_transfer *t, const scene_opacity_point *a, const scene_opacity_point *b)
 {
     enum { PARTS = 16 };
@@ -114,7 +115,7 @@ static scene_opacity_point point_between(const scene_opacity_point *a, const sce
                                  (float)(a->opacity + share * (b->opacity - a->opacity))};
 }
 
-/* The same for a ramp that is cut into pieces of equal length by place. */
+/* The same difference for a ramp that is cut into pieces of equal length by place. */
 static double ramp_error(const render_transfer *t, const scene_opacity_point *ramp, int pieces)
 {
     double most = 0;
@@ -134,8 +135,8 @@ static int worst_of(const double *errors, int count)
     return worst;
 }
 
-/* Cut the ramps that bend along the values: always the worst into one more piece, until none is left to be cut or no
- * point. */
+/* Cuts the ramps that bend along the values. It cuts the worst one into one more piece at a time, until no ramp or no
+ * point is left. */
 static void cut_ramps(const render_transfer *t, const scene_volume *volume, opacity_points *out)
 {
     static const double good_enough = 1e-4;

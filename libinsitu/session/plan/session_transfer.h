@@ -19,7 +19,7 @@ typedef struct session_transfer {
  * with nothing to free. Local. */
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
-/* Tells whether it takes memory, and so may run out; the same on all ranks. */
+/* Tells whether making the transfer function takes memory, and so may fail; the same on all ranks. */
 bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 

@@ -19,7 +19,7 @@
 #include "session_candidates.h"
 #include "session_scalars.h"
 
-static const double worst_cost = 1.5; /* of a refitted tree, in costs when built */
+static const double worst_cost = 1.5; /* a refitted tree's cost, as a multiple of its cost when it was built */
 
 /* Seconds a cell on one thread, before anything was measured. */
 static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit = 1e-8};
@@ -183,7 +183,7 @@ static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
     return count;
 }
 
-/* All of them, or what can be seen. */
+/* Refits all bounds, or those of what can be seen. */
 static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool all, base_error *error)
 {
     const double start = MPI_Wtime();
@@ -280,7 +280,7 @@ static double full_price(const tree_update *u, const session_mesh *mesh)
     return rate_of(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
 }
 
-/* Is there a full tree of these cells? */
+/* Tells whether there is a full tree of these cells. */
 static bool has_full_tree(const session_mesh *mesh)
 {
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
@@ -318,7 +318,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     const double seconds = MPI_Wtime() - start;
     measure(&u->trees->rates.select, seconds, mesh->given.cell_count);
     u->report->build_ms += 1e3 * seconds;
-    /* Half of the full price or more: buy. */
+    /* The full tree is built where the partial one costs half of its price or more. */
     const bool is_forced = u->choice == SCENE_TREE_PARTIAL;
     const bool is_partial = is_forced || 2 * selection.count <= mesh->drawn_count;
     status = build_tree(u, mesh, is_partial ? &selection : NULL, error);

@@ -8,8 +8,8 @@
 #include "session_space.h"
 #include "session_team.h"
 
-/* How far from 0, in halves of the diagonal of the global bounds, a slice's distance may be: one that lies on the
- * border of the data is taken into them. */
+/* A slice that lies on the border of the data is moved inside by at most this share of half the diagonal of the global
+ * bounds. */
 #define SESSION_BORDER_SHARE 1e-6
 
 /* A point of the plane in this step. */

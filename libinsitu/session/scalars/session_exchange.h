@@ -42,14 +42,14 @@ void session_mail_free(session_mail *mail);
 /* Two deliveries in a row on one communicator must differ in this, or another collective call stand between them. */
 typedef enum session_mail_tag { SESSION_MAIL_THERE = 1, SESSION_MAIL_BACK } session_mail_tag;
 
-/* Brings every rank's out to their places; *in owns its memory. Only ranks that get words are sent any, and one
- * reduction tells when all have come, and whether a rank had failed before: then all return its error, *error may have
- * that before the call, and its out is not looked at. What fails on this rank in receiving is in *error alone, with *in
- * empty, for the next phase to agree on. Collective. */
+/* Brings every rank's words in out to the ranks that they are for. *in owns its memory. Messages go only to ranks that
+ * get words, and one reduction tells when all have come. A rank that has failed before calls with its error in *error,
+ * and its out is not looked at: then all ranks return that error. What fails on this rank in receiving is in *error
+ * alone, with *in empty, for the next phase to agree on. Collective. */
 insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
                                    base_error *error);
 
-/* The same; what fails in receiving is agreed on, too. Collective, agreed. */
+/* As session_mail_deliver(), but what fails in receiving is agreed on too. Collective, agreed. */
 insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error);
 
 /* Returns how many things a rank takes in a round in which each may be a question to every rank: at most so many, and

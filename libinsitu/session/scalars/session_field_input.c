@@ -6,7 +6,6 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_mesh_input.h"
-#include "session_topology.h"
 
 static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
 {

@@ -11,9 +11,10 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, const 
  * field. Local. */
 insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
 
-/* How many entries of connectivity are vertices of cells; of cells that are no polyhedra. */
+/* Counts the entries of connectivity that are vertices of cells. The cells are no polyhedra. */
 int64_t session_corner_count(const insitu_mesh *mesh);
-/* How many values the field has without an index, and entries of it with one; of corners in rows: at least. */
+/* Returns how many values the field has, or, where it has an index, how many entries the index has. For corners in rows
+ * it is the least number. */
 int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field);
 
 #endif

@@ -22,7 +22,7 @@ static insitu_status call_fill(const session_mesh *mesh, const insitu_field *giv
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* One that failed fails for all that need it. */
+/* A fill that has failed is an error for all that need the field. */
 static insitu_status fill_field(session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];

@@ -10,7 +10,6 @@
 #include "session_field_input.h"
 #include "session_scalars.h"
 #include "session_torn.h"
-#include "session_topology.h"
 
 void session_want_field(const session_meshes *meshes, const scene_field *field)
 {
@@ -24,7 +23,7 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 typedef struct indexed_values {
     const session_torn *torn; /* where the places are its corners, and values are at vertices */
     grid_array index, values; /* no index: places have the tuples of their numbers */
-    int64_t row, used;        /* of each row of places so many are read */
+    int64_t row, used;        /* places in a row, and how many of them are read */
     int64_t count, places;    /* tuples, and those that have them */
     int64_t component_stride;
     int component_count;

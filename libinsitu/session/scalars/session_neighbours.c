@@ -2,7 +2,6 @@
 
 #include <string.h>
 
-#include "session_topology.h"
 #include "session_torn.h"
 
 static session_key key_of_id(const session_mesh *mesh, int64_t vertex)

@@ -31,7 +31,7 @@ bool session_find_values(const session_mesh *mesh, const scene_field *field, gri
 /* A new scalar of field 0, out of date in all. NULL where memory ran out. */
 session_scalar *session_add_scalar(session_mesh *mesh);
 
-/* Is it the vertices' distance from a plane? */
+/* Tells whether the scalar is the vertices' distance from a plane. */
 bool session_is_distance(const session_scalar *scalar);
 /* The scalar's name for messages. */
 const char *session_scalar_name(const session_mesh *mesh, const session_scalar *scalar);

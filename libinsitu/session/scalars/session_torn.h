@@ -18,7 +18,7 @@
 insitu_status session_tear_meshes(const session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                   const session_team *team, base_error *error);
 
-/* Which of the caller's vertices stands at the corner of a torn mesh. */
+/* Returns the caller's vertex that stands at the corner of a torn mesh. */
 int64_t session_torn_origin(const session_torn *torn, int64_t corner);
 
 #endif

@@ -28,9 +28,9 @@ typedef struct scene_field {
     int meshes_line;    /* for messages about them */
 } scene_field;
 
-/* Is the layer drawn on a mesh of this name, if that has the field? */
+/* Tells whether the layer is drawn on a mesh of this name, if that has the field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
-/* Does name stand for the mesh? */
+/* Tells whether name stands for the mesh. */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
 /* The source of a range that is not fixed. All use the values on all ranks, at each drawn step. */
@@ -47,13 +47,14 @@ typedef struct scene_range {
     scene_range_source source; /* where not fixed */
 } scene_range;
 
-/* How values are spaced along a colour map: as they are; by their logarithm; or, for values of both signs, linearly up
- * to a threshold and by the logarithm beyond (render_scaled() of render.h, in the same terms). */
+/* The scale that spaces values along a colour map: linear; the logarithm; or, for values of both signs, linear up to a
+ * threshold and the logarithm beyond (render_scaled() of render.h, in the same terms). */
 typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 
-/* How a value becomes a colour: the same for all layers. Its place is (s(value) - s(low)) / (s(high) - s(low)), s being
- * the scale and [low, high] the range. Places below 0 and above 1 have the colours of 0 and 1, or those of outside. A
- * place's colour is taken from the table, linear between entries; in bands it is that of entry floor(place × count). */
+/* A colour map turns a value into a colour, for layers of all kinds. The value's place is (s(value) - s(low)) /
+ * (s(high) - s(low)), s being the scale and [low, high] the range. Places below 0 and above 1 have the colours of 0 and
+ * 1, or those of outside. A place's colour is taken from the table, linear between entries; in bands it is that of
+ * entry floor(place × count). */
 typedef struct scene_colour_map {
     char *name;     /* of a built-in map or of one in a file; "" of a list */
     int count;      /* >= 2; of bands >= 1 */
@@ -266,14 +267,14 @@ typedef struct scene_output {
     bool has_data;        /* of EXR: the nearest surface's normal, value and numbers too */
     bool is_deep;         /* an EXR of all that lies behind each other in a pixel */
     int database;         /* index of the scene's, in which the picture is a line; -1: none */
-    int folder_bytes;     /* of path that are the database's folder and its slash; 0 without a database */
+    int folder_bytes;     /* bytes of path that are the database's folder and its slash; 0 without a database */
 } scene_output;
 
 /* A Cinema database of Spec D: a folder of pictures, and a table of what they show. */
 typedef struct scene_database {
     char *path;      /* the folder, relative to the working directory of rank 0; no slash at its end */
     int first_image; /* the source of the first image in it */
-    bool has_images, has_orbits, has_isovalues, has_fields; /* columns: several images; and what some image has */
+    bool has_images, has_orbits, has_isovalues, has_fields; /* the table has this column */
 } scene_database;
 
 typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
@@ -347,7 +348,7 @@ typedef struct scene_image {
     int every;         /* drawn at cycles that are multiples of it; 1 by default */
     double every_time; /* > 0: instead, when the time passes a multiple of it */
     scene_condition when;
-    bool once; /* of the steps in which it is due, draw the first alone */
+    bool once; /* drawn only in the first step in which it is due */
 } scene_image;
 
 /* Results that all variants of an image share are found for the first of them. */
@@ -368,7 +369,7 @@ typedef enum scene_schedule {
     SCENE_SCHEDULE_BINARY
 } scene_schedule;
 
-/* When pictures are written: by a thread while the simulation goes on, or before the step is over. */
+/* Pictures are written by a thread while the simulation goes on, or before the step is over. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
 /* Images of a file, which have a bit each in session_events.h; and pictures that they make in a step. */

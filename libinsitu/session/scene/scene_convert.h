@@ -32,7 +32,7 @@ insitu_status scene_find_series(const scene_document *d, const char *path, const
                                 scene_series *out);
 /* Counted over all images together; too many are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Keep in the layers, which are those of the file, only what the variant shows. */
+/* Keeps in the layers, which are those of the file, only what the variant shows. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
@@ -67,7 +67,8 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,
                                         scene_decorations *out);
 void scene_free_decorations(scene_decorations *decorations);
-/* Refuse placeholders that are none, or stand for what the image has not. key: of the text; path: below the image. */
+/* Refuses unknown placeholders, and those that stand for something that the image does not have. key: of the text;
+ * path: below the image. */
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
 
 /* The keys that say how values become colours, of the mapping at path. */
@@ -98,7 +99,7 @@ scene_material scene_convert_material(const scene_file_material *in);
  */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* The set of a layer: that of all layers, and its own. */
+/* Makes the set of a layer: the clips of all layers, and its own. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
 /* The plane of the number in the list `planes` of the mapping at path. */

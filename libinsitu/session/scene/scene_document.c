@@ -432,7 +432,7 @@ static insitu_status bad_key(scene_document *d, const char *path, const yaml_nod
                      line_of(name), path, *path ? ": " : "", quoted, fault, expected);
 }
 
-/* Why a key that earlier scenes had is no longer there; NULL where it never was. */
+/* Says why a key of earlier scenes is no longer there. NULL: there never was such a key. */
 static const char *why_gone(const char *key)
 {
     static const char *const gone[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},

@@ -3,13 +3,12 @@
 #include "scene_convert.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "colour_map.h"
 #include "memory.h"
 
-/* most_scaled_points: others are put between them (session_transfer.c). */
+/* session_transfer.c puts further points between most_scaled_points. */
 enum { max_isovalues = 16, max_volumes = 4, most_scaled_points = 8 };
 
 /* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
@@ -19,58 +18,6 @@ static const float cycle[max_isovalues][3] = {
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
     {0.55F, 0.40F, 0.30F}, {0.65F, 0.85F, 0.45F}, {0.25F, 0.35F, 0.60F}, {0.95F, 0.78F, 0.65F},
     {0.15F, 0.50F, 0.30F}, {0.75F, 0.70F, 0.85F}, {0.60F, 0.20F, 0.40F}, {0.75F, 0.75F, 0.75F}};
-
-static insitu_status convert_component(const scene_document *d, const char *path, const char *text, int *component)
-{
-    static const struct {
-        const char *word;
-        int component;
-    } words[] = {{"magnitude", SCENE_COMPONENT_MAGNITUDE}, {"x", 0}, {"y", 1}, {"z", 2}};
-    *component = SCENE_COMPONENT_DEFAULT;
-    if (!text) return INSITU_OK;
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
-        if (strcmp(text, words[i].word) == 0) {
-            *component = words[i].component;
-            return INSITU_OK;
-        }
-    }
-    const size_t digits = strspn(text, "0123456789");
-    if (digits == 0 || digits > 3 || text[digits]) {
-        return scene_bad(d, path, "component",
-                         "\"%s\" is not allowed, expected magnitude, x, y, z or a number from 0 to 999", text);
-    }
-    *component = (int)strtol(text, NULL, 10);
-    return INSITU_OK;
-}
-
-insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out)
-{
-    char path[SCENE_PATH_SIZE + 8];
-    const char *names[SCENE_MAX_NAMES];
-    snprintf(path, sizeof path, "%s.mesh", layer);
-    const int count = scene_document_texts(d, path, names, SCENE_MAX_NAMES);
-    out->meshes_line = scene_document_line(d, path);
-    out->meshes = base_calloc((size_t)count, sizeof *out->meshes);
-    if (!out->meshes) return scene_no_memory(d);
-    while (out->mesh_count < count) {
-        char *name = base_strdup(names[out->mesh_count]);
-        if (!name) return scene_no_memory(d);
-        out->meshes[out->mesh_count++] = name;
-    }
-    return INSITU_OK;
-}
-
-insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
-                                  const char *component, scene_field *out)
-{
-    char field_path[SCENE_PATH_SIZE + 8];
-    snprintf(field_path, sizeof field_path, "%s.field", path);
-    out->line = scene_document_line(d, field_path);
-    out->name = base_strdup(name);
-    if (!out->name) return scene_no_memory(d);
-    const insitu_status status = scene_convert_meshes(d, layer, out);
-    return status ? status : convert_component(d, path, component, &out->component);
-}
 
 static insitu_status convert_values(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                     scene_isosurface *out)
@@ -113,33 +60,10 @@ static insitu_status convert_colours(const scene_document *d, const char *path, 
     return INSITU_OK;
 }
 
-insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
-                                      scene_field *out, scene_colour_map *map)
-{
-    char colour_by_path[SCENE_PATH_SIZE];
-    snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
-    out->at_vertices = out->joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
-    const insitu_status status = scene_convert_colour_map(d, colour_by_path, &in->colours, map);
-    return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
-}
-
-static float given_or(const double *given, float otherwise)
-{
-    return given ? (float)*given : otherwise;
-}
-
-scene_material scene_convert_material(const scene_file_material *in)
-{
-    static const scene_file_material none;
-    if (!in) in = &none;
-    return (scene_material){given_or(in->ambient, 0.15F), given_or(in->diffuse, 0.75F), given_or(in->specular, 0.25F),
-                            given_or(in->shininess, 32)};
-}
-
 static insitu_status convert_isosurface(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                         int first_value, scene_isosurface *out)
 {
-    out->opacity = given_or(in->opacity, 1);
+    out->opacity = in->opacity ? (float)*in->opacity : 1;
     out->material = scene_convert_material(in->material);
     out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
     out->difference = in->difference ? *in->difference : 1;

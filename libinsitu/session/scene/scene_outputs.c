@@ -1,4 +1,4 @@
-/* Where images go: file names with placeholders. */
+/* The files that images are written to, whose names have placeholders. */
 #include "scene_convert.h"
 
 #include <stdio.h>

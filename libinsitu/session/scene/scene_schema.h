@@ -61,7 +61,7 @@ typedef struct scene_file_material {
     double *ambient, *diffuse, *specular, *shininess;
 } scene_file_material;
 
-/* How values become colours; map and range, which have several forms, are read from the document. */
+/* The keys of a colour map. map and range have several forms and are read from the document. */
 typedef struct scene_file_colour_map {
     bool *reversed;
     int *discrete;

@@ -94,7 +94,7 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     event_work work;
     if (!work_create(scene, now->cycle, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
     for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
-    insitu_status status = session_agree(team->comm, error); /* what fills fields may be collective */
+    insitu_status status = session_agree(team->comm, error); /* the functions that fill fields may be collective */
     if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_wanted(meshes, team->threads, error);
     status = session_agree(team->comm, error);

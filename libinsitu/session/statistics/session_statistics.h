@@ -11,7 +11,7 @@ enum { SESSION_MAX_BINS = 256 };
 typedef struct session_statistics_wish {
     const scene_field *field;
     int bin_count;    /* of a histogram; 0: none */
-    double low, high; /* what the bins cover; low > high: what the values do */
+    double low, high; /* the range that the bins cover; low > high: that of the values */
 } session_statistics_wish;
 
 /* A cell's value is its own, or the mean of its vertices'. Cells whose values are not all finite do not count. */
@@ -22,7 +22,8 @@ typedef struct session_statistics {
     double mean, deviation; /* of cells' values, weighted by volume */
     int bin_count;
     double low, high;                /* of the first and last bin */
-    double shares[SESSION_MAX_BINS]; /* of the volume, by cells' values; the ends count to the outer bins */
+    double shares[SESSION_MAX_BINS]; /* each bin's share of the volume, by cells' values; values beyond the ends count
+                                        in the outer bins */
 } session_statistics;
 
 /* Finds the statistics of fields over all meshes that have them and are named for them, by three reductions.

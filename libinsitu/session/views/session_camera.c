@@ -22,7 +22,7 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* up, or an axis that is not along the view where up is. */
+/* Chooses up, or, where that is along the view, an axis that is not. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
     const double cross[3] = {direction[1] * up[2] - direction[2] * up[1], direction[2] * up[0] - direction[0] * up[2],

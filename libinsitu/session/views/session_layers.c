@@ -91,9 +91,10 @@ static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mes
     if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
-/* slot: which run of part_count fields. */
+/* Fills one run of part_count fields, whose number is slot, on the meshes that have the field. plane: NULL for the
+ * field's values, else the values are the distances from it. */
 static render_field place_field(const session_meshes *meshes, session_layers *layers, int slot,
-                                const scene_field *field, bool wants_ranges)
+                                const scene_field *field, const scene_plane *plane, bool wants_ranges)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
@@ -101,7 +102,9 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     for (int i = 0; i < session_part_slots(meshes); i++) {
         const session_mesh *mesh = session_part(meshes, i);
         if (!is_part(mesh)) continue;
-        place_scalar(layers, at++, mesh, session_find_scalar(mesh, field), wants_ranges);
+        const session_scalar *scalar = session_find_scalar(mesh, field);
+        if (scalar && plane) scalar = session_find_distance(mesh, plane);
+        place_scalar(layers, at++, mesh, scalar, wants_ranges);
     }
     return out;
 }
@@ -118,22 +121,6 @@ static const render_vertex_gradients *place_gradients(const session_meshes *mesh
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar) out[at] = (render_vertex_gradients){scalar->gradient_entries, (const float(*)[3])scalar->gradients};
         at++;
-    }
-    return out;
-}
-
-/* The distances on the meshes that have the field. */
-static render_field place_distances(const session_meshes *meshes, session_layers *layers, int slot,
-                                    const scene_field *field, const scene_plane *plane)
-{
-    const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
-    const render_field out = {layers->fields + first, layers->ranges + first};
-    ptrdiff_t at = first;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        const session_mesh *mesh = session_part(meshes, i);
-        if (!is_part(mesh)) continue;
-        const session_scalar *scalar = session_find_scalar(mesh, field) ? session_find_distance(mesh, plane) : NULL;
-        place_scalar(layers, at++, mesh, scalar, true);
     }
     return out;
 }
@@ -175,7 +162,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
         [SCENE_GRADIENT] = RENDER_GRADIENT, [SCENE_DIFFERENCES] = RENDER_DIFFERENCES, [SCENE_VERTEX] = RENDER_VERTEX};
     render_surface_layer *out = &layers->surfaces[index];
     const scene_material *m = &layer->material;
-    *out = (render_surface_layer){.field = place_field(basis->meshes, layers, 2 * index, &layer->field, true),
+    *out = (render_surface_layer){.field = place_field(basis->meshes, layers, 2 * index, &layer->field, NULL, true),
                                   .value_count = layer->value_count,
                                   .values = layer->values,
                                   .colours = layer->colours,
@@ -188,14 +175,14 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .clips = layer->clips};
     if (layer->normals == SCENE_VERTEX) out->gradients = place_gradients(basis->meshes, layers, index, &layer->field);
     if (!layer->has_colour_by) return INSITU_OK;
-    out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, false);
+    out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, NULL, false);
     out->colour_map = &layers->transfers[index].transfer;
     return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
 }
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Are the slot's faces those that the layer shows? Then whole is set to the mesh that has them. */
+/* Tells whether the layer shows the slot's faces. If so, whole is set to the mesh that has them. */
 static bool is_shown(const session_meshes *meshes, int slot, const scene_surface *layer, session_mesh **whole,
                      session_outer **outer)
 {
@@ -236,7 +223,7 @@ static bool gather(const session_mesh *whole, const session_outer *outer, const 
     return *values != NULL;
 }
 
-/* The colours' field at the outer faces, gathered from the cells'. */
+/* Gathers the field of the colours at the outer faces from the cells'. */
 static bool place_gathered(const session_meshes *meshes, session_layers *layers, int slot, const scene_surface *layer,
                            render_field *out)
 {
@@ -307,10 +294,10 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
     layers->distances[surface] = session_slice_distance(low, high, basis->half_diagonal);
     warn_of_plane(basis, image, surface, low, high);
     layers->surfaces[surface] = (render_surface_layer){
-        .field = place_distances(basis->meshes, layers, 2 * surface, &layer->field, plane),
+        .field = place_field(basis->meshes, layers, 2 * surface, &layer->field, plane, true),
         .value_count = 1,
         .values = &layers->distances[surface],
-        .colour_field = place_field(basis->meshes, layers, 2 * surface + 1, &layer->field, false),
+        .colour_field = place_field(basis->meshes, layers, 2 * surface + 1, &layer->field, NULL, false),
         .colour_map = &transfer->transfer,
         .opacity = layer->opacity,
         .material = {m->ambient, m->diffuse, m->specular, m->shininess},
@@ -337,7 +324,7 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     const scene_volume *layer = &image->volumes[index];
     session_transfer *transfer = &layers->transfers[layers->surface_count + index];
     layers->volumes[index] = (render_volume_layer){
-        .field = place_field(basis->meshes, layers, 2 * layers->surface_count + index, &layer->field, true),
+        .field = place_field(basis->meshes, layers, 2 * layers->surface_count + index, &layer->field, NULL, true),
         .transfer = &transfer->transfer};
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }

@@ -66,7 +66,7 @@ static void convert_elevations(const scene_document *d, const char *path, scene_
     }
 }
 
-/* Keys that an orbit takes the place of. */
+/* Refuses the keys that an orbit takes the place of. */
 static insitu_status refuse_others(const scene_document *d, const char *path, const scene_file_camera *in)
 {
     static const char words[] = "given beside orbit, expected one of the two";

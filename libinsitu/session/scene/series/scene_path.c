@@ -58,7 +58,7 @@ static void take_point(const scene_camera_point *p, scene_camera *out)
     out->angle = p->angle;
 }
 
-/* Between points i and i + 1. */
+/* Finds the camera between points i and i + 1. */
 static void take_between(const scene_camera *camera, int i, double at, scene_camera *out)
 {
     double numbers[4][NUMBERS_OF_POINT], found[NUMBERS_OF_POINT];
