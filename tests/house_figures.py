@@ -11,7 +11,6 @@ import sys
 
 MOST_PARAMETERS, MOST_FILES, MOST_DEPTH, MOST_FUNCTION_LINES = 7, 20, 8, 60
 LONG_LISTS = {"compositing": 1}  # functions of more parameters that are suffered
-NO_CIRCLES = {"render", "compositing", "adaptors", "tools"}
 arguments = [a for a in sys.argv[1:] if a != "--hold"]
 root = pathlib.Path(arguments[0] if arguments else pathlib.Path(__file__).parent.parent)
 parts = ["libinsitu", "mmbvh", "render", "compositing", "adaptors", "mini-app", "tools"]
@@ -126,8 +125,7 @@ for part in parts:
     hold(part, "files in a folder", folders.most_common(1)[0][1], MOST_FILES)
     hold(part, "depth of includes", depth(deepest), MOST_DEPTH)
     hold(part, f"functions of more than {MOST_PARAMETERS} parameters", len(long_lists), LONG_LISTS.get(part, 0))
-    if part in NO_CIRCLES:
-        hold(part, "circles of calls among files", len(groups), 0)
+    hold(part, "circles of calls among files", len(groups), 0)
 
 if "--hold" in sys.argv and complaints:
     sys.exit("\n".join(complaints))

@@ -94,6 +94,19 @@ refuses 'render: functions of more than 7 parameters: 1' figures
 echo '#include "render_kernels.c"' >"$place/tree/render/seeded.c"
 refuses 'render: depth of includes: 9, more than 8' figures
 rm "$place/tree/render/seeded.c"
+for room in libinsitu mmbvh render compositing adaptors mini-app tools; do
+    mkdir "$place/tree/$room/seeded"
+    printf 'int seeded_there(void)\n{\n    return seeded_here();\n}\n' >"$place/tree/$room/seeded/seeded_one.c"
+    printf 'int seeded_here(void)\n{\n    return seeded_there();\n}\n' >"$place/tree/$room/seeded/seeded_two.c"
+done
+refuses 'circles of calls among files' figures
+for room in libinsitu mmbvh render compositing adaptors mini-app tools; do
+    if ! grep -q "^$room: circles of calls among files: 1, more than 0" "$place/said"; then
+        echo "the circle in $room was not found"
+        failures=$((failures + 1))
+    fi
+    rm -r "$place/tree/$room/seeded"
+done
 accepts figures
 rm -rf "$place/tree"
 mkdir -p "$place/tree/mmbvh"
