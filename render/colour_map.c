@@ -58,11 +58,6 @@ float colour_linear_from_srgb(float srgb)
     return (float)colour_linear_of(srgb);
 }
 
-float colour_srgb_from_linear(float linear)
-{
-    return (float)colour_srgb_of(linear);
-}
-
 static void fill_published(colour_table table, const uint64_t *codes)
 {
     for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
@@ -136,9 +131,4 @@ const float *colour_map_table(const char *name, int *colour_count)
         return tables[map][0];
     }
     return NULL;
-}
-
-const char *colour_map_name(colour_map map)
-{
-    return names[map];
 }

@@ -32,13 +32,10 @@
 #define COLOUR_MAP_CONSTANT(word, name) COLOUR_MAP_##word,
 typedef enum colour_map { COLOUR_MAPS(COLOUR_MAP_CONSTANT) COLOUR_MAP_COUNT } colour_map;
 
-const char *colour_map_name(colour_map map);
-
 /* The map's table (colour_count × 3 floats, linear light, evenly spaced, static), or NULL where none has this name. */
 const float *colour_map_table(const char *name, int *colour_count);
 
-/* Converts one sRGB component in [0, 1] to linear light, and back. */
+/* Turns one sRGB component in [0, 1] into linear light. */
 float colour_linear_from_srgb(float srgb);
-float colour_srgb_from_linear(float linear);
 
 #endif

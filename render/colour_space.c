@@ -8,11 +8,6 @@ double colour_linear_of(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-double colour_srgb_of(double linear)
-{
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
-}
-
 static double mix(double a, double b, double share)
 {
     return a + share * (b - a);

@@ -13,9 +13,8 @@ typedef enum colour_space { COLOUR_RGB, COLOUR_HSV, COLOUR_LAB, COLOUR_DIVERGING
 /* The colour at `share` of the way from a to b, both sRGB in [0, 1], in linear light, in [0, 1]. */
 void colour_between(colour_space space, const double a[3], const double b[3], double share, float linear[3]);
 
-/* Converts one component in double. */
+/* Turns one sRGB component into linear light, in double. */
 double colour_linear_of(double srgb);
-double colour_srgb_of(double linear);
 
 typedef struct colour_point {
     double at;      /* never falling */

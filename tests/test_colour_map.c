@@ -9,6 +9,9 @@
 
 #include "colour_map.h"
 
+#define NAME(word, name) name,
+static const char *const names[COLOUR_MAP_COUNT] = {COLOUR_MAPS(NAME)};
+
 static double code_of(float linear)
 {
     const double l = linear;
@@ -97,10 +100,9 @@ static void colour_map_names_are_found(void **state)
 {
     (void)state;
     for (int i = 0; i < COLOUR_MAP_COUNT; i++) {
-        assert_non_null(table_of(colour_map_name((colour_map)i)));
+        assert_non_null(table_of(names[i]));
         for (int j = 0; j < i; j++)
-            assert_memory_not_equal(table_of(colour_map_name((colour_map)i)), table_of(colour_map_name((colour_map)j)),
-                                    768 * sizeof(float));
+            assert_memory_not_equal(table_of(names[i]), table_of(names[j]), 768 * sizeof(float));
     }
 }
 
@@ -124,7 +126,7 @@ static void colour_map_steps_are_small(void **state)
 {
     (void)state;
     for (int map = 0; map < COLOUR_MAP_COUNT; map++) {
-        const char *name = colour_map_name((colour_map)map);
+        const char *name = names[map];
         const float *table = table_of(name);
         for (int i = 0; i < 3 * 255; i++) {
             assert_true(table[i] >= 0 && table[i] <= 1);
@@ -144,28 +146,28 @@ static void colour_map_of_unknown_name_is_null(void **state)
     assert_int_equal(count, 7);
 }
 
-/* Float32 in and out: half a step of 2^-24 each way, through slopes of at most 12.92. */
-static void colour_curve_is_srgb_and_back(void **state)
+static void colour_curve_is_srgb(void **state)
 {
     (void)state;
-    assert_true(colour_linear_from_srgb(0) == 0 && colour_srgb_from_linear(0) == 0);
-    assert_true(colour_linear_from_srgb(1) == 1 && colour_srgb_from_linear(1) == 1);
+    assert_true(colour_linear_from_srgb(0) == 0 && colour_linear_from_srgb(1) == 1);
     for (int i = 0; i <= 65535; i++) {
         const float srgb = (float)i / 65535;
         const double exact = srgb <= 0.04045F ? (double)srgb / 12.92 : pow(((double)srgb + 0.055) / 1.055, 2.4);
         const float linear = colour_linear_from_srgb(srgb);
         assert_true(fabs((double)linear - exact) <= exact * 6e-8);
-        assert_true(fabs((double)colour_srgb_from_linear(linear) - (double)srgb) < 2e-7);
     }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(colour_map_codes_are_the_published), cmocka_unit_test(colour_map_names_are_found),
-        cmocka_unit_test(colour_map_meets_published_colours), cmocka_unit_test(colour_map_lightness_rises),
-        cmocka_unit_test(colour_map_steps_are_small),         cmocka_unit_test(colour_map_of_unknown_name_is_null),
-        cmocka_unit_test(colour_curve_is_srgb_and_back),
+        cmocka_unit_test(colour_map_codes_are_the_published),
+        cmocka_unit_test(colour_map_names_are_found),
+        cmocka_unit_test(colour_map_meets_published_colours),
+        cmocka_unit_test(colour_map_lightness_rises),
+        cmocka_unit_test(colour_map_steps_are_small),
+        cmocka_unit_test(colour_map_of_unknown_name_is_null),
+        cmocka_unit_test(colour_curve_is_srgb),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
