@@ -83,3 +83,11 @@ bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kin
     if (head) bench_print_head();
     return true;
 }
+
+int bench_measure_meshes(int argc, char **argv, const char *about, test_mesh_kind last, bench_measure *measure)
+{
+    bench_command command;
+    if (!bench_command_parse(argc, argv, about, last, &command)) return command.status;
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
+    return 0;
+}

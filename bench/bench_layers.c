@@ -80,16 +80,13 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
 
 int main(int argc, char **argv)
 {
-    bench_command command;
     MPI_Init(&argc, &argv);
-    if (!bench_command_parse(
-            argc, argv,
-            "Measures steps of new values for each MESH (tets or hexes) of N^3 cubes: a slice, the outer\n"
-            "surface, the same clipped, with edges and with 4 samples a pixel, the first three beside VTK's\n"
-            "filters and Mesa; and an isosurface by each kind of normals.",
-            TEST_HEXES, &command))
-        command.mesh_count = 0;
-    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
+    const int status = bench_measure_meshes(
+        argc, argv,
+        "Measures steps of new values for each MESH (tets or hexes) of N^3 cubes: a slice, the outer\n"
+        "surface, the same clipped, with edges and with 4 samples a pixel, the first three beside VTK's\n"
+        "filters and Mesa; and an isosurface by each kind of normals.",
+        TEST_HEXES, measure);
     MPI_Finalize();
-    return command.status;
+    return status;
 }

@@ -195,12 +195,9 @@ static void measure(const bench_command *command, test_mesh_kind mesh, int n)
 
 int main(int argc, char **argv)
 {
-    bench_command command;
-    if (!bench_command_parse(argc, argv,
-                             "Measures rays from the hits of an isosurface of each MESH (tets or hexes) of N^3 cubes,\n"
-                             "towards a light and into the hemisphere, beside Embree's on VTK's triangles.",
-                             TEST_HEXES, &command))
-        return command.status;
-    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
-    return 0;
+    return bench_measure_meshes(
+        argc, argv,
+        "Measures rays from the hits of an isosurface of each MESH (tets or hexes) of N^3 cubes,\n"
+        "towards a light and into the hemisphere, beside Embree's on VTK's triangles.",
+        TEST_HEXES, measure);
 }

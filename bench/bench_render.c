@@ -79,12 +79,9 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
 
 int main(int argc, char **argv)
 {
-    bench_command command;
-    if (!bench_command_parse(argc, argv,
-                             "Measures building, refitting and drawing of each MESH (tets, hexes, wedges, pyramids,\n"
-                             "polyhedra or mixed) of N^3 cubes.",
-                             TEST_MIXED, &command))
-        return command.status;
-    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
-    return 0;
+    return bench_measure_meshes(
+        argc, argv,
+        "Measures building, refitting and drawing of each MESH (tets, hexes, wedges, pyramids,\n"
+        "polyhedra or mixed) of N^3 cubes.",
+        TEST_MIXED, measure);
 }

@@ -47,14 +47,12 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
 
 int main(int argc, char **argv)
 {
-    bench_command command;
     MPI_Init(&argc, &argv);
-    if (!bench_command_parse(argc, argv,
+    const int status =
+        bench_measure_meshes(argc, argv,
                              "Measures whole steps for each MESH (tets or hexes) of N^3 cubes, with new values, moved\n"
                              "vertices and a new mesh, beside VTK's extraction and Mesa, and beside Embree.",
-                             TEST_HEXES, &command))
-        command.mesh_count = 0;
-    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
+                             TEST_HEXES, measure);
     MPI_Finalize();
-    return command.status;
+    return status;
 }
