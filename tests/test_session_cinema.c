@@ -29,25 +29,6 @@ static void make_input(session_input *in)
     input_create(in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
 }
 
-/* Rank 0's file; empty where there is none. */
-static void read_file(const char *path, char text[MOST])
-{
-    text[0] = '\0';
-    FILE *file = own_rank == 0 ? fopen(path, "r") : NULL;
-    if (!file) return;
-    text[fread(text, 1, MOST - 1, file)] = '\0';
-    fclose(file);
-}
-
-static void put_file(const char *path, const char *text)
-{
-    if (own_rank != 0) return;
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-}
-
 static void forget_files(void)
 {
     if (own_rank != 0) return;
@@ -108,7 +89,7 @@ static void expect_script(const char *table, char text[MOST])
 static bool is_page_there(void)
 {
     static char page[MOST];
-    read_file("out/a.cdb/index.html", page);
+    read_file("out/a.cdb/index.html", MOST, page);
     return strlen(page) == session_cinema_page_size && memcmp(page, session_cinema_page, strlen(page)) == 0;
 }
 
@@ -117,14 +98,14 @@ static bool is_table(int first, int end)
     static char expected[MOST], found[MOST];
     if (own_rank != 0) return true;
     expect_table(first, end, expected);
-    read_file("out/a.cdb/data.csv", found);
+    read_file("out/a.cdb/data.csv", MOST, found);
     if (strcmp(found, expected) != 0) {
         fprintf(stderr, "%s\nexpected\n%s\n", found, expected);
         return false;
     }
     static char script[MOST];
     expect_script(expected, script);
-    read_file("out/a.cdb/data.js", found);
+    read_file("out/a.cdb/data.js", MOST, found);
     return strcmp(found, script) == 0 && is_page_there();
 }
 
@@ -153,12 +134,12 @@ static void tables_of_several_images_have_all_columns(void **state)
                   IMAGE("z", "    camera: {orbit: {views: 1, start: 0.1}}\n", SURFACE,
                         "{cinema: two.cdb, path: \"{cycle}/{name}.png\"}"),
               &in, 3, 4);
-    read_file("two.cdb/data.csv", text);
+    read_file("two.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "cycle,time,image,phi,theta,field,FILE\n"
                                              "3,1.5,\"x, \"\"y\"\"\",,,f,\"x, \"\"y\"\"_000003_f.png\"\n"
                                              "3,1.5,\"x, \"\"y\"\"\",,,g,\"x, \"\"y\"\"_000003_g.png\"\n"
                                              "3,1.5,z,0.1,30,,3/z.png\n") == 0);
-    read_file("two.cdb/data.js", text);
+    read_file("two.cdb/data.js", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "\n\"3,1.5,\\x22x, \\x22\\x22y\\x22\\x22\\x22,,,f,\\x22x, ") != NULL);
     input_free(&in);
 }
@@ -175,20 +156,20 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     run_steps(swept, &in, 0, 7);
     run_steps(swept, &in, 3, 7); /* the first picture is of cycle 4 */
     everywhere(is_table(0, 7));
-    read_file("out/a.cdb/data.csv", text);
+    read_file("out/a.cdb/data.csv", MOST, text);
     if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* the last line is torn */
     put_file("out/a.cdb/data.csv", text);
     run_steps(swept, &in, 7, 9);
     expect_table(0, 9, text);
     static char found[MOST];
-    read_file("out/a.cdb/data.csv", found);
+    read_file("out/a.cdb/data.csv", MOST, found);
     if (own_rank == 0) { /* all but the torn line */
         char *torn = strstr(text, "\n6,3,180,10.5,-0.5") + 1, *after = strchr(torn, '\n') + 1;
         memmove(torn, after, strlen(after) + 1);
     }
     everywhere(own_rank != 0 || strcmp(text, found) == 0);
     run_steps(swept, &in, 1, 2); /* a run that draws nothing writes nothing */
-    read_file("out/a.cdb/data.csv", found);
+    read_file("out/a.cdb/data.csv", MOST, found);
     everywhere(own_rank != 0 || strcmp(text, found) == 0);
     run_steps(swept, &in, 2, 5);
     everywhere(is_table(0, 5));
@@ -208,7 +189,7 @@ static void lines_go_from_the_first_step_on(void **state)
         SURFACE, "{cinema: out/a.cdb}");
     static char text[MOST], expected[MOST], last[MOST];
     run_steps(late, &in, 3, 7);
-    read_file("out/a.cdb/data.csv", text);
+    read_file("out/a.cdb/data.csv", MOST, text);
     expect_table(0, 3, expected);
     expect_table(6, 7, last);
     strcat(expected, strchr(last, '\n') + 1);
@@ -277,7 +258,7 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     unwritable = "_002_";
     told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
     unwritable = NULL;
-    read_file("out/a.cdb/data.csv", text);
+    read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || (!strstr(text, "_002_") && strstr(text, "_003_-0.5.png\n")));
     everywhere(caught_count == (own_rank == 0 ? 6 : 0));
     insitu_destroy(&session);
@@ -302,7 +283,7 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
         base_memory_fail_nth(0);
         everywhere(status == INSITU_OK || status == INSITU_ERROR_MEMORY);
         failures += status != INSITU_OK;
-        read_file("out/a.cdb/data.csv", text);
+        read_file("out/a.cdb/data.csv", MOST, text);
         bool is_whole = true;
         for (const char *line = text, *end; *line && is_whole; line = end + 1) {
             end = strchr(line, '\n');
@@ -316,7 +297,7 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     everywhere(failures > 3);
     forget_pictures();
     everywhere(insitu_step(session, 1000, 500) == INSITU_OK);
-    read_file("out/a.cdb/data.csv", text);
+    read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "a_001000_003_-0.5.png\n"));
     insitu_destroy(&session);
     input_free(&in);

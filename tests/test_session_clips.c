@@ -10,13 +10,11 @@
 #include "render.h"
 #include "session.h"
 #include "test_session_fixture.h"
+#include "test_session_view.h"
 
-enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
+enum { SIDE = 3 };
 
-#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
-#define IMAGE(more, layers)                                                                                            \
-    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "%s" more "    layers:\n" layers    \
-    "    outputs: [{path: a.exr}]\n"
+#define CLIPPED(more, layers) IMAGE_BEGIN("%s" more) layers IMAGE_END
 
 typedef struct half_space {
     double normal[3], distance;
@@ -55,23 +53,9 @@ static const half_space cube[] = {{{1, 0, 0}, 1},  {{-1, 0, 0}, 1}, {{0, 1, 0}, 
 /* test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1: its isosurface 0.2. */
 static const half_space linear = {{0.3, -0.7, 0.5}, 0.1};
 
-typedef struct ray {
-    double base[3], direction[3];
-} ray;
-
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static ray ray_of(int pixel)
-{
-    render_camera camera;
-    ray out;
-    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
-                          40, WIDTH, HEIGHT);
-    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, out.base, out.direction);
-    return out;
 }
 
 static double meet(const ray *r, const half_space *plane)
@@ -263,19 +247,19 @@ typedef struct clip_case {
 } clip_case;
 
 static const clip_case cases[] = {
-    {"surface", IMAGE("", "      - surface: {opacity: 1%s}\n"), is_cube, 0},
-    {"clear surface", IMAGE("", "      - surface: {opacity: 0.5%s}\n"), is_clear_cube, 0},
-    {"isosurface", IMAGE("", "      - isosurface: {field: f, values: [0.2]%s}\n"), is_plane, 0},
-    {"coloured", IMAGE("", "      - isosurface: {field: f, values: [0.2], colour_by: {field: f}%s}\n"), is_plane, 0},
-    {"clear isosurface", IMAGE("", "      - isosurface: {field: f, values: [0.2], opacity: 0.25%s}\n"), is_clear_plane,
-     0},
-    {"to an error", IMAGE("", MEDIUM), is_exact_medium, 1e-6},
-    {"to a small error", IMAGE("    sampling: {max_error: 1e-4}\n", MEDIUM), is_exact_medium, 1e-6},
-    {"segments", IMAGE("    sampling: {method: segments}\n", MEDIUM), is_exact_medium, 1e-6},
-    {"samples", IMAGE("    sampling: {step: 0.01}\n", MEDIUM), is_sampled_medium, 1e-6},
-    {"two by segments", IMAGE("    sampling: {method: segments}\n", MEDIUM MEDIUM), is_double_medium, 1e-6},
-    {"two by samples", IMAGE("    sampling: {step: 0.01}\n", MEDIUM MEDIUM), is_double_sampled_medium, 1e-6},
-    {"clear surface in a medium", IMAGE("", MEDIUM "      - isosurface: {field: f, values: [0.2], opacity: 0%s}\n"),
+    {"surface", CLIPPED("", "      - surface: {opacity: 1%s}\n"), is_cube, 0},
+    {"clear surface", CLIPPED("", "      - surface: {opacity: 0.5%s}\n"), is_clear_cube, 0},
+    {"isosurface", CLIPPED("", "      - isosurface: {field: f, values: [0.2]%s}\n"), is_plane, 0},
+    {"coloured", CLIPPED("", "      - isosurface: {field: f, values: [0.2], colour_by: {field: f}%s}\n"), is_plane, 0},
+    {"clear isosurface", CLIPPED("", "      - isosurface: {field: f, values: [0.2], opacity: 0.25%s}\n"),
+     is_clear_plane, 0},
+    {"to an error", CLIPPED("", MEDIUM), is_exact_medium, 1e-6},
+    {"to a small error", CLIPPED("    sampling: {max_error: 1e-4}\n", MEDIUM), is_exact_medium, 1e-6},
+    {"segments", CLIPPED("    sampling: {method: segments}\n", MEDIUM), is_exact_medium, 1e-6},
+    {"samples", CLIPPED("    sampling: {step: 0.01}\n", MEDIUM), is_sampled_medium, 1e-6},
+    {"two by segments", CLIPPED("    sampling: {method: segments}\n", MEDIUM MEDIUM), is_double_medium, 1e-6},
+    {"two by samples", CLIPPED("    sampling: {step: 0.01}\n", MEDIUM MEDIUM), is_double_sampled_medium, 1e-6},
+    {"clear surface in a medium", CLIPPED("", MEDIUM "      - isosurface: {field: f, values: [0.2], opacity: 0%s}\n"),
      is_exact_medium, 1e-6},
 };
 enum { CASES = sizeof cases / sizeof *cases };
@@ -367,8 +351,8 @@ static void slices_in_the_clipping_plane_are_seen(void **state)
 {
     (void)state;
     static const clip_case slice = {
-        .scene = IMAGE("", "      - slice: {field: f, planes: [{normal: [-1, -2, -2], point: [0.9, 0, 0]}]}\n"
-                           "      - surface: {}\n")};
+        .scene = CLIPPED("", "      - slice: {field: f, planes: [{normal: [-1, -2, -2], point: [0.9, 0, 0]}]}\n"
+                             "      - surface: {}\n")};
     session_input in = {0};
     input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
     caught_picture picture = draw(MPI_COMM_WORLD, scene_of(&slice, &regions[0], OF_IMAGE), &in);

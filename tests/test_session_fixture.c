@@ -47,6 +47,24 @@ void assert_told(const insitu_session *session, insitu_status status, insitu_sta
     assert_everywhere(has_all, "the message names the thing", file, line);
 }
 
+void read_file(const char *path, size_t size, char *text)
+{
+    text[0] = '\0';
+    FILE *file = own_rank == 0 ? fopen(path, "r") : NULL;
+    if (!file) return;
+    text[fread(text, 1, size - 1, file)] = '\0';
+    fclose(file);
+}
+
+void put_file(const char *path, const char *text)
+{
+    if (own_rank != 0) return;
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    fclose(file);
+}
+
 int run_session_tests(int argc, char **argv, int (*run)(void))
 {
     MPI_Init(&argc, &argv);
@@ -81,10 +99,8 @@ insitu_session *open_session(MPI_Comm comm, const char *scene)
     return session;
 }
 
-void input_describe(session_input *in)
+void describe_part(const test_mesh *part, insitu_mesh *mesh)
 {
-    test_mesh *part = &in->part;
-    insitu_mesh *mesh = &in->mesh;
     insitu_mesh_defaults(mesh);
     mesh->vertex_count = part->vertex_count;
     insitu_mesh_interleaved(mesh, part->coordinates, INSITU_FLOAT64);
@@ -98,10 +114,15 @@ void input_describe(session_input *in)
     mesh->face_offsets = (insitu_array){part->face_offsets, INSITU_INT64, 0};
     mesh->face_connectivity_count = part->face_connectivity_count;
     mesh->face_connectivity = (insitu_array){part->face_connectivity, INSITU_INT64, 0};
+}
+
+void input_describe(session_input *in)
+{
+    describe_part(&in->part, &in->mesh);
     insitu_field_defaults(&in->field);
     in->field.name = "f";
-    in->field.count = part->vertex_count;
-    in->field.values = (insitu_array){part->values, INSITU_FLOAT64, 0};
+    in->field.count = in->part.vertex_count;
+    in->field.values = (insitu_array){in->part.values, INSITU_FLOAT64, 0};
 }
 
 void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count)

@@ -30,6 +30,12 @@ void assert_told(const insitu_session *session, insitu_status status, insitu_sta
 /* Goes into a folder of this name and the count of ranks, within the folder: each count's files are apart. */
 bool enter_folder(const char *folder, const char *name);
 
+/* Reads rank 0's file into size bytes of text, which is empty on other ranks and where there is no file. */
+void read_file(const char *path, size_t size, char *text);
+
+/* Rank 0 writes the file. */
+void put_file(const char *path, const char *text);
+
 /* MPI, and argv[1]: a folder for scene files. Returns what main returns. */
 int run_session_tests(int argc, char **argv, int (*run)(void));
 
@@ -47,6 +53,9 @@ typedef struct session_input {
     int side, rank, count;
     test_partition_kind dealt;
 } session_input;
+
+/* Describes a part as it is: with types, offsets, ghosts and faces. */
+void describe_part(const test_mesh *part, insitu_mesh *mesh);
 
 /* Hexes or any kind, side^3 cubes, dealt to count ranks; the part of rank. */
 void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count);
@@ -89,7 +98,7 @@ typedef struct caught_picture {
     int width, height;
     float *rgba, *depth; /* depth NULL where none was given */
     int channel_count;
-    float *data; /* the channels one after the other; NULL where there are none */
+    float *data;                 /* the channels one after the other; NULL where there are none */
     insitu_deep_sample *samples; /* of a deep picture, pixel by pixel; else NULL */
     int64_t *first;              /* pixels + 1: of samples */
     char path[256];

@@ -92,15 +92,7 @@ static int64_t whole_vertex(const double position[3])
 
 static void describe(part_input *in)
 {
-    insitu_mesh_defaults(&in->mesh);
-    in->mesh.vertex_count = in->part.vertex_count;
-    insitu_mesh_interleaved(&in->mesh, in->part.coordinates, INSITU_FLOAT64);
-    in->mesh.cell_count = in->part.cell_count;
-    in->mesh.connectivity_count = in->part.connectivity_count;
-    in->mesh.connectivity = (insitu_array){in->part.connectivity, INSITU_INT64, 0};
-    in->mesh.cell_types = (insitu_array){in->part.types, INSITU_UINT8, 0};
-    in->mesh.offsets = (insitu_array){in->part.offsets, INSITU_INT64, 0};
-    in->mesh.ghosts = (insitu_array){in->part.ghosts, INSITU_UINT8, 0};
+    describe_part(&in->part, &in->mesh);
     insitu_field_defaults(&in->field);
     in->field.name = "c";
     in->field.centring = INSITU_CELL;

@@ -10,13 +10,8 @@
 #include "render.h"
 #include "session.h"
 #include "test_session_fixture.h"
+#include "test_session_view.h"
 
-enum { WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
-
-#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
-#define IMAGE(layers)                                                                                                  \
-    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "    layers:\n" layers              \
-    "    outputs: [{path: a.exr}]\n"
 #define SURFACE                                                                                                        \
     "      - surface: {colour_by: {field: f, map: grey, range: [-2, 2]}, material: {ambient: 1, diffuse: 0, "          \
     "specular: 0}}\n"
@@ -195,16 +190,13 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
 static double meet_sheet(int pixel, double place[3])
 {
     static const double normal[3] = {0.3, 0.2, -1};
-    render_camera camera;
-    double base[3], direction[3], along = 0, left = 0;
-    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
-                          40, WIDTH, HEIGHT);
-    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
+    const ray r = ray_of(pixel);
+    double along = 0, left = 0;
     for (int a = 0; a < 3; a++) {
-        along += normal[a] * direction[a];
-        left -= normal[a] * base[a];
+        along += normal[a] * r.direction[a];
+        left -= normal[a] * r.base[a];
     }
-    for (int a = 0; a < 3; a++) place[a] = base[a] + left / along * direction[a];
+    for (int a = 0; a < 3; a++) place[a] = r.base[a] + left / along * r.direction[a];
     return left / along;
 }
 

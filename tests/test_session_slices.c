@@ -10,30 +10,13 @@
 #include "render.h"
 #include "session.h"
 #include "test_session_fixture.h"
+#include "test_session_view.h"
 
-enum { SIDE = 4, WIDTH = 48, HEIGHT = 36 };
+enum { SIDE = 4 };
 
-#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
-#define IMAGE(layers)                                                                                                  \
-    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "    layers:\n" layers              \
-    "    outputs: [{path: a.exr}]\n"
 #define SLICE(keys, planes) "      - slice: {field: f, map: turbo, range: [-1.5, 1.7], planes: [" planes "]" keys "}\n"
 
 static const double low = -1.5, high = 1.7;
-
-typedef struct ray {
-    double base[3], direction[3];
-} ray;
-
-static ray ray_of(int pixel)
-{
-    render_camera camera;
-    ray out;
-    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
-                          40, WIDTH, HEIGHT);
-    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, out.base, out.direction);
-    return out;
-}
 
 typedef struct plane {
     double normal[3], distance;

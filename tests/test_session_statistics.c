@@ -44,25 +44,6 @@ static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, 
     test_mesh_free(&whole);
 }
 
-/* Rank 0's file; empty where there is none. */
-static void read_file(const char *path, char text[MOST])
-{
-    text[0] = '\0';
-    FILE *file = fopen(path, "r");
-    if (!file) return;
-    text[fread(text, 1, MOST - 1, file)] = '\0';
-    fclose(file);
-}
-
-static void put_file(const char *path, const char *text)
-{
-    if (own_rank != 0) return;
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-}
-
 /* A field of the last line. */
 static double number_at(const char *text, int column)
 {
@@ -110,7 +91,7 @@ static void numbers_of_linear_fields_are_closed_forms(void **state)
         input_describe(&in);
         if (own_rank == 0) unlink("linear.csv");
         run_steps(NEVER "statistics: [{field: f, path: linear.csv}]\n", &in, 0, 1);
-        read_file("linear.csv", text);
+        read_file("linear.csv", MOST, text);
         everywhere(own_rank != 0 || (is_near(number_at(text, VOLUME), 8) && is_near(number_at(text, LEAST), -1.4) &&
                                      is_near(number_at(text, MOST_VALUE), 1.6) &&
                                      (kind == TEST_MIXED || is_near(number_at(text, MEAN), 0.1))));
@@ -138,7 +119,7 @@ static void numbers_of_cells_are_sums(void **state)
     if (own_rank == 0) unlink("folder/cells.csv"), rmdir("folder");
     run_steps(NEVER "statistics: [{field: f, path: folder/cells.csv, histogram: {bins: 5, range: [-2, 6]}}]\n", &in, 0,
               1);
-    read_file("folder/cells.csv", text);
+    read_file("folder/cells.csv", MOST, text);
     bool is_well = number_at(text, CELLS) == COUNT && is_near(number_at(text, VOLUME), 8);
     is_well = is_well && is_near(number_at(text, LEAST), least) && is_near(number_at(text, MOST_VALUE), most);
     is_well = is_well && is_near(number_at(text, MEAN), sum) && is_near(number_at(text, DEVIATION), sqrt(squares));
@@ -172,8 +153,8 @@ static void files_do_not_depend_on_the_partition(void **state)
                 input_free(&whole);
                 rank_count = ranks;
             }
-            read_file("parts.csv", text);
-            read_file("whole.csv", alone);
+            read_file("parts.csv", MOST, text);
+            read_file("whole.csv", MOST, alone);
             everywhere(own_rank != 0 || (strlen(text) > 900 && strcmp(text, alone) == 0));
             input_free(&in);
         }
@@ -190,15 +171,15 @@ static void runs_that_begin_again_go_on_with_the_file(void **state)
     make_part(TEST_TETS, 0.1, false, &in);
     if (own_rank == 0) unlink("runs.csv");
     run_steps(scene, &in, 0, 7);
-    read_file("runs.csv", first);
+    read_file("runs.csv", MOST, first);
     everywhere(own_rank != 0 || (number_at(first, 0) == 6 && number_at(first, 1) == 3));
     run_steps(scene, &in, 3, 7);
-    read_file("runs.csv", text);
+    read_file("runs.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(first, text) == 0);
     if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* the last line is torn */
     put_file("runs.csv", first);
     run_steps(scene, &in, 6, 7);
-    read_file("runs.csv", first);
+    read_file("runs.csv", MOST, first);
     everywhere(own_rank != 0 || strcmp(first, text) == 0);
     input_free(&in);
 }
@@ -217,7 +198,7 @@ static void files_that_cannot_be_written_are_told(void **state)
     assert_int_equal(hand_over(session, &in), INSITU_OK);
     told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
     everywhere(caught_count == (own_rank == 0));
-    read_file("other.csv", text);
+    read_file("other.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: g, path: g.csv}]\n"));

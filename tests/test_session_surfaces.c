@@ -9,29 +9,12 @@
 #include "render.h"
 #include "session.h"
 #include "test_session_fixture.h"
+#include "test_session_view.h"
 
-enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
+enum { SIDE = 3 };
 
-#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
-#define IMAGE(layers)                                                                                                  \
-    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "    layers:\n" layers              \
-    "    outputs: [{path: a.exr}]\n"
 #define PLAIN "material: {ambient: 1, diffuse: 0, specular: 0}"
 #define COLOURED(keys) "      - surface: {colour_by: {field: f, map: grey, range: [-2, 2]}, " PLAIN keys "}\n"
-
-typedef struct ray {
-    double base[3], direction[3];
-} ray;
-
-static ray ray_of(int pixel)
-{
-    render_camera camera;
-    ray out;
-    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
-                          40, WIDTH, HEIGHT);
-    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, out.base, out.direction);
-    return out;
-}
 
 /* ---- inputs -------------------------------------------------------------------------------------------------- */
 

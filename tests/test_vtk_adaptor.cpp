@@ -33,9 +33,6 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "insitu/vtk.h"
-#include "test_vtk_session_stub.h"
-
 // cmocka defines fail as a macro, so it comes after all C++ headers.
 extern "C" {
 #include <setjmp.h>
@@ -46,24 +43,12 @@ extern "C" {
 #include <cmocka.h>
 }
 
+#include "test_vtk_fixture.h"
+
 namespace
 {
 
 using point = std::array<double, 3>;
-
-struct fixture {
-    insitu_session session;
-    insitu_vtk_adaptor *adaptor = nullptr;
-    insitu_vtk_report report{};
-
-    fixture() { assert_int_equal(insitu_vtk_create(&session, &adaptor), INSITU_OK); }
-    ~fixture() { insitu_vtk_destroy(&adaptor); }
-    fixture(const fixture &) = delete;
-    fixture &operator=(const fixture &) = delete;
-
-    insitu_status set(vtkDataObject *data) { return insitu_vtk_set(adaptor, "m", data, &report); }
-    const stub_mesh &mesh(const std::string &name = "m") { return session.meshes.at(name); }
-};
 
 /* A grid of single cells, each with its own points: a regular prism or what the points say. */
 void add_cell(vtkUnstructuredGrid *grid, int type, const std::vector<point> &points)

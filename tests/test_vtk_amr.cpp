@@ -17,9 +17,6 @@
 #include <vtkUniformGrid.h>
 #include <vtkUnsignedCharArray.h>
 
-#include "insitu/vtk.h"
-#include "test_vtk_session_stub.h"
-
 // cmocka defines fail as a macro, so it comes after all C++ headers.
 extern "C" {
 #include <setjmp.h>
@@ -30,21 +27,10 @@ extern "C" {
 #include <cmocka.h>
 }
 
+#include "test_vtk_fixture.h"
+
 namespace
 {
-
-struct fixture {
-    insitu_session session;
-    insitu_vtk_adaptor *adaptor = nullptr;
-    insitu_vtk_report report{};
-
-    fixture() { assert_int_equal(insitu_vtk_create(&session, &adaptor), INSITU_OK); }
-    ~fixture() { insitu_vtk_destroy(&adaptor); }
-    fixture(const fixture &) = delete;
-    fixture &operator=(const fixture &) = delete;
-
-    insitu_status set(vtkDataObject *data) { return insitu_vtk_set(adaptor, "m", data, &report); }
-};
 
 /* A grid of an AMR: its level, its first cell in that level's counting, and how many cells it has. */
 struct block {
