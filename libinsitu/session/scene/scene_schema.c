@@ -39,7 +39,7 @@ DEFINE_MAPPING(light, "lights", LIGHT_KEYS);
       .help = "Rays a pixel and frame. Their error falls as the number; with `antialias` each frame has others.",      \
       .by_default = "`16`", .low = 1, .high = 64)                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("radius", OPTIONAL, scene_file_occlusion, radius),                                         \
-      .help = "What is farther away darkens nothing, in scene units.",                                                 \
+      .help = "The largest distance at which something darkens a place, in scene units.",                              \
       .by_default = "a tenth of the diagonal of the bounds of all the data", .low = 0, .is_low_excluded = true,        \
       .high = 1e30)
 DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
@@ -182,7 +182,7 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
     X(CYAML_FIELD_BOOL_PTR("decorations", OPTIONAL, scene_file_output, decorations),                                   \
       .help = "Draw the image's decorations into this file.", .by_default = "`true` for PNG, `false` for EXR")         \
     X(CYAML_FIELD_BOOL_PTR("data", OPTIONAL, scene_file_output, data),                                                 \
-      .help = "Of an EXR: numbers of the nearest surface in the pixel too, of any opacity, through the pixel's "       \
+      .help = "An EXR also gets numbers of the nearest surface in the pixel, of any opacity, through the pixel's "     \
               "centre. N.X, N.Y and N.Z are its unit normal towards the eye, in the scene's axes; value is that of "   \
               "the field that colours it, or its isovalue; layer is the number of its layer in the list, from 0, and " \
               "surface that of its isovalue or plane in the layer. 0, NaN and -1 where there is no surface. Two "      \
@@ -221,8 +221,8 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
 DEFINE_MAPPING(condition, "when", CONDITION_KEYS);
 
 #define HISTOGRAM_KEYS(X)                                                                                              \
-    X(CYAML_FIELD_INT_PTR("bins", OPTIONAL, scene_file_histogram, bins), .help = "How many, of equal width.",          \
-      .by_default = "`32`", .low = 1, .high = 256)                                                                     \
+    X(CYAML_FIELD_INT_PTR("bins", OPTIONAL, scene_file_histogram, bins),                                               \
+      .help = "The number of bins, which have equal widths.", .by_default = "`32`", .low = 1, .high = 256)             \
     X(NUMBERS("range", scene_file_histogram, range, 2),                                                                \
       .help = "The values `[low, high]` that the bins cover, low < high. Cells beyond are in no bin.",                 \
       .by_default = "the least and the greatest value of each step")
@@ -260,7 +260,7 @@ static const cyaml_schema_value_t statistics = {
           "with `every`.",                                                                                             \
       .by_default = "by `every`", .low = 0, .is_low_excluded = true, .high = 1e30)                                     \
     X(CYAML_FIELD_MAPPING_PTR("when", OPTIONAL, scene_file_image, when, condition_fields),                             \
-      .help = "Of the steps of `every` or `every_time`, draw only those in which this holds.", .by_default = "always", \
+      .help = "Draw only in those steps of `every` or `every_time` in which this holds.", .by_default = "always",      \
       .child = &condition_mapping)                                                                                     \
     X(CYAML_FIELD_BOOL_PTR("once", OPTIONAL, scene_file_image, once),                                                  \
       .help = "Draw only at the first of the steps in which the image is due. An edited scene begins anew.",           \
@@ -290,13 +290,13 @@ static const cyaml_schema_value_t statistics = {
           "hemisphere above it, spread as the cosine, the share that meets no opaque layer within `radius` is a "      \
           "factor on its ambient and diffuse light. By what casts shadows, on what has them. Which rays a pixel has "  \
           "does not change from step to step. A core asks some 7 million rays a second in tetrahedra, 4 million in "   \
-          "hexahedra. `{}` takes all its defaults.",                                           \
+          "hexahedra. `{}` takes all its defaults.",                                                                   \
       .by_default = "none", .child = &occlusion_mapping)                                                               \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, scene_file_image, clip, scene_clip_fields),                            \
       .help = "Cuts parts of all layers away, exactly, and through the cells; volumes keep their `max_error`.",        \
       .by_default = "nothing is cut away", .child = &scene_clip_mapping)                                               \
     X(CYAML_FIELD_SEQUENCE("layers", CYAML_FLAG_POINTER, scene_file_image, layers, &layer, 1, 20),                     \
-      .help = "What is drawn. Each entry holds one of the keys of a layer.", .child = &scene_layer_mapping)            \
+      .help = "The layers to draw. Each entry holds one of the keys of a layer.", .child = &scene_layer_mapping)       \
     X(CYAML_FIELD_MAPPING_PTR("sampling", OPTIONAL, scene_file_image, sampling, sampling_fields),                      \
       .help = "How volumes are integrated, and how finely.",                                                           \
       .by_default = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered",            \
@@ -311,7 +311,7 @@ static const cyaml_schema_value_t statistics = {
       .by_default = "`1`", .low = 1, .high = 16)                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("decorations", OPTIONAL, scene_file_image, decorations, decorations_fields),             \
       .help =                                                                                                          \
-          "What is written and drawn beside the data. Nothing of it lies over another, and all of it grows with "      \
+          "Words, bars and lines beside the data. None of them lies over another, and all of them grow with "          \
           "the picture. Words need a font: DejaVuSans, or another common one, in the system's folders or in those "    \
           "that OPENIMAGEIO_FONTS names in rank 0's environment; without one the report warns.",                       \
       .by_default = "none", .child = &decorations_mapping)                                                             \
@@ -329,7 +329,7 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
           "fewer. 0: the cores of the node, shared among its ranks.",                                                  \
       .by_default = "`0`", .low = 0, .high = 4096)                                                                     \
     X(CHOICE("tree", scene_file, tree, tree_words),                                                                    \
-      .help = "What the trees are built over: all cells (`full`), those that the images can show (`partial`), or "     \
+      .help = "Trees are built over all cells (`full`), over those that the images can show (`partial`), or over "     \
               "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \
       .by_default = "`auto`")                                                                                          \
     X(CHOICE("schedule", scene_file, schedule, schedule_words),                                                        \
@@ -350,7 +350,7 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .help =                                                                                                          \
           "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \
           "value, normals by gradient, share the work of finding its cells, where these are tets or hexes in arrays "  \
-          "of float32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "  \
+          "of float32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "            \
           "hex, at most 64 MiB a rank, are held while the step is drawn.",                                             \
       .child = &image_mapping)                                                                                         \
     X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \

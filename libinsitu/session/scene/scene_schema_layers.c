@@ -18,13 +18,12 @@ static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"
     "stands for the meshes below it too: `data` for `data/0`, `data/1`, ..., as the blocks of a file are called."
 #define MESH_DEFAULT "the meshes that have the field"
 #define INTERPOLATE_HELP                                                                                               \
-    "How a field that has one value a cell is drawn: `cell`, as it is, the same throughout each cell; or `vertex`, "   \
-    "by "                                                                                                              \
-    "the means of the cells at each vertex, on all ranks, interpolated between the vertices (8 bytes a vertex are "    \
+    "A field that has one value a cell is drawn by `cell` as it is, the same throughout each cell, and by `vertex` "   \
+    "by the means of the cells at each vertex, on all ranks, interpolated between the vertices (8 bytes a vertex are " \
     "held). A field that has a value at each corner of each cell is drawn torn by `cell`, and by the means of the "    \
-    "corners at each vertex by `vertex`. Of no effect on a field that has one value a vertex."
+    "corners at each vertex by `vertex`. It does not matter to a field that has one value a vertex."
 #define ISO_INTERPOLATE_HELP                                                                                           \
-    "How a field that has one value a cell is drawn: by the means of the cells at each vertex, on all ranks (8 bytes " \
+    "A field that has one value a cell is drawn by the means of the cells at each vertex, on all ranks (8 bytes "      \
     "a vertex are held). `cell` is refused: between cells of two values there is a face, not a surface of the value "  \
     "asked for. A field that has a value at each corner of each cell is drawn torn unless this says `vertex`."
 #define RANGE_DEFAULT "`data`"
@@ -90,7 +89,7 @@ static const scene_form range_forms[] = {
       .help = "So many bands of equal width, each in one colour: those of the map at even places, ends included.",     \
       .by_default = "smooth", .low = 1, .high = 64)                                                                    \
     X(CHOICE("scale", type, colours.scale, scale_words),                                                               \
-      .help = "How values are spaced along the map: as they are, by their logarithm (values of 0 and less are below "  \
+      .help = "The spacing of values along the map: as they are, by their logarithm (values of 0 and less are below "  \
               "the range), or by `symlog`, linear up to the `threshold` on both sides of 0 and logarithmic beyond: s " \
               "= value / threshold there, and 1 + ln(value / threshold), mirrored.",                                   \
       .by_default = "`linear`")                                                                                        \
@@ -111,7 +110,7 @@ static const scene_form range_forms[] = {
       .by_default = RANGE_DEFAULT, TAKES(range_forms))
 #define PLANE_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
-      .help = "What the plane is at right angles to. Any length but 0.")                                               \
+      .help = "The direction at right angles to the plane, of any length but 0.")                                      \
     X(NUMBERS("point", scene_file_plane, point, 3), .help = "A point of the plane, in scene units.",                   \
       .by_default = "the middle of the bounds of all the data, at each drawn step")                                    \
     X(CYAML_FIELD_FLOAT_PTR("offset", OPTIONAL, scene_file_plane, offset),                                             \
@@ -141,7 +140,8 @@ DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
     X(CYAML_FIELD_MAPPING_PTR("sphere", OPTIONAL, scene_file_clip, sphere, sphere_fields),                             \
       .help = "What lies outside of the sphere is cut away.", .by_default = "none", .child = &sphere_mapping)          \
     X(CHOICE("keep", scene_file_clip, keep, keep_words),                                                               \
-      .help = "What of the box and of the sphere is kept; `outside`: what lies inside of either is cut away.",         \
+      .help = "The side of the box and of the sphere that is kept. With `outside`, all that lies inside of either is " \
+              "cut away.",                                                                                             \
       .by_default = "`inside`")
 EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
 
@@ -198,8 +198,8 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help = "How the surfaces take light.", .by_default = "a slight gloss", .child = &material_mapping)              \
     X(CHOICE("normals", scene_file_isosurface, normals, normal_words),                                                 \
       .help =                                                                                                          \
-          "What light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, or "          \
-          "smooth: gradients at each `vertex`, over its cells on all ranks, interpolated within cells; or central "    \
+          "The normals that light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, " \
+          "or smooth: gradients at each `vertex`, over its cells on all ranks, interpolated within cells; or central " \
           "`differences` about the hit, in the cells of all ranks, slower.",                                           \
       .by_default = "`gradient`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \

@@ -16,9 +16,9 @@ static const cyaml_strval_t projection_words[] = {{"perspective", SCENE_PERSPECT
     X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
       .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
     X(CHOICE("fit", scene_file_automatic, fit, fit_words),                                                             \
-      .help = "What fits into the image: the `box` of the data's bounds, which then fills 0.95 of the frame's width "  \
-              "or height, less the room of a title, colour bars and rulers, or the `sphere` around it, which looks "   \
-              "the same size from every side.",                                                                        \
+      .help = "The body that fits into the image: the `box` of the data's bounds, which then fills 0.95 of the "       \
+              "frame's width or height, less the room of a title, colour bars and rulers, or the `sphere` around it, " \
+              "which looks the same size from every side.",                                                            \
       .by_default = "`sphere`")                                                                                        \
     X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom), .help = "1 fits; larger is nearer.",        \
       .by_default = "`1`", .low = 1e-4, .high = 1000)
@@ -26,12 +26,13 @@ DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
 
 #define ORBIT_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_INT("views", REQUIRED, scene_file_orbit, views),                                                     \
-      .help = "How many views a circle has, evenly spaced. An image makes a picture for each view of each circle, "    \
-              "and all images together at most 1024 a step.",                                                          \
+      .help =                                                                                                          \
+          "The number of views of a circle, evenly spaced. An image makes a picture for each view of each circle, "    \
+          "and all images together at most 1024 a step.",                                                              \
       .low = 1, .high = SCENE_MAX_PICTURES)                                                                            \
     X(NUMBERS("axis", scene_file_orbit, axis, 3),                                                                      \
-      .help = "What the eye goes around, counterclockwise seen from its tip, through the middle of the data; up in "   \
-              "the image. Any length but 0.",                                                                          \
+      .help = "The axis that the eye goes around, counterclockwise seen from its tip, through the middle of the "      \
+              "data; up in the image. Any length but 0.",                                                              \
       .by_default = "`[0, 1, 0]`")                                                                                     \
     X(CYAML_FIELD_IGNORE("elevation", OPTIONAL),                                                                       \
       .help = "How far the eye is above the plane across the axis, in degrees (theta); a list makes as many circles.", \
@@ -52,7 +53,8 @@ DEFINE_MAPPING(orbit, "orbit", ORBIT_KEYS);
       .help = "Where the eye is, in scene units.", .low = -1e30, .high = 1e30)                                         \
     X(CYAML_FIELD_SEQUENCE_FIXED("focal", CYAML_FLAG_POINTER, scene_file_point, focal, &number, 3),                    \
       .help = "The point looked at. Not where the eye is.", .low = -1e30, .high = 1e30)                                \
-    X(NUMBERS("up", scene_file_point, up, 3), .help = "What is up in the image. Not parallel to the view.",            \
+    X(NUMBERS("up", scene_file_point, up, 3),                                                                          \
+      .help = "The direction that is up in the image, not parallel to the view.",                                      \
       .by_default = "the camera's `up`, or `[0, 1, 0]`", .low = -1e30, .high = 1e30)                                   \
     X(CYAML_FIELD_FLOAT_PTR("angle", OPTIONAL, scene_file_point, angle),                                               \
       .help = "Whole vertical angle of view, in degrees.", .by_default = "the camera's", .low = 1e-6, .high = 180,     \
@@ -70,7 +72,8 @@ static const cyaml_schema_value_t point = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CYAML_FIELD_MAPPING_PTR("automatic", OPTIONAL, scene_file_camera, automatic, automatic_fields),                  \
       .help = "Place the eye by the bounds of all the data of all ranks, at each drawn step.",                         \
       .by_default = "where no `position` is given", .child = &automatic_mapping)                                       \
-    X(NUMBERS("up", scene_file_camera, up, 3), .help = "What is up in the image. Not parallel to the view.",           \
+    X(NUMBERS("up", scene_file_camera, up, 3),                                                                         \
+      .help = "The direction that is up in the image, not parallel to the view.",                                      \
       .by_default = "`[0, 1, 0]`; `[0, 0, 1]` where the view is along y")                                              \
     X(CYAML_FIELD_FLOAT_PTR("angle", OPTIONAL, scene_file_camera, angle),                                              \
       .help = "Whole vertical angle of view, in degrees.", .by_default = "`40`", .low = 1e-6, .high = 180,             \
@@ -84,7 +87,7 @@ static const cyaml_schema_value_t point = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .is_low_excluded = true, .high = 1e30)                                                                           \
     X(CYAML_FIELD_MAPPING_PTR("orbit", OPTIONAL, scene_file_camera, orbit, orbit_fields),                              \
       .help = "Draw the image from several places on circles around the data, at each drawn step: a picture each. "    \
-              "What fits, and the `zoom`, are those of `automatic`.",                                                  \
+              "`fit` and `zoom` are those of `automatic`.",                                                            \
       .by_default = "none", .child = &orbit_mapping)                                                                   \
     X(CYAML_FIELD_SEQUENCE("path", POINTER, scene_file_camera, path, &point, 1, 256),                                  \
       .help = "Places that the camera goes through as the run goes on. Between two of them each coordinate and the "   \
