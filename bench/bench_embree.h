@@ -26,7 +26,7 @@ typedef struct bench_embree_ray {
     float origin[3], direction[3], far;
 } bench_embree_ray;
 
-/* Which of the rays meet a triangle, by packets of 16 in the order given. */
+/* Finds which of the rays meet a triangle, by packets of 16 in the order given. */
 void bench_embree_occlude(bench_embree *embree, const bench_embree_ray *rays, int64_t count, bool *blocked);
 
 typedef enum bench_embree_builder {

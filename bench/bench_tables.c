@@ -16,7 +16,7 @@ enum { VOLUME_WIDTH = 640, VOLUME_HEIGHT = 360, GROUPS = 6, STEPS = 6 };
 
 static const int groups[GROUPS] = {1, 4, 8, 16, 24, 32};
 
-/* In sides of a cube: as in table 4.3, from a quarter to one and a half of the step of other tables. */
+/* Steps in sides of a cube. As in table 4.3, they go from a quarter to one and a half of the step of other tables. */
 static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 
 static const struct {

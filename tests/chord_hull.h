@@ -40,11 +40,11 @@ typedef struct chord_ray {
 chord_ray chord_hull_ray(const render_job *job, const chord_rays *rays, int i);
 
 bool chord_is_slanted(const chord_ray *r);
-/* Does it run within the hull's surface? */
+/* Tells whether the chord runs within the hull's surface. */
 bool chord_is_touching(const chord_ray *r);
 /* Tells whether anything between depths low and high is in the shrunk hull, deeper along the ray than rounding. */
 bool chord_is_within(const chord_ray *r, double low, double high);
-/* Is it beyond the swollen one? */
+/* Tells whether the chord is beyond the swollen hull. */
 bool chord_is_beyond(const chord_ray *r, double depth);
 
 #endif

@@ -65,7 +65,7 @@ static long double cross(const double *a, const double *b)
     return (long double)a[0] * (long double)b[1] - (long double)a[1] * (long double)b[0];
 }
 
-/* Does the positive u axis cross the edge? */
+/* Tells whether the positive u axis crosses the edge. */
 static bool axis_crosses(const double *a, const double *b)
 {
     if ((a[1] >= 0) == (b[1] >= 0)) return false;
@@ -120,7 +120,7 @@ static double solve_u(const double *a, const double *b, const double *c, const d
     return below != 0 ? -(a[axis] + w * c[axis]) / below : 0.5;
 }
 
-/* How far a + u b + w c + u w d is from 0, relative to the quad's size. */
+/* Returns how far a + u b + w c + u w d is from 0, relative to the quad's size. */
 static double bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u, double w)
 {
     double residual = 0, size = 0;

@@ -52,7 +52,7 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
 /* Take a polyhedron apart: cell has its vertices (each once) and faces. */
 void reference_polyhedron_setup(reference_cell *cell);
 
-/* How near, in lengths, the point is to a sheet between two of the polyhedron's tets. */
+/* Returns the distance of the point from the nearest sheet between two of the polyhedron's tets. */
 double reference_sheet_distance(const reference_cell *cell, const double point[3]);
 
 /* A polyhedron's field at depth z between two crossings: the sum over the tets that hold the point. From a crossing to

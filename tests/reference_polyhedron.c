@@ -83,7 +83,8 @@ static void add_triangles(reference_cell *cell)
     }
 }
 
-/* Is the point inside the surface of the pieces other than the one given? By a ray in no direction in particular. */
+/* Tells whether the point is inside the surface of the pieces other than the one given, by a ray in an arbitrary
+ * direction. */
 static bool is_inside_others(const reference_cell *cell, const int *piece, int mine, const double *point)
 {
     static const double direction[3] = {0.5377, 0.1834, -0.7621};

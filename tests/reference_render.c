@@ -286,7 +286,7 @@ static double first_root(trace *t, const placed_cell *c, const double *values, d
     return bisect(t, c, values, iso, breaks[k - 1], breaks[k], side_in);
 }
 
-/* Does the inside at an end contradict the face? */
+/* Tells whether the inside at an end contradicts the face. */
 static bool is_contradicted(trace *t, const placed_cell *c, const double *values, double iso, const bool side[2])
 {
     double inside[2];
@@ -510,7 +510,7 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, pl
     c->size = longest > 0 ? cbrt(volume) : 1;
 }
 
-/* Does the ray pass the sheared box of the cell, widened by a little? */
+/* Tells whether the ray passes the sheared box of the cell, widened by a little. */
 static bool is_near(const trace *t, int part, int64_t index)
 {
     const grid *g = t->scene->job->parts[part].cells;

@@ -79,8 +79,8 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
     if (kind == MESH_BESIDE) test_mesh_to_polyhedra(out, 0.5);
 }
 
-/* As a share of a cube's side. Cells are sound up to here; at 0.3 quads pass through the faces beside them, and cells
- * really overlap (docs/hard-cases.md). */
+/* The jitter, as a share of a cube's side. Cells are sound up to here; at 0.3 quads pass through the faces beside them,
+ * and cells really overlap (docs/hard-cases.md). */
 static const double jitter_wanted = 0.2;
 
 /* ---- a ray ---- */
@@ -144,7 +144,7 @@ static double depth_of(const render_job *job, float t)
     return (double)t / job->space.scale + job->space.depth_origin;
 }
 
-/* Are ends alone only where they may be? */
+/* Tells whether ends are alone only where they may be. */
 static bool is_paired(const render_job *job, const chord_ray *r, const chord_span *spans, int count)
 {
     float lone[2 * CHORD_MAX_SPANS];

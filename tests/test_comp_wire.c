@@ -72,7 +72,7 @@ static void fill_sheet(comp_sheet *sheet)
     }
 }
 
-/* What pixels of the first so many words differ? */
+/* Counts the words of pixels that differ, among the first `words` of each; differing masks count as one. */
 static int count_differences(const comp_sheet *a, const comp_sheet *b, int words)
 {
     int count = memcmp(a->masks, b->masks, sizeof a->masks) != 0;
@@ -214,8 +214,8 @@ static void sheets_are_merged_alike(void **context)
     (void)context;
     static const float background[4] = {0.1f, 0.2f, 0.3f, 0.75f};
     static comp_sheet first, other, expected, joined, pixels, plain_pixels;
-    static float stored[5 * WIDE * HIGH] __attribute__((aligned(64))), plain_stored[5 * WIDE * HIGH]
-        __attribute__((aligned(64)));
+    static float stored[5 * WIDE * HIGH] __attribute__((aligned(64))),
+        plain_stored[5 * WIDE * HIGH] __attribute__((aligned(64)));
     const comp_sheet_loops *const plain = comp_sheet_loops_of(CPU_PLAIN);
     for (int trial = 0; trial < 300; trial++) {
         uint16_t plain_left[COMP_ROWS], left[COMP_ROWS];

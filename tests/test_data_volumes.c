@@ -320,7 +320,8 @@ static void truth_of(subject *s, int pixel, bool of_folded, double rgba[4])
     reference_integral_free(scene);
 }
 
-/* Does the ray meet a folded cell, or a face whose patch is folded there? A fog throughout shows the folded cells. */
+/* Tells whether the ray meets a folded cell, or a face whose patch is folded there. A fog throughout shows the folded
+ * cells. */
 static bool has_no_truth(subject *s, int pixel)
 {
     double rgba[4];
@@ -399,8 +400,9 @@ static int choose_pixels(const data_set *set, const picture *pictures, int pixel
 
 /* ---- the test ------------------------------------------------------------------------------------------------ */
 
-/* How many of the pixels may have no truth. Only the crushed can has folded cells, which at most a seventh of all its
- * pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be such. */
+/* Returns how many of the pixels may have no truth. Only the crushed can has folded cells, which at most a seventh of
+ * all its pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be
+ * such. */
 static int most_left_out(const data_set *set, int count)
 {
     if (strcmp(set->file, "can_2") != 0) return 0;

@@ -72,7 +72,7 @@ static void ticks_stand_where_their_numbers_are(void **state)
 
 /* ---- the box ------------------------------------------------------------------------------------------------- */
 
-/* How far a point is from the ray through a place of the picture (continuous pixels), as the renderer has rays. */
+/* Returns how far a point is from the renderer's ray through a place of the picture (continuous pixels). */
 static double off_ray(const render_camera *c, const double pixel[2], const double point[3])
 {
     double base[3], direction[3], right[3], down[3], unused[3], along = 0, length = 0, square = 0;

@@ -350,7 +350,7 @@ static split_edge *find_split(split_edges *edges, test_mesh *mesh, int64_t a, in
     return e;
 }
 
-/* Is the edge's middle a vertex of the face? Both of its cells have it so. */
+/* Tells whether the edge's middle is a vertex of the face. It is in both of the face's cells. */
 static bool face_has_middle(int64_t face, int64_t low)
 {
     return test_uniform((uint64_t)(face * 1000 + low), 4) < 0.5;

@@ -1,4 +1,4 @@
-/* How much a test does: its usual part, which meets each kind of case, or the whole, by ./test --long. CMake's
+/* A test runs its usual part, which meets each kind of case, or the whole, by ./test --long. CMake's
  * insitu_add_split_test() registers both. */
 #ifndef TEST_EFFORT_H
 #define TEST_EFFORT_H

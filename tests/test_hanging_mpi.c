@@ -207,8 +207,8 @@ static void hanging_nodes_are_no_overlaps(void **state)
 
 /* ---- surfaces ------------------------------------------------------------------------------------------------ */
 
-/* How far the ray of a pixel must go to the plane on which test_linear() has the value; and is it there well within the
- * mesh? All shapes hold the ball of radius 0.5. */
+/* Finds how far the ray of a pixel must go to the plane on which test_linear() has the value. Returns whether that
+ * place is well within the mesh: all shapes hold the ball of radius 0.5. */
 static bool meets_plane(const render_camera *camera, int p, double value, double *depth)
 {
     double base[3], direction[3], end[3], distance = 0;

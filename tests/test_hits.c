@@ -37,10 +37,10 @@ static double residual_allowed(const render_fixture *f, double slope)
     return 1e-6 + (3e-8 + 3e-8) / f->job.space.scale * fabs(slope);
 }
 
-/* How far float32 may move a hit along its ray, in cells. Along the ray, t and the cell's vertices are each off by half
- * a unit of 1 in scaled units, 3e-8. Across it a vertex is off by 3e-8 along both axes, 4.2e-8 together, which the
- * slant of ray and surface turns into depth. The field is off by half a unit of its values and as much in their sum,
- * 6e-8 of their range, which the slope turns into depth. */
+/* Returns how far float32 may move a hit along its ray, in cells. Along the ray, t and the cell's vertices are each off
+ * by half a unit of 1 in scaled units, 3e-8. Across it a vertex is off by 3e-8 along both axes, 4.2e-8 together, which
+ * the slant of ray and surface turns into depth. The field is off by half a unit of its values and as much in their
+ * sum, 6e-8 of their range, which the slope turns into depth. */
 static double depth_moved(const render_fixture *f, const reference_hit *truth, double slope)
 {
     const double scaled_cell = f->cell_size * f->job.space.scale;

@@ -133,7 +133,7 @@ typedef struct outcome {
     char message[256];
 } outcome;
 
-/* How memory is made short: by the heap from a number on, or by a limit of the process's addresses. */
+/* Memory is made short by the heap from a number on, or by a limit of the process's addresses. */
 typedef struct shortage {
     int64_t n;
     rlim_t spare;

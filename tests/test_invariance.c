@@ -267,7 +267,7 @@ static void draw(insitu_session *session, const input *in, int cycle)
     everywhere(status == INSITU_OK);
 }
 
-/* What all pictures of an image have shown. */
+/* Sums of what all pictures of an image have shown. */
 typedef struct tally {
     int pictures, same, depths; /* depths: of pixels that differ */
     double worst;

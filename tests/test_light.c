@@ -106,7 +106,7 @@ static double size_of(const test_mesh *mesh, int64_t cell)
     return cbrt((high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
 }
 
-/* What brute force says of the ray: 1 where something is met in front, 0, or -1 where rounding may decide. Roots of the
+/* Tells by brute force whether the ray meets something in front: 1, 0, or -1 where rounding may decide. Roots of the
  * hit's own surface lie behind the start by the lift less what hits are off by. */
 static int look(const render_fixture *f, const test_mesh *mesh, const double start[3], const double d[3], double reach)
 {

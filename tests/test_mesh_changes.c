@@ -1,4 +1,4 @@
-/* The same mesh otherwise: rounded, mirrored, renumbered, turned, moved. */
+/* Changes meshes: rounds, mirrors, renumbers, turns and moves them. */
 #include "test_mesh_make.h"
 
 #include <stdlib.h>

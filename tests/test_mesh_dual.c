@@ -67,7 +67,7 @@ static void triangle_normal(const hull *h, const int *t, double out[3])
     normalize(out);
 }
 
-/* Is all of the hull behind the triangle? */
+/* Tells whether all of the hull is behind the triangle. */
 static bool is_outside(const hull *h, const int *t, const double *normal)
 {
     for (int i = 0; i < h->point_count; i++)
@@ -252,7 +252,7 @@ static bool tet_has(const int64_t *tet, int64_t point)
     return tet[0] == point || tet[1] == point || tet[2] == point || tet[3] == point;
 }
 
-/* Have the tets a common triangle? */
+/* Tells whether the tets have a common triangle. */
 static bool are_beside(const int64_t *one, const int64_t *other)
 {
     int common = 0;

@@ -113,7 +113,7 @@ static void group_toggle(tet_group *g, int64_t face)
     g->faces[g->face_count++] = face;
 }
 
-/* Has every edge of the surface two faces? */
+/* Tells whether every edge of the surface has two faces. */
 static bool group_is_closed(const tet_group *g, const face_table *t)
 {
     for (int i = 0; i < g->face_count; i++)

@@ -143,7 +143,7 @@ static inline double test_worse(double worst, double off)
 
 /* A uniform number in [0, 1) of an index and a seed. */
 double test_uniform(uint64_t index, uint64_t seed);
-/* The same in [low, high). */
+/* As above, in [low, high). */
 double test_uniform_in(uint64_t index, uint64_t seed, double low, double high);
 
 #endif

@@ -83,7 +83,8 @@ static void box_beyond_the_grid_is_refused(void **state)
     }
 }
 
-/* The same nodes, leaf for leaf, with the same ranges to the bit, in a box that holds the other's. */
+/* Both layouts have the same nodes, leaf for leaf, with the same ranges to the bit, and each compact box holds the
+ * other layout's. */
 static void layouts_hold_one_tree(void **state)
 {
     (void)state;

@@ -107,7 +107,7 @@ typedef struct staged {
     render_volume_layer volumes[2];
 } staged;
 
-/* Of surfaces alone, whose normals are by differences. */
+/* Whether scenes of surfaces alone have normals by differences. */
 static bool is_by_differences;
 
 static void stage(staged *s, const test_mesh *mesh, const drawing *d)
@@ -152,7 +152,8 @@ static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool
     *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL, false};
     stage(&s, mesh, d);
     s.f.job.is_alone = is_alone;
-    const session_frame_target target = {comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, d->fragment_limit};
+    const session_frame_target target = {
+        comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, d->fragment_limit};
     if (session_draw_frame(&target, &s.f.job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);
     fixture_free(&s.f);
     return frame.overlaps;
@@ -207,7 +208,7 @@ static bool same_images(const image *whole, const image *other, const drawing *d
     return !depths && colour <= bound;
 }
 
-/* May rounding turn one of the ray's decisions, or has its root finder more than one answer? */
+/* Tells whether rounding may turn one of the ray's decisions, or its root finder has more than one answer. */
 static bool is_doubtful(const reference_ray *ray)
 {
     const double margin = fixture_usual_bounds.margin;

@@ -494,7 +494,7 @@ static void concave_polyhedra_miss_no_crossing(void **state)
     assert_none_missed("concave cells", &t);
 }
 
-/* Does the field pass the value on the ray? */
+/* Tells whether the field passes the value on the ray. */
 static bool passes(const subject *s, const reference_line *line, double value)
 {
     static span spans[REFERENCE_MAX_TRIANGLES];

@@ -232,11 +232,10 @@ void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *
             fail_msg("render_frame: %s", error.message);
     }
     index_pixels(out, pixels);
-    out->picture =
-        (image){.width = width,
-                .height = height,
-                .rgba = malloc((size_t)pixels * 4 * sizeof(float)),
-                .depth = malloc((size_t)pixels * sizeof(float))};
+    out->picture = (image){.width = width,
+                           .height = height,
+                           .rgba = malloc((size_t)pixels * 4 * sizeof(float)),
+                           .depth = malloc((size_t)pixels * sizeof(float))};
     for (int64_t p = 0; p < pixels; p++)
         comp_merge_pixel(out->list.items + out->first[p], out->first[p + 1] - out->first[p], fixture_background,
                          out->picture.rgba + 4 * p, out->picture.depth + p);
@@ -315,7 +314,8 @@ static int surface_fragments(const drawn_frame *drawn, int64_t pixel, const frag
     return count;
 }
 
-/* Is the root finder still on its way? Bent fields and jumps at warped faces are slow for regula falsi. */
+/* Tells whether the root finder is still on its way. Bent fields and jumps at warped faces are slow for regula falsi.
+ */
 static bool is_slow(const comparison *c, const reference_ray *ray)
 {
     for (int i = 0; i < ray->hit_count; i++)

@@ -93,7 +93,7 @@ void drawn_assert_same(const drawn_frame *a, const drawn_frame *b);
 /* The largest difference of a channel. */
 double drawn_difference(const drawn_frame *a, const drawn_frame *b);
 
-/* How far the kernels may be from the reference. */
+/* Bounds of how far the kernels may be from the reference. */
 typedef struct fixture_bounds {
     double depth;    /* in cells; 5e-7 × conditioning where that is more */
     double colour;   /* of a channel over the background */

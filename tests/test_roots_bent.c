@@ -125,7 +125,7 @@ static double course_pass(course *c, const knot *from, const knot *to, double v)
     return high;
 }
 
-/* Is a crossing certain, and until where must a hit have come? */
+/* Tells whether a crossing is certain, and until where a hit must have come. */
 static bool course_certain(course *c, double band, double *t)
 {
     int side = 0;

@@ -1,4 +1,4 @@
-/* How a scene gives values colours: tables from lists and files, changes to them, and errors. */
+/* Colours of values in a scene: tables from lists and files, changes to them, and errors. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -25,11 +25,11 @@ static double share_of(int field, uint64_t vertex, uint64_t seed)
     return field == 2 ? test_uniform_in(0, 100 * seed + 5, 0.1, 0.9) : share;
 }
 
-/* How much light changes if a value is off by 4e-7 of the domain, as float32 leaves those of polyhedra. Opacity a is
- * off by that times its slope, extinction, -log(1 - a), by no more than 1 / (1 - a) of that. For light, let extinction
- * k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by int dk (c T - int_s c k T)
- * ds, whose bracket is T at most, for colours c in [0, 1]. So light is off by at most int dk T ds, which is no more
- * than dk times the length, and no more than the largest dk / k, as int k T ds <= 1. */
+/* Bounds how much light changes if a value is off by 4e-7 of the domain, as float32 leaves those of polyhedra. Opacity
+ * a is off by that times its slope, extinction, -log(1 - a), by no more than 1 / (1 - a) of that. For light, let
+ * extinction k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by int dk (c T -
+ * int_s c k T) ds, whose bracket is T at most, for colours c in [0, 1]. So light is off by at most int dk T ds, which
+ * is no more than dk times the length, and no more than the largest dk / k, as int k T ds <= 1. */
 static double rounding_of(const step_function *function, double width, double unit)
 {
     const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);

@@ -128,8 +128,8 @@ static void a_cubic_that_dips_below_a_step(void **state)
     test_mesh_free(&mesh);
 }
 
-/* How far beyond 0.6 the hex comes on the ray of a picture of one pixel, the eye moved sideways and up; NaN: its most
- * is at an end. */
+/* Returns how far beyond 0.6 the hex comes on the ray of a picture of one pixel, with the eye moved sideways and up.
+ * NaN: its most is at an end. */
 static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
 {
     static double values[SAMPLES];

@@ -157,7 +157,7 @@ static void free_drawing(drawing *d)
     for (int i = 0; i < PICTURES; i++) free(d->pictures[i].rgba), free(d->pictures[i].depth);
 }
 
-/* Is any cell another one in this order? */
+/* Tells whether any cell is another one in this order. */
 static bool has_turned(const test_mesh *part, insitu_vertex_order order)
 {
     bool turned = false;

@@ -1,4 +1,4 @@
-/* How often all ranks wait for each other in a step: MPI's collective calls, counted where the library makes them. */
+/* Counts how often all ranks wait for each other in a step: MPI's collective calls, where the library makes them. */
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -251,7 +251,7 @@ static double opacity_by_value(const render_transfer *t, double value)
     return (double)t->opacities[i] + share * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
 }
 
-/* How much the ramps, whose points are even along the scale, are off between low and 1e6. */
+/* Returns how much the ramps, whose points are even along the scale, are off between low and 1e6. */
 static double ramps_are_off(scene_scale scale, double low, const scene_volume *volume)
 {
     float colours[6] = {0};

@@ -65,7 +65,7 @@ static bool is_in_order(const insitu_deep_sample *samples, int64_t count)
     return true;
 }
 
-/* How far the flat pixel is from what the samples make over the background. */
+/* Returns how far the flat pixel is from what the samples make over the background. */
 static double distance(const insitu_deep_sample *samples, int64_t count, const double behind[4], const float *flat)
 {
     double rgba[4] = {0, 0, 0, 0}, worst = 0;
@@ -73,8 +73,7 @@ static double distance(const insitu_deep_sample *samples, int64_t count, const d
         const double through = 1 - rgba[3];
         for (int c = 0; c < 4; c++) rgba[c] += through * (double)samples[i].rgba[c];
     }
-    for (int c = 0; c < 4; c++)
-        worst = test_worse(worst, fabs(rgba[c] + (1 - rgba[3]) * behind[c] - (double)flat[c]));
+    for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs(rgba[c] + (1 - rgba[3]) * behind[c] - (double)flat[c]));
     return worst;
 }
 

@@ -32,7 +32,7 @@ static void arm_traps(void)
     feenableexcept(TRAPS);
 }
 
-/* How many threads of a team have the traps, and the flag of a division by zero; all are disarmed. */
+/* Counts the threads of a team that have the traps, and those with the flag of a division by zero, and disarms all. */
 static void count_armed(int threads, int *armed, int *flagged)
 {
     int traps = 0, flags = 0;

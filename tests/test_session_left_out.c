@@ -49,7 +49,7 @@ static void draw(insitu_session *session, const session_input *in, int cycle, ca
     caught_count = 0;
 }
 
-/* Do all channels differ by the bound at most, and does the picture show something? */
+/* Tells whether all channels differ by the bound at most, and the picture shows something. */
 static bool are_same(const caught_picture *a, const caught_picture *b, double bound)
 {
     int shown = 0;

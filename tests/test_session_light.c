@@ -38,7 +38,7 @@ static void camera_ray(int pixel, double base[3], double direction[3])
     render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
 }
 
-/* Where the pixel's ray is at the depth. */
+/* Finds where the pixel's ray is at the depth. */
 static void place_at(int pixel, double depth, double out[3])
 {
     double base[3], direction[3];
@@ -189,7 +189,7 @@ static double above(int plane, const double place[3])
     return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - planes[plane].distance;
 }
 
-/* Whether something is met within the radius: 1, 0, or -1 where rounding decides. */
+/* Tells whether something is met within the radius: 1, 0, or -1 where rounding decides. */
 static int corner_blocks(const double from[3], const double d[3])
 {
     for (int i = 0; i < 2; i++) {
@@ -260,13 +260,14 @@ static void corners_are_as_dark_as_disk_segments(void **context)
                 double at[3];
                 if (!isfinite(drawn.depth[p])) continue;
                 place_at(p, (double)drawn.depth[p], at);
-                /* From the plane that it is not on. */
+                /* The angle is taken from the plane that the place is not on. */
                 const double ratio = fmax(fabs(above(0, at)), fabs(above(1, at))) / radius;
                 expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
                 count++;
             }
-            /* Of a pixel the share is off by no more than that of 16 independent rays, 1/8; their mean by a root of
-             * their number less, five times; at the cube's ends the planes end, of a tenth of the pixels at most. */
+            /* A pixel's share is off by no more than that of 16 independent rays, 1/8. The mean over the pixels is off
+             * by a root of their number less, five times that at most. At the cube's ends the planes end, in a tenth of
+             * the pixels at most. */
             const double off = fabs(s.sum - expected) / count;
             is_right =
                 s.wrong == 0 && s.pixels > 200 && s.unsure < s.pixels / 10 && off < 5 * 0.125 / sqrt(count) + 0.02;

@@ -29,7 +29,7 @@ static __attribute__((noinline)) void paint_stack(volatile unsigned char **top)
     for (int i = NEAR; i < PAINTED; i++) here[-i] = PAINT;
 }
 
-/* How far below top the paint is gone. */
+/* Returns how far below top the paint is gone. */
 static __attribute__((noinline)) int taken_stack(volatile unsigned char *top)
 {
     int taken = PAINTED - 1;

@@ -20,7 +20,7 @@ void step_begin(render_fixture *f, const test_mesh *mesh, fixture_camera camera,
 
 /* The truth of every so many pixels, the others' left as they are: side * side * 4. tolerance: the integral's. */
 double *step_truth(const render_fixture *f, int every, double tolerance);
-/* How far a picture is from it at most, drawn by every instruction set. */
+/* Returns how far a picture is from it at most, drawn by every instruction set. */
 double step_worst_of_sets(const render_fixture *f, const double *truth, int every);
 
 /* The worst of each error asked for, 1e-2 to 1e-4, and of every instruction set. */

@@ -166,7 +166,7 @@ std::vector<size_t> cuts_of(size_t size, int random_count)
     return cuts;
 }
 
-/* How many cuts of one file of the sample are taken for something else. */
+/* Counts the cuts of one file of the sample that are taken for something else. */
 int count_wrong_cuts(const sample &s, const std::string &file)
 {
     int wrong = 0;

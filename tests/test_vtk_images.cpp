@@ -134,7 +134,7 @@ std::string file_of(const std::string &folder, const std::string &image, size_t 
     return folder + "/" + image + "_" + std::to_string(step) + ".exr";
 }
 
-/* How many pixels differ by more than the tolerance, in any channel. */
+/* Counts the pixels that differ by more than the tolerance in any channel. */
 int differing(const picture &a, const picture &b)
 {
     int count = 0;

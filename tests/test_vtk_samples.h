@@ -16,7 +16,7 @@ enum class lattice { image, rectilinear, curved };
 /* A grid with the point field "x", and the cell field "c", which counts cells. */
 vtkSmartPointer<vtkDataSet> structured(lattice kind);
 
-/* The same as a list of hexahedra, made from the lattice's indices alone. */
+/* As above, but a list of hexahedra made from the lattice's indices alone. */
 vtkSmartPointer<vtkUnstructuredGrid> hexes(lattice kind);
 
 /* A row of unit cubes along x from `first` on, every second a polyhedron if is_mixed, else all hexahedra. */
