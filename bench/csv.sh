@@ -11,7 +11,7 @@ csv_load() {
     cut -d' ' -f1 /proc/loadavg
 }
 
-# What else ran shows: more load than threads means that speeds are too low.
+# The load tells whether other programs ran: if it is more than the threads, the measured speeds are too low.
 csv_loads() {
     echo "# load average $1 at the start and $(csv_load) at the end"
 }

@@ -1,5 +1,5 @@
-# What a user gets: headers, libraries, insitu::insitu and insitu::vtk for find_package(), insitu.pc for the rest. All of
-# it may be moved after installation: no file names the prefix. A component is what a Debian package holds (package.cmake).
+# Installs headers, libraries, insitu::insitu and insitu::vtk for find_package(), and insitu.pc for others. All of it may
+# be moved after installation: no file names the prefix. A component is what a Debian package holds (package.cmake).
 include(CMakePackageConfigHelpers)
 set(insitu_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/insitu)
 
@@ -56,6 +56,6 @@ install(FILES ${PROJECT_BINARY_DIR}/insitu.pc DESTINATION ${insitu_pc_dir} COMPO
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/NOTICE DESTINATION ${CMAKE_INSTALL_DOCDIR}
   COMPONENT library)
 
-# What the last installation of this build has put somewhere is taken away again.
+# Takes away the files that the last installation of this build has put somewhere.
 add_custom_target(uninstall COMMAND ${CMAKE_COMMAND} -DMANIFEST=${PROJECT_BINARY_DIR}/install_manifest.txt
   -P ${CMAKE_CURRENT_LIST_DIR}/uninstall.cmake)

@@ -1,4 +1,4 @@
-# What ./demo, ./test and bench/run share; sourced from the root of the tree. Each step looks first whether it has been done,
+# Functions that ./demo, ./test and bench/run share; sourced from the root of the tree. Each step looks first whether it has been done,
 # so that a second run goes straight to the work.
 
 setup_fail() {

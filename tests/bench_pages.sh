@@ -64,7 +64,7 @@ shows '| ≥ 2 | **1.50** (1.00 / 0.667) |' # of a measure in two files the firs
 shows '1 of 1 bars are missed'
 shows 'SAH build, on tets 31: 1.50, asked ≥ 2'
 
-# Of several files the newest counts, those without a date last.
+# If there are several files the newest counts; files without a date count as the oldest.
 sed 's/^# A machine/&\n# measured 2020-02-01T10:00Z/' "$folder/held.csv" >"$folder/newer.csv"
 sed 's/^# A machine/&\n# measured 2020-01-31T23:00Z/' "$folder/missed.csv" >"$folder/older.csv"
 $performance --partial "$folder/older.csv" "$folder/newer.csv" >"$folder/page"

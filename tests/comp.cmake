@@ -22,7 +22,7 @@ target_link_libraries(test_comp_mpi
   PRIVATE insitu_compositing ${INSITU_SHEETS} insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)
 insitu_add_mpi_test(comp_mpi test_comp_mpi 1 2 3 5 7 16 TIMEOUT 300)
 
-# The same with threads that share the merging.
+# As above, with threads that share the merging.
 add_test(NAME comp_mpi_4_threads
   COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 2 $<TARGET_FILE:test_comp_mpi>)
 set_tests_properties(comp_mpi_4_threads PROPERTIES

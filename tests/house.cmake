@@ -1,4 +1,4 @@
-# What holds for the house as a whole, and that these tests can fail.
+# Rules for the whole tree, and tests that these tests can fail.
 add_test(NAME house_arrows_go_down COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_includes.sh ${PROJECT_SOURCE_DIR})
 list(TRANSFORM MPI_C_INCLUDE_DIRS PREPEND -I OUTPUT_VARIABLE house_mpi)
 add_test(NAME house_headers_compile_alone

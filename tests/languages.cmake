@@ -62,7 +62,7 @@ else()
     ${PROJECT_SOURCE_DIR}/examples/six_calls.py)
   insitu_add_same_pictures_test(discontinuous_example_draws_on_2_ranks ${INSITU_TEST_PYTHON}
     ${PROJECT_SOURCE_DIR}/examples/discontinuous.py)
-  # What is said of changes saves work, and changes no picture: the program that says nothing draws the same.
+  # Telling what has changed saves work and changes no picture: the program that tells nothing draws the same.
   set(moving_mesh ${PROJECT_SOURCE_DIR}/examples/moving_mesh.py)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${moving_mesh})
   file(READ ${moving_mesh} text)

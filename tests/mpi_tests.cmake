@@ -1,5 +1,5 @@
-# How tests start MPI programs: more ranks than cores, which yield as they wait; as root in a container too; one thread a
-# rank.
+# Tests start MPI programs with more ranks than cores, which yield as they wait, with one thread a rank, and in a
+# container as root too.
 set(INSITU_TEST_ENVIRONMENT
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMP_NUM_THREADS=1
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none

@@ -11,7 +11,7 @@ add_test(NAME outside_project_builds_and_runs
 set_tests_properties(outside_project_builds_and_runs PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};ASAN_OPTIONS=detect_leaks=0" TIMEOUT 180)
 
-# What is exported is what the headers declare.
+# The library exports the functions that the headers declare, and nothing else.
 set(insitu_headers_of ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu)
 add_test(NAME exported_symbols COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu> libinsitu.so.0
   ${insitu_headers_of}/insitu.h ${insitu_headers_of}/status.h)

@@ -72,7 +72,7 @@ separate_arguments(flags UNIX_COMMAND "${flags}")
 run(${MPICC} ${SOURCE}/outside_user.c -o ${FOLDER}/static_by_pkg_config ${flags})
 run(${FOLDER}/static_by_pkg_config)
 
-# What is installed can be taken away.
+# An installation can be taken away.
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${FOLDER}/again)
 run(${CMAKE_COMMAND} -DMANIFEST=${BUILD}/install_manifest.txt -P ${SOURCE}/../../cmake/uninstall.cmake)
 if(EXISTS ${FOLDER}/again)

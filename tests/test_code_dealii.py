@@ -80,7 +80,7 @@ for cycle in range(0, 41, 10):
     differing = (abs(heat[0] - heat[1]).max(axis=2) > 8).mean()
     assert differing < 0.01, f"cycle {cycle}: {100 * differing:.1f} % of the pixels of the mesh differ"
 
-# Of Q2 the corners are right to the error told; between them a trilinear cell misses h^2 / 8 of each second derivative.
+# With Q2 the corners are right to the error told; between them a trilinear cell misses h^2 / 8 of each second derivative.
 place, errors = run("q2", 2, 2)
 for cycle in range(0, 41, 10):
     check_sphere(place, cycle, errors[cycle] + 3 * FINEST**2 / 8 * SHARPEST)

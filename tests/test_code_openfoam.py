@@ -103,8 +103,8 @@ def check_tank(ranks):
 
 # ---- the dam --------------------------------------------------------------------------------------------------------
 
-# How far the water has come along the floor, and how high it stands, in the plane x = 0.3: at the first step what
-# setFields has put there, then what these cases gave when the pictures were looked at. A refined cell is 1 / 64.
+# The water's reach along the floor, and its height in the plane x = 0.3. The first row is what setFields has put there;
+# the others are what these cases gave when the pictures were looked at. A refined cell is 1 / 64.
 DAM = {"0.0": (0.1875, 0.75), "0.1": (0.2833, 0.7042), "0.2": (0.4875, 0.5646), "0.3": (0.75, 0.3583)}
 
 

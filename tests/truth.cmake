@@ -1,5 +1,5 @@
-# What is true without libinsitu's kernels: meshes whose answers are known, and brute force in double. The tests' and the
-# benchmarks'.
+# The truth that tests and benchmarks compare with, made without libinsitu's kernels: meshes whose answers are known, and
+# brute force in double.
 set(here ${CMAKE_CURRENT_LIST_DIR})
 add_library(test_meshes STATIC
   ${here}/test_meshes.c ${here}/test_mesh_changes.c ${here}/test_mesh_dual.c ${here}/test_mesh_lattice.c

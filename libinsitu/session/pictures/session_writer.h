@@ -27,7 +27,7 @@ typedef struct session_writer {
     pthread_cond_t has_changed; /* the queue, or is_ending, or is_loading */
     pthread_t thread;
     bool is_running, is_refused; /* a thread was started; a thread could not be started */
-    bool is_loading;             /* the image library */
+    bool is_loading;             /* the thread loads the image library */
     bool is_ending;
     struct session_files *first, *last; /* the queue; the thread is at the first */
     struct session_files *done, *last_done;

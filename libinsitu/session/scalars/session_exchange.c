@@ -92,7 +92,9 @@ static insitu_status start_sends(delivery *d, const session_mail *out, base_erro
     for (int r = 0; r < d->ranks; r++) {
         receivers += out->counts[r] > 0;
         if (out->counts[r] > INT32_MAX)
-            return base_fail(error, INSITU_ERROR_MEMORY, "more than 16 GiB of data for a rank at once");
+            return base_fail(error, INSITU_ERROR_MEMORY,
+                             "%lld bytes of data for rank %d, at most %lld can be sent at once",
+                             8 * (long long)out->counts[r], r, 8LL * INT32_MAX);
     }
     d->sends = base_alloc((size_t)(receivers + 1) * sizeof(MPI_Request));
     if (!d->sends) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for messages to %d ranks", receivers);
