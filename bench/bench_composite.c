@@ -284,7 +284,8 @@ int main(int argc, char **argv)
     make_scene(&o, &scene);
     bench b = {.options = &o, .scene = &scene, .out = {.width = o.width, .height = o.height}};
     const size_t pixels = (size_t)o.width * (size_t)o.height;
-    b.group = (comp_group){MPI_COMM_WORLD, {1, false}, COMP_AUTOMATIC, 0};
+    b.group = (comp_group){MPI_COMM_WORLD, {1, false}, COMP_AUTOMATIC, 0, comp_claims_create(rank_count)};
+    if (!b.group.claims) abort();
     b.out.rgba = own_rank == 0 ? base_alloc(pixels * 4 * sizeof(float)) : NULL;
     b.out.depth = own_rank == 0 ? base_alloc(pixels * sizeof(float)) : NULL;
     b.icet = bench_icet_create(MPI_COMM_WORLD);
@@ -294,6 +295,7 @@ int main(int argc, char **argv)
     bench_scene_show_volume(&scene);
     measure_layer(&b, "volume", false);
     bench_icet_free(b.icet);
+    base_free(b.group.claims);
     base_free(b.out.rgba);
     base_free(b.out.depth);
     bench_scene_free(&scene);

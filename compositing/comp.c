@@ -7,6 +7,7 @@
 #include "comp.h"
 
 #include <omp.h>
+#include <string.h>
 
 #include "comp_agree.h"
 #include "comp_cost.h"
@@ -25,9 +26,14 @@ typedef struct composition {
     comp_route route;
     comp_grid grid;
     comp_strips strips;
-    int32_t votes[COMP_MOST_BLOCKS + 2];
     comp_owners owners;
+    uint64_t *loads; /* of all ranks, in fragments */
 } composition;
+
+comp_claim *comp_claims_create(int ranks)
+{
+    return base_alloc((comp_most_blocks(ranks) + COMP_AGREED_CLAIMS) * sizeof(comp_claim));
+}
 
 static composition composition_of(const comp_group *group, const float background[4], image *out,
                                   comp_statistics *statistics)
@@ -66,21 +72,26 @@ static void choose_route(composition *c, int64_t fragments)
 /* A rank beyond the owners leaves what it would own to its partner. */
 static void choose_owners(composition *c)
 {
+    comp_claim *const claims = c->group->claims;
     c->owners.count = c->route.owners;
-    comp_votes_level(c->votes, c->grid.blocks);
+    comp_claims_level(claims, c->grid.blocks, c->loads, c->route.ranks);
     for (uint32_t b = 0; b < c->grid.blocks; b++) {
-        const int place = c->votes[b] ? comp_route_place(&c->route, comp_vote_rank(c->votes[b])) : -1;
+        const int place = claims[b].vote ? comp_route_place(&c->route, comp_vote_rank(claims[b].vote)) : -1;
         c->owners.places[b] = place < c->route.owners ? place : place - c->route.owners;
     }
 }
 
-/* Votes for each block by how many fragments this rank has there. */
-static void vote(composition *c)
+/* Claims each block by how many fragments this rank has there. */
+static void claim(composition *c)
 {
-    int64_t counts[COMP_MOST_BLOCKS] = {0};
-    for (uint32_t r = 0; r < c->strips.starts[c->grid.strips]; r++)
-        counts[comp_grid_block(&c->grid, c->strips.ranges[r].strip)] += c->strips.ranges[r].count;
-    for (uint32_t b = 0; b < c->grid.blocks; b++) c->votes[b] = comp_vote(b, c->room.rank, counts[b]);
+    comp_claim *const claims = c->group->claims;
+    const uint32_t ranges = c->strips.starts[c->grid.strips];
+    for (uint32_t r = 0; r < ranges; r++)
+        claims[comp_grid_block(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
+    for (uint32_t r = 0; r < ranges; r++) {
+        const uint32_t block = comp_grid_block(&c->grid, c->strips.ranges[r].strip);
+        if (!claims[block].vote) claims[block].vote = comp_vote(block, c->room.rank, claims[block].fragments);
+    }
 }
 
 /* Allocates what the three phases need. */
@@ -90,9 +101,14 @@ static insitu_status prepare(composition *c, fragment_list *items, base_error *e
     if (c->out->deep) c->merged.deep = base_calloc((size_t)c->grid.threads, sizeof *c->merged.deep);
     if (c->out->deep && !c->merged.deep)
         return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
+    c->loads = base_alloc((size_t)c->route.ranks * sizeof *c->loads);
+    c->owners.places = base_alloc((size_t)c->grid.blocks * sizeof *c->owners.places);
+    if (!c->loads || !c->owners.places)
+        return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for the owners of %u blocks",
+                         (unsigned)c->grid.blocks);
     insitu_status status = c->route.ranks > 1 ? comp_mailroom_open(c->group->comm, &c->room, error) : INSITU_OK;
     if (!status) status = comp_strips_make(&c->grid, items, &c->strips, error);
-    if (!status) vote(c);
+    if (!status) claim(c);
     return status;
 }
 
@@ -146,8 +162,9 @@ static insitu_status begin(composition *c, int threads, base_error *error)
     c->statistics->has_failed = status != INSITU_OK;
     if (status) return status;
     c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
-    c->grid = comp_grid_of((uint32_t)c->out->width, (uint32_t)c->out->height);
+    c->grid = comp_grid_of((uint32_t)c->out->width, (uint32_t)c->out->height, ranks);
     c->grid.threads = threads > 0 ? threads : omp_get_max_threads();
+    memset(c->group->claims, 0, c->grid.blocks * sizeof *c->group->claims);
     return INSITU_OK;
 }
 
@@ -174,7 +191,7 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     statistics->sent_fragments = items->count;
     int64_t most = items->count;
     insitu_status own = prepare(c, items, error), status = own;
-    if (c->route.ranks > 1) status = comp_agree_votes(comm, own, &most, c->votes, (int)c->grid.blocks, error);
+    if (c->route.ranks > 1) status = comp_agree_claims(comm, own, &most, c->group->claims, (int)c->grid.blocks, error);
     if (!status) {
         if (c->route.ranks > 1) choose_route(c, most);
         choose_owners(c);
@@ -185,6 +202,8 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     statistics->has_failed = own != INSITU_OK || status == INSITU_ERROR_MPI;
     comp_strips_free(&c->strips);
     comp_mailroom_close(&c->room);
+    base_free(c->owners.places);
+    base_free(c->loads);
     base_free(items->items);
     *items = (fragment_list){NULL, 0, 0};
     return c->out->deep ? gather_deep(c, status, error) : status;

@@ -9,26 +9,46 @@
 #include "comp_grid.h"
 
 #include <math.h>
-#include <stddef.h>
 
-/* Blocks are the smallest that are few enough, and nearly square. */
-comp_grid comp_grid_of(uint32_t width, uint32_t height)
+static void count_blocks(comp_grid *g)
 {
-    comp_grid g = {.width = width, .height = height, .threads = 1};
-    const uint32_t across = (width - 1) / COMP_LANES + 1, down = (height - 1) / COMP_ROWS + 1;
-    g.across = across;
-    g.strips = across * down;
+    const uint32_t down = ((g->height - 1) >> g->row_shift) + 1;
+    g->strips = g->across * down;
+    g->blocks_across = ((g->across - 1) >> g->shift_x) + 1;
+    g->blocks = g->blocks_across * (((down - 1) >> g->shift_y) + 1);
+}
+
+static void merge_blocks(comp_grid *g)
+{
+    if (g->shift_x <= g->shift_y)
+        g->shift_x++;
+    else
+        g->shift_y++;
+}
+
+/* Undoes merge_blocks(), or divides strips. */
+static void divide_blocks(comp_grid *g)
+{
+    if (g->shift_x > g->shift_y)
+        g->shift_x--;
+    else if (g->shift_y > 0)
+        g->shift_y--;
+    else
+        g->row_shift--;
+}
+
+/* Blocks are nearly square, and the smallest that are few enough; but for many ranks the largest that are many enough.
+ * A block of one row of a strip is not divided. */
+comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
+{
+    comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
+    const int counted = ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS;
+    const uint32_t wanted = counted > 1 ? COMP_RANK_BLOCKS * (uint32_t)counted : 0;
+    g.across = (width - 1) / COMP_LANES + 1;
     g.inverse = width > 1 ? UINT64_MAX / width + 1 : 0;
-    for (;;) {
-        g.blocks_across = ((across - 1) >> g.shift_x) + 1;
-        const uint64_t blocks = (uint64_t)g.blocks_across * (((down - 1) >> g.shift_y) + 1);
-        g.blocks = (uint32_t)blocks;
-        if (blocks <= COMP_MOST_BLOCKS) return g;
-        if (g.shift_x <= g.shift_y)
-            g.shift_x++;
-        else
-            g.shift_y++;
-    }
+    for (count_blocks(&g); g.blocks > COMP_FEW_BLOCKS; count_blocks(&g)) merge_blocks(&g);
+    for (; g.blocks < wanted && (g.shift_x || g.row_shift); count_blocks(&g)) divide_blocks(&g);
+    return g;
 }
 
 static uint32_t hash(uint32_t x)
@@ -48,47 +68,59 @@ int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 
-/* How many blocks each rank owns that owns any, in a table by the rank's hash. */
-typedef struct ownership {
-    int rank;
-    uint32_t blocks;
-} ownership;
-
-enum { SLOTS = 2 * COMP_MOST_BLOCKS };
-
-static ownership *find_ownership(ownership *all, int rank)
+/* Counts what each rank owns; returns what it would own if all owners had the same, rounded up. */
+static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
-    uint32_t slot = hash((uint32_t)rank + 1) % SLOTS;
-    while (all[slot].rank >= 0 && all[slot].rank != rank) slot = (slot + 1) % SLOTS;
-    all[slot].rank = rank;
-    return &all[slot];
-}
-
-/* Returns how many blocks the busiest rank need own. */
-static uint32_t find_share(const int32_t *votes, uint32_t blocks, ownership *all)
-{
-    uint32_t owners = 0, owned = 0;
-    for (int i = 0; i < SLOTS; i++) all[i] = (ownership){-1, 0};
+    uint64_t owners = 0, all = 0;
+    for (int r = 0; r < ranks; r++) loads[r] = 0;
     for (uint32_t b = 0; b < blocks; b++) {
-        if (!votes[b]) continue;
-        ownership *own = find_ownership(all, comp_vote_rank(votes[b]));
-        owners += own->blocks++ == 0;
-        owned++;
+        if (!claims[b].vote) continue;
+        uint64_t *const load = &loads[comp_vote_rank(claims[b].vote)];
+        owners += *load == 0;
+        *load += claims[b].fragments;
+        all += claims[b].fragments;
     }
-    return owners ? (owned + owners - 1) / owners : 0;
+    return owners ? (all + owners - 1) / owners : 0;
 }
 
-void comp_votes_level(int32_t *votes, uint32_t blocks)
+/* The blocks are gone through in their order, and the owners who take some as well, so that most blocks stay near by.
+ * A rank gives a block if it is then nearer to its share. One takes it for the same reason; where there is none, one
+ * that is farther beyond its share then, by an eighth of the block, and so on; at last any that has less than its share.
+ * Such a rank exists while another has more. As nobody gives its last block, each owner is met among the blocks. */
+typedef struct takers {
+    const comp_claim *claims;
+    uint32_t blocks, next;
+    uint64_t beyond; /* eighths of a block */
+    const uint64_t *loads;
+    uint64_t share;
+} takers;
+
+static int find_taker(takers *t, uint64_t fragments)
 {
-    ownership all[SLOTS];
-    const uint32_t share = find_share(votes, blocks, all);
-    int next = 0;
-    for (uint32_t b = blocks; b-- > 0;) {
-        ownership *own = votes[b] ? find_ownership(all, comp_vote_rank(votes[b])) : NULL;
-        if (!own || own->blocks <= share) continue;
-        while (all[next].rank < 0 || all[next].blocks >= share) next++;
-        own->blocks--;
-        all[next].blocks++;
-        votes[b] = (int32_t)((uint32_t)votes[b] & ~0xfffffu) | all[next].rank;
+    for (;; t->next++) {
+        if (t->next == t->blocks) {
+            t->next = 0;
+            t->beyond += t->beyond < 8;
+        }
+        const int32_t vote = t->claims[t->next].vote;
+        if (!vote) continue;
+        const int rank = comp_vote_rank(vote);
+        const uint64_t load = t->loads[rank];
+        if (load < t->share && 8 * load + (8 - t->beyond) * fragments <= 8 * t->share) return rank;
+    }
+}
+
+void comp_claims_level(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
+{
+    takers t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
+    for (uint32_t b = 0; b < blocks; b++) {
+        if (!claims[b].vote) continue;
+        const uint64_t fragments = claims[b].fragments;
+        uint64_t *const load = &loads[comp_vote_rank(claims[b].vote)];
+        if (2 * *load < 2 * t.share + fragments || *load == fragments) continue;
+        const int taker = find_taker(&t, fragments);
+        *load -= fragments;
+        loads[taker] += fragments;
+        claims[b].vote = (int32_t)((uint32_t)claims[b].vote & ~0xfffffu) | taker;
     }
 }

@@ -395,7 +395,8 @@ int main(int argc, char **argv)
     MPI_Comm_set_errhandler(comm, MPI_ERRORS_RETURN);
     MPI_Comm_rank(comm, &own_rank);
     MPI_Comm_size(comm, &rank_count);
-    group = (comp_group){comm, {1, false}, COMP_DIRECT, 0};
+    group = (comp_group){comm, {1, false}, COMP_DIRECT, 0, comp_claims_create(rank_count)};
+    if (!group.claims) MPI_Abort(comm, 1);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(composite_equals_serial_merge),
         cmocka_unit_test(overlaps_are_told_to_all),
@@ -407,6 +408,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(image_without_pixels_is_refused),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    base_free(group.claims);
     MPI_Comm_free(&comm);
     MPI_Finalize();
     return failed;

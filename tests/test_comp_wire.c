@@ -198,7 +198,7 @@ enum { WIDE = 40, HIGH = 50 };
 /* A picture, colours and then depths, whose right strips and lower ones are cut. Every second strip has no depths. */
 static void store_by(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4], float *stored)
 {
-    const comp_grid grid = comp_grid_of(WIDE, HIGH);
+    const comp_grid grid = comp_grid_of(WIDE, HIGH, 1);
     memset(stored, 0x55, 5 * WIDE * HIGH * sizeof *stored);
     for (uint32_t strip = 0; strip < grid.strips; strip++) {
         const comp_area area = comp_grid_area(&grid, strip);

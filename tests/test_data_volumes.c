@@ -11,6 +11,7 @@
 
 #include "colour_map.h"
 #include "comp.h"
+#include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
 #include "test_data_mesh.h"
@@ -355,10 +356,11 @@ static void draw(subject *s, double max_error, picture *out)
     image target = {WIDTH, HEIGHT, out->rgba, out->depth, NULL, false};
     memset(s->ghosts, 0, (size_t)s->rectangle_count);
     s->f.job.max_error = max_error;
-    const session_frame_target where = {
-        MPI_COMM_SELF, {MPI_COMM_SELF, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, MAX_FRAGMENTS};
+    const comp_group group = {MPI_COMM_SELF, {1, false}, COMP_AUTOMATIC, 0, comp_claims_create(1)};
+    const session_frame_target where = {MPI_COMM_SELF, group, fixture_background, MAX_FRAGMENTS};
     if (session_draw_frame(&where, &s->f.job, &target, &out->frame, &error) != INSITU_OK)
         fail_msg("session_draw_frame: %s", error.message);
+    base_free(group.claims);
 }
 
 static double pixel_difference(const picture *a, const picture *b, int pixel)

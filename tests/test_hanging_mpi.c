@@ -3,6 +3,7 @@
  * which cells overlap, no ray passes between cells, and the picture is the same on any number of ranks.
  *
  * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+#include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
 #include "test_mesh_hanging.h"
@@ -60,8 +61,12 @@ static int64_t draw(render_fixture *f, MPI_Comm comm, bool is_alone, image *out)
     base_error error = {0};
     *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL, false};
     f->job.is_alone = is_alone;
-    const session_frame_target target = {comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, MANY};
+    int ranks = 1;
+    MPI_Comm_size(comm, &ranks);
+    const comp_group group = {comm, {1, false}, COMP_AUTOMATIC, 0, comp_claims_create(ranks)};
+    const session_frame_target target = {comm, group, fixture_background, MANY};
     if (session_draw_frame(&target, &f->job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);
+    base_free(group.claims);
     return frame.overlaps;
 }
 

@@ -4,6 +4,7 @@
  * that do not overlap must not have a single pixel that is drawn twice.
  *
  * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+#include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
 #include "test_effort.h"
@@ -152,9 +153,13 @@ static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool
     *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL, false};
     stage(&s, mesh, d);
     s.f.job.is_alone = is_alone;
-    const session_frame_target target = {
-        comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, d->fragment_limit};
+    int ranks = 1;
+    MPI_Comm_size(comm, &ranks);
+    const comp_group group = {comm, {1, false}, COMP_AUTOMATIC, 0, comp_claims_create(ranks)};
+    const session_frame_target target = {comm, group, fixture_background, d->fragment_limit};
+    assert_non_null(group.claims);
     if (session_draw_frame(&target, &s.f.job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);
+    base_free(group.claims);
     fixture_free(&s.f);
     return frame.overlaps;
 }

@@ -68,9 +68,13 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
     out->height = HEIGHT;
     out->rgba = malloc(4 * PIXELS * sizeof(float));
     out->depth = malloc(PIXELS * sizeof(float));
-    const comp_group group = {comm, {1, false}, COMP_AUTOMATIC, 0};
+    int ranks = 1;
+    MPI_Comm_size(comm, &ranks);
+    const comp_group group = {comm, {1, false}, COMP_AUTOMATIC, 0, comp_claims_create(ranks)};
+    assert_non_null(group.claims);
     assert_int_equal(comp_composite(&group, &list, fixture_background, 0, out, NULL, &error), INSITU_OK);
     base_free(list.items);
+    base_free(group.claims);
     fixture_free(&f);
 }
 

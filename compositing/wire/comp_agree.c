@@ -33,17 +33,37 @@ insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, ba
     return tell(own, worst, ((int64_t)worst << 32) - all[0], error);
 }
 
-insitu_status comp_agree_votes(MPI_Comm comm, insitu_status own, int64_t *greatest, int32_t *votes, int count,
-                               base_error *error)
+/* An MPI_User_function for claims, which are pairs of int. */
+static void add_claims(void *in, void *sum, int *count, MPI_Datatype *type)
+{
+    const comp_claim *const added = in;
+    comp_claim *const sums = sum;
+    (void)type;
+    for (int i = 0; i < *count; i++) comp_claim_add(&added[i], &sums[i]);
+}
+
+_Static_assert(sizeof(comp_claim) == 2 * sizeof(int), "a claim is MPI_2INT");
+
+static int reduce_claims(MPI_Comm comm, comp_claim *claims, int count)
+{
+    MPI_Op op;
+    int code = MPI_Op_create(add_claims, 1, &op);
+    if (code != MPI_SUCCESS) return code;
+    code = MPI_Allreduce(MPI_IN_PLACE, claims, count, MPI_2INT, op, comm);
+    MPI_Op_free(&op);
+    return code;
+}
+
+insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claim *claims, int count,
+                                base_error *error)
 {
     enum { SHIFT = 20, MASK = (1 << SHIFT) - 1 };
     int rank = 0;
     MPI_Comm_rank(comm, &rank);
-    votes[count] = own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0;
-    votes[count + 1] = (int32_t)(*greatest < INT32_MAX ? *greatest : INT32_MAX);
-    const insitu_status status =
-        comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, votes, count + 2, MPI_INT32_T, MPI_MAX, comm), error);
+    claims[count] = (comp_claim){own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0, 0};
+    claims[count + 1] = (comp_claim){(int32_t)(*greatest < INT32_MAX ? *greatest : INT32_MAX), 0};
+    const insitu_status status = comp_mpi_status(reduce_claims(comm, claims, count + 2), error);
     if (status != INSITU_OK) return status;
-    *greatest = votes[count + 1];
-    return tell(own, (insitu_status)(votes[count] >> SHIFT), MASK - (votes[count] & MASK), error);
+    *greatest = claims[count + 1].vote;
+    return tell(own, (insitu_status)(claims[count].vote >> SHIFT), MASK - (claims[count].vote & MASK), error);
 }

@@ -111,7 +111,7 @@ module insitu
         integer(c_int) :: images = 0
         real(c_double) :: total_ms = 0, prepare_ms = 0, build_ms = 0, refit_ms = 0, surface_ms = 0, volume_ms = 0, &
             composite_ms = 0, write_ms = 0, background_ms = 0
-        integer(c_int) :: pictures_waiting = 0
+        integer(c_int) :: pictures_waiting = 0, turns = 0
         integer(c_int64_t) :: cells = 0, cells_ghost = 0, cells_unusable = 0, cells_inverted = 0, cells_flat = 0, &
             cells_shell = 0, cells_recognised = 0
         integer(c_int64_t) :: rays = 0, fragments = 0, bytes_sent = 0, map_failures = 0

@@ -119,6 +119,7 @@ class _Report(ctypes.Structure):
         ("write_ms", ctypes.c_double),
         ("background_ms", ctypes.c_double),
         ("pictures_waiting", ctypes.c_int),
+        ("turns", ctypes.c_int),
         ("cells", ctypes.c_int64),
         ("cells_ghost", ctypes.c_int64),
         ("cells_unusable", ctypes.c_int64),

@@ -2,6 +2,7 @@
  * fail on one rank alone end in agreement, so that a session is created on all ranks or on none. */
 #include "session.h"
 
+#include "comp.h"
 #include "memory.h"
 #include "session_agree.h"
 #include "session_guard.h"
@@ -56,6 +57,7 @@ static void free_session(insitu_session *session)
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
     session_report_free(&session->report);
+    base_free(session->team.claims);
     base_free(session);
 }
 
@@ -64,14 +66,15 @@ static insitu_status create(const session_team *team, const session_scene_source
                             base_error *error)
 {
     insitu_session *session = base_calloc(1, sizeof *session);
-    if (session)
+    if (session) {
         session_writer_create(&session->writer);
-    else
-        session_no_memory(error, (int64_t)sizeof *session, "the session");
+        session->team = *team;
+        session->team.claims = comp_claims_create(team->ranks);
+    }
+    if (!session || !session->team.claims) session_no_memory(error, (int64_t)sizeof *session, "the session");
     if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no place for the session", source->call);
     insitu_status status = session_agree(team->comm, error);
     if (status) goto fail;
-    session->team = *team;
     session_team_count_node(&session->team);
     session->space.scale = 1;
     session_report_create(&session->report);

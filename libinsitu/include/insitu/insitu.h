@@ -270,6 +270,8 @@ typedef struct insitu_report {
     double background_ms;   /* on rank 0: time that the writing thread took for pictures that it finished since the last
                                step */
     int pictures_waiting;   /* on rank 0: pictures that the writing thread had not yet written when the step ended */
+    int turns;              /* in which pixels were drawn where cells or several volumes overlap; in each, all ranks
+                               wait for each other. The same on every rank */
     int64_t cells;          /* handed over, ghosts included */
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
     int64_t cells_unusable; /* not drawn: the cell's own field value or that of a vertex is not finite */

@@ -29,6 +29,7 @@ static void add_frame(session_frame *sum, const session_frame *frame)
     sum->fragments += frame->fragments;
     sum->surface_ms += frame->surface_ms;
     sum->composite_ms += frame->composite_ms;
+    sum->turns += frame->turns;
     sum->sent_bytes += frame->sent_bytes;
     sum->schedule = frame->schedule;
 }

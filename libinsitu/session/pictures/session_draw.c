@@ -185,6 +185,7 @@ static void report_frame(insitu_report *report, const session_frame *frame)
     report->volume_ms += frame->volume_ms;
     report->fragments += frame->fragments;
     report->composite_ms += frame->composite_ms;
+    report->turns += frame->turns;
     report->bytes_sent += frame->sent_bytes;
     if (frame->schedule != COMP_AUTOMATIC) report->schedule = comp_schedule_name(frame->schedule);
 }
@@ -275,7 +276,8 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     const float *background = image->decorations.is_given ? no_background : image->background;
     const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
     _Static_assert((int)SCENE_SCHEDULE_BINARY == (int)COMP_BINARY, "a scene's schedules are those of compositing");
-    const comp_group compositing = {d->team->compositing_comm, nodes, (comp_schedule)d->scene->schedule, 0};
+    const comp_group compositing = {d->team->compositing_comm, nodes, (comp_schedule)d->scene->schedule, 0,
+                                    d->team->claims};
     frames_basis basis = {d,
                           {d->team->comm, compositing, background, overlap_fragments},
                           canvas,

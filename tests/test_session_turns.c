@@ -1,0 +1,75 @@
+/* Volumes that fill one space make fragments in every cell on a ray. They are drawn in turns, so that no rank holds all
+ * of its fragments at once, and in few, because in each all ranks wait for each other. */
+#include <stdio.h>
+
+#include "test_effort.h"
+#include "test_session_fixture.h"
+
+#define IMAGE(width, height, layers)                                                                                   \
+    "images:\n  - name: a\n    size: [" #width ", " #height "]\n    layers:\n" layers                                 \
+    "    sampling: {method: segments}\n    outputs: [{path: a.exr}]\n"
+#define THIN "      - volume: {field: f, opacity: [[0, 0.1], [1, 0.3]], unit_distance: 1}\n"
+#define DENSE "      - volume: {field: f, opacity: [[0, 0.4], [0.5, 0.1], [1, 0.3]], unit_distance: 1}\n"
+
+static insitu_report totals; /* fragments are those of all ranks, bytes_peak is the greatest */
+
+static void draw(const char *text, int side)
+{
+    session_input in;
+    input_create(&in, TEST_TETS, side, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(text), &in);
+    totals = *insitu_last_report(session);
+    const int64_t own[3] = {totals.turns, -totals.turns, totals.bytes_peak};
+    int64_t most[3];
+    MPI_Allreduce(own, most, 3, MPI_INT64_T, MPI_MAX, MPI_COMM_WORLD);
+    MPI_Allreduce(MPI_IN_PLACE, &totals.fragments, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    everywhere(most[0] == -most[1]);
+    totals.bytes_peak = most[2];
+    insitu_destroy(&session);
+    input_free(&in);
+    forget_pictures();
+}
+
+static void one_volume_needs_no_turns(void **context)
+{
+    (void)context;
+    draw(IMAGE(64, 48, THIN), 4);
+    everywhere(totals.turns == 0);
+}
+
+/* A few fragments a ray: all at once. */
+static void two_volumes_take_a_turn(void **context)
+{
+    (void)context;
+    draw(IMAGE(40, 30, THIN DENSE), 4);
+    everywhere(totals.turns == 1);
+}
+
+/* A picture that took 124 turns when they were of 4 million fragments of all ranks, by an estimate. A rank may hold
+ * 2 million fragments at once, 64 MiB, and as much again packed and unpacked. */
+static void many_fragments_take_few_turns(void **context)
+{
+    (void)context;
+    enum { LEAST_FRAGMENTS = 58900000, MOST_TURNS = 8 };
+    if (!test_is_whole()) skip();
+    draw(IMAGE(960, 540, THIN DENSE), 74);
+    if (own_rank == 0)
+        fprintf(stderr, "%lld fragments in %d turns, %lld MB at most on a rank\n", (long long)totals.fragments,
+                totals.turns, (long long)(totals.bytes_peak / 1000000));
+    everywhere(totals.fragments >= LEAST_FRAGMENTS && totals.turns <= MOST_TURNS);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(one_volume_needs_no_turns),
+        cmocka_unit_test(two_volumes_take_a_turn),
+        cmocka_unit_test(many_fragments_take_few_turns),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
