@@ -85,8 +85,9 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
 
 /* The blocks are gone through in their order, and the owners who take some as well, so that most blocks stay near by.
  * A rank gives a block if it is then nearer to its share. One takes it for the same reason; where there is none, one
- * that is farther beyond its share then, by an eighth of the block, and so on; at last any that has less than its share.
- * Such a rank exists while another has more. As nobody gives its last block, each owner is met among the blocks. */
+ * that is farther beyond its share then, by an eighth of the block, and so on; at last any that has less than its
+ * share. Such a rank exists while another has more. As nobody gives its last block, each owner is met among the blocks.
+ */
 typedef struct takers {
     const comp_claim *claims;
     uint32_t blocks, next;

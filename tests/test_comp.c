@@ -265,7 +265,8 @@ static void check_grid(uint32_t width, uint32_t height, int ranks)
     const uint32_t every = grid.strips / 5000000 + 1; /* of more strips a part */
     uint64_t area = 0;
     assert_true(grid.blocks >= 1 && grid.blocks <= comp_most_blocks(ranks));
-    assert_true(ranks == 1 || grid.blocks >= COMP_RANK_BLOCKS * (uint32_t)(ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS) ||
+    assert_true(ranks == 1 ||
+                grid.blocks >= COMP_RANK_BLOCKS * (uint32_t)(ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS) ||
                 (grid.row_shift == 0 && grid.blocks == grid.strips));
     for (uint64_t s64 = 0; s64 < grid.strips; s64 += every) {
         const uint32_t s = (uint32_t)s64;
@@ -291,9 +292,9 @@ static void check_grid(uint32_t width, uint32_t height, int ranks)
 static void strips_share_all_pixels(void **context)
 {
     (void)context;
-    const uint32_t sizes[][2] = {{1, 1},         {1, 7},           {16, 32},        {17, 33},
-                                 {640, 480},     {1021, 769},      {1920, 1080},    {7680, 4320},
-                                 {32768, 32768}, {65535, 65537},   {4294967295u, 1}, {1, 4294967295u}};
+    const uint32_t sizes[][2] = {{1, 1},         {1, 7},         {16, 32},         {17, 33},
+                                 {640, 480},     {1021, 769},    {1920, 1080},     {7680, 4320},
+                                 {32768, 32768}, {65535, 65537}, {4294967295u, 1}, {1, 4294967295u}};
     state = 4;
     static const int ranks[] = {1, 2, 32, 33, 1000, 100000};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
@@ -428,14 +429,14 @@ static double check_levels(uint32_t blocks, int ranks)
 }
 
 /* Where all ranks have the same, each owns the same, to a tenth: of pictures 1000 to 4096 wide, of which at least an
- * eighth is covered, by up to a thousand ranks. The lot is then any rank's. A block has 16 pixels at least: where a rank
- * has fewer than ten of these on average, nobody has more than one beyond the mean (check_levels()). */
+ * eighth is covered, by up to a thousand ranks. The lot is then any rank's. A block has 16 pixels at least: where a
+ * rank has fewer than ten of these on average, nobody has more than one beyond the mean (check_levels()). */
 static void owners_share_what_all_have(void **context)
 {
     (void)context;
     static span_function *const shapes[] = {span_of_disc, span_of_ring, span_of_column, span_of_band};
     static const uint32_t widths[] = {1000, 1023, 1024, 1025, 1280, 1531, 1920, 2048, 2560, 3000, 3840, 4093, 4096};
-    static const int ranks[] = {1,  2,  3,   5,   7,   8,   13,  16,  31,  32,  33,  61,        64,
+    static const int ranks[] = {1,  2,   3,   5,   7,   8,   13,  16,  31,  32,  33,  61,  64,
                                 97, 100, 127, 128, 199, 256, 257, 401, 512, 600, 729, 997, MOST_RANKS};
     enum { ENOUGH = 10 * COMP_LANES };
     int uneven = 0;
@@ -480,7 +481,8 @@ static void owners_share_what_they_have(void **context)
             claims[b] = (comp_claim){0, 0};
             for (int r = 0; r < ranks[n]; r++)
                 comp_claim_add(&(comp_claim){comp_vote(b, r, have[r]), (uint32_t)have[r]}, &claims[b]);
-            assert_true(!claims[b].vote == !seen.fragments && (!seen.fragments || claims[b].fragments % seen.fragments == 0));
+            assert_true(!claims[b].vote == !seen.fragments &&
+                        (!seen.fragments || claims[b].fragments % seen.fragments == 0));
         }
         assert_true(check_levels(grid.blocks, ranks[n]) <= 1.1);
     }
@@ -493,14 +495,15 @@ static int unfair_winner(int how, uint32_t b, uint32_t blocks, int ranks)
     switch (how) {
     case 0: return (int)(b < count ? b : 0);                           /* one has all, the others a block each */
     case 1: return (int)(b < count ? 0 : b % count);                   /* the first blocks are one's */
-    case 2: return (int)((uint64_t)b * b / blocks * count / blocks);    /* runs, of which the first are the longest */
+    case 2: return (int)((uint64_t)b * b / blocks * count / blocks);   /* runs, of which the first are the longest */
     case 3: return (int)(next_random() % (1 + next_random() % count)); /* a few often, the others rarely */
     case 4: return ranks - 1;                                          /* one has all */
     default: return (int)(next_random() % count);
     }
 }
 
-/* The fragments of a block: of all the same; few but in one block; any number; none in most; more than can be counted. */
+/* The fragments of a block: of all the same; few but in one block; any number; none in most; more than can be counted.
+ */
 static uint32_t unfair_fragments(int how, uint32_t b, uint32_t blocks)
 {
     switch (how) {
@@ -581,7 +584,7 @@ static void strips_hand_over_all(void **context)
     state = 11;
     for (int threads = 1; threads <= 4; threads += 3)
         for (int spread = 1; spread <= 1000; spread *= 10) {
-            comp_grid grid = comp_grid_of(101, 67, 1);
+            comp_grid grid = comp_grid_of(101, 67, threads); /* for four in shorter strips */
             comp_strips strips;
             handed h = {&grid, back, 0, 0};
             grid.threads = threads;

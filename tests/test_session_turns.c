@@ -6,8 +6,8 @@
 #include "test_session_fixture.h"
 
 #define IMAGE(width, height, layers)                                                                                   \
-    "images:\n  - name: a\n    size: [" #width ", " #height "]\n    layers:\n" layers                                 \
-    "    sampling: {method: segments}\n    outputs: [{path: a.exr}]\n"
+    "images:\n  - name: a\n    size: [" #width ", " #height "]\n    layers:\n" layers                                  \
+    "    sampling: {method: segments}\n    camera: {automatic: {zoom: 1.24}}\n    outputs: [{path: a.exr}]\n"
 #define THIN "      - volume: {field: f, opacity: [[0, 0.1], [1, 0.3]], unit_distance: 1}\n"
 #define DENSE "      - volume: {field: f, opacity: [[0, 0.4], [0.5, 0.1], [1, 0.3]], unit_distance: 1}\n"
 
@@ -52,7 +52,7 @@ static void many_fragments_take_few_turns(void **context)
     (void)context;
     enum { LEAST_FRAGMENTS = 58900000, MOST_TURNS = 8 };
     if (!test_is_whole()) skip();
-    draw(IMAGE(960, 540, THIN DENSE), 74);
+    draw(IMAGE(960, 540, THIN DENSE), 48);
     if (own_rank == 0)
         fprintf(stderr, "%lld fragments in %d turns, %lld MB at most on a rank\n", (long long)totals.fragments,
                 totals.turns, (long long)(totals.bytes_peak / 1000000));
