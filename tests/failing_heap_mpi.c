@@ -49,6 +49,8 @@ LET_BE(Isend, (const void *from, int count, MPI_Datatype type, int rank, int tag
        (from, count, type, rank, tag, comm, request))
 LET_BE(Issend, (const void *from, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm, MPI_Request *request),
        (from, count, type, rank, tag, comm, request))
+LET_BE(Op_create, (MPI_User_function * function, int commutes, MPI_Op *op), (function, commutes, op))
+LET_BE(Op_free, (MPI_Op * op), (op))
 LET_BE(Recv, (void *to, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm, MPI_Status *status),
        (to, count, type, rank, tag, comm, status))
 LET_BE(Send, (const void *from, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm),
