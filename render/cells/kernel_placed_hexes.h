@@ -322,6 +322,22 @@ typedef struct kernel_lanes_order {
     vm first[3], last[3];
 } kernel_lanes_order;
 
+/* kernel_triangle_order() of the loop, four bits a corner, and along which of its sides 01, 12, 20 the rank falls. */
+SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], kernel_lanes_order *o, vm falls[3])
+{
+    const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
+    vi word = vi_set(0);
+    for (int i = 0; i < 3; i++) falls[i] = vf_lt(r[(i + 1) % 3], r[i]);
+    for (int i = 0; i < 3; i++) {
+        const vm before = falls[(i + 2) % 3], behind = falls[i];
+        o->first[i] = vm_andnot(before, behind);
+        o->last[i] = vm_andnot(behind, before);
+        word |=
+            vi_select(o->first[i], vi_set(loop[i]), vi_select(o->last[i], vi_set(loop[i] << 8), vi_set(loop[i] << 4)));
+    }
+    return word;
+}
+
 /* Orders a triangle's three sides, which are named by their opposite corners: those of k, i and j are ij, jk and ik. */
 SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposite[3], vf out[3])
 {
@@ -338,18 +354,10 @@ SIMD_INLINE void kernel_placed_triangle(kernel_placed_polys *out, int type, int 
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
     kernel_triangle_lines *lines = &out->triangles[face - kernel_first_triangle(type)];
-    const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
-    const vm falls[3] = {vf_lt(r[1], r[0]), vf_lt(r[2], r[1]), vf_lt(r[0], r[2])}; /* along the sides 01, 12, 20 */
     kernel_lanes_order o;
+    vm falls[3];
     vf opposite[3], in_order[3], errors[3], extents[3];
-    vi word = vi_set(0);
-    for (int i = 0; i < 3; i++) {
-        const vm before = falls[(i + 2) % 3], behind = falls[i];
-        o.first[i] = vm_andnot(before, behind);
-        o.last[i] = vm_andnot(behind, before);
-        word |=
-            vi_select(o.first[i], vi_set(loop[i]), vi_select(o.last[i], vi_set(loop[i] << 8), vi_set(loop[i] << 4)));
-    }
+    const vi word = kernel_triangle_word(loop, rank, &o, falls);
     memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
     float(*const from[3])[SIMD_WIDTH] = {out->c, out->cu, out->cv};
     float(*const to[3])[SIMD_WIDTH] = {lines->c, lines->cu, lines->cv};

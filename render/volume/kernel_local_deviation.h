@@ -1,4 +1,5 @@
-/* The field along rays between two faces of their hexes, a ray and its cell a lane, from three places between them.
+/* The field along rays between two faces of their hexes, wedges or pyramids, a ray and its cell a lane, from three
+ * places between them. A function's type is a constant where it is called from.
  *
  * In kernel_local.h's coordinates the field is f0 + g r + (its bent terms), and y = r + n(r) goes in a line along the
  * ray, with the same bent terms b in n = B b. So with r = y - n(r)
@@ -13,10 +14,16 @@
  * third of the terms of a step with the derivatives at the place, and all three places take theirs side by side.
  *
  * How wrong it is. Let the residual be the sum over the coordinates of what y - (r + n(r)) is off zero by. The
- * derivative of n is no more than N in the cell; r may be KERNEL_DEVIATION_MARGIN outside, where it is no more
- * than 1.082 N, as bent terms have no more than two coordinates in their derivatives. So r is off by no more than
- * residual / (1 - 1.082 N), if r itself is no farther outside, which is asked; else the ray goes to the cell alone. The
- * gradients of b up to there are sqrt(2) 0.52 of two coordinates and sqrt(3) 0.52^2 of three. */
+ * derivative of n is no more than N in the cell. r may be somewhat outside (kernel_local_is_near()), where it is no
+ * more than 1.082 N:
+ *
+ *              r may be up to                                   derivative          gradients of b
+ *     hex      |ρ|, |σ|, |κ| <= 0.52                            1.04^2 N            sqrt(2) 0.52, sqrt(3) 0.52^2
+ *     wedge    0.02 outside, within the cell times 1.06         1.06 N              |(0.52, 0.707)|
+ *     pyramid  |α|, |β| <= 0.52 k, k <= 1.02                    1.045 N             |(0.52, 0.52, 0.52^2)|
+ *
+ * These are convex. So r is off by no more than residual / (1 - 1.082 N), if r itself is no farther outside, which is
+ * asked; else the ray goes to the cell alone. */
 #ifndef RENDER_KERNEL_LOCAL_DEVIATION_H
 #define RENDER_KERNEL_LOCAL_DEVIATION_H
 
@@ -35,6 +42,7 @@ enum { KERNEL_DEVIATION_STEPS = 8 };
 /* Lane by lane. */
 typedef struct kernel_local_nonlinear {
     float terms[KERNEL_BENT_TERMS][SIMD_WIDTH]; /* h */
+    float unseen[SIMD_WIDTH];                   /* the least that is taken for E of kernel_local_segments.h */
     float sensitivity[SIMD_WIDTH];              /* what the field may be off by, over the residual */
     float residual_limit[SIMD_WIDTH];           /* a larger residual says nothing of the field */
     float tolerance[SIMD_WIDTH];                /* a smaller one is small enough */
@@ -48,17 +56,30 @@ typedef struct kernel_local_deviations {
 
 /* ---- cells ---- */
 
+/* The gradient of a bent term is no more than that. */
+SIMD_INLINE float kernel_local_bent_slope(int type, int term)
+{
+    return type == GRID_WEDGE ? 0.88f : type == GRID_PYRAMID ? 0.79f : term < 3 ? 0.74f : 0.47f;
+}
+
+/* What no look may see of the field, by the bend's square and the bent terms (kernel_local_segments.h). */
+SIMD_INLINE float kernel_local_bent_unseen(int type)
+{
+    return type == GRID_HEX ? 0.0011f : type == GRID_WEDGE ? 0.0004f : 0;
+}
+
 /* All but the tolerance. */
-SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, kernel_local_nonlinear *out)
+SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_nonlinear *out)
 {
     vf most = vf_set(0);
-    for (int k = 0; k < KERNEL_BENT_TERMS; k++) {
+    for (int k = 0; k < kernel_bent_terms(type); k++) {
         vf own = vf_load(c->field[4 + k]);
         for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->bent[k][a]), own);
         vf_store(out->terms[k], own);
-        most += vf_abs(own) * (k < 3 ? 0.74f : 0.47f);
+        most += vf_abs(own) * kernel_local_bent_slope(type, k);
     }
-    const vf room = 1.0f - 1.082f * vf_sqrt(vf_load(c->bend));
+    const vf bend = vf_sqrt(vf_load(c->bend)), room = 1.0f - 1.082f * bend;
+    vf_store(out->unseen, kernel_local_bent_unseen(type) * vf_load(c->bend) * most);
     vf_store(out->sensitivity, most / room);
     vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
 }
@@ -76,25 +97,33 @@ typedef struct kernel_local_iterate {
     vf r[3], residual[3], deviation;
 } kernel_local_iterate;
 
-SIMD_INLINE void kernel_hex_bent(const vf r[3], vf out[KERNEL_BENT_TERMS])
+SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BENT_TERMS])
 {
-    out[0] = r[0] * r[1];
-    out[1] = r[0] * r[2];
-    out[2] = r[1] * r[2];
-    out[3] = out[0] * r[2];
+    kernel_bend b;
+    kernel_bend_at(type, r, &b);
+    memcpy(out, b.term, sizeof b.term);
+}
+
+/* Tells where r is in the cell or not far outside. */
+SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
+{
+    if (type == GRID_WEDGE) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
+    const vf most = vf_max(vf_abs(r[0]), vf_abs(r[1])), half = vf_set(0.5f + KERNEL_DEVIATION_MARGIN);
+    if (type == GRID_HEX) return vf_le(vf_max(most, vf_abs(r[2])), half);
+    return vm_and(vf_le(most, half * r[2]), vf_le(r[2], vf_set(1 + KERNEL_DEVIATION_MARGIN)));
 }
 
 SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
-                                       vi lane, const kernel_local_crossing ends[2], kernel_local_chord *out)
+                                       vi lane, const kernel_local_crossing ends[2], int type, kernel_local_chord *out)
 {
     vf first[KERNEL_BENT_TERMS], last[KERNEL_BENT_TERMS];
-    kernel_hex_bent(ends[0].r, first);
-    kernel_hex_bent(ends[1].r, last);
+    kernel_local_bent_at(type, ends[0].r, first);
+    kernel_local_bent_at(type, ends[1].r, last);
     for (int a = 0; a < 3; a++) {
         out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
         out->span[a] = ends[1].r[a] - ends[0].r[a];
     }
-    for (int k = 0; k < KERNEL_BENT_TERMS; k++) {
+    for (int k = 0; k < kernel_bent_terms(type); k++) {
         out->mean[k] = 0.5f * (first[k] + last[k]);
         out->rise[k] = last[k] - first[k];
         out->own[k] = kernel_local_take(nonlinear->terms[k], lane);
@@ -103,17 +132,17 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
 }
 
 /* Finds the residual at the place u, and how far the field is off its chord. */
-SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, kernel_local_iterate *p)
+SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
     vf term[KERNEL_BENT_TERMS];
-    kernel_hex_bent(p->r, term);
+    kernel_local_bent_at(type, p->r, term);
     for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
-    for (int k = 0; k < KERNEL_BENT_TERMS; k++) {
+    for (int k = 0; k < kernel_bent_terms(type); k++) {
         term[k] -= vf_muladd(c->rise[k], vf_set(u), c->mean[k]);
         for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->bent[k][a], term[k], p->residual[a]);
     }
     p->deviation = c->own[0] * term[0];
-    for (int k = 1; k < KERNEL_BENT_TERMS; k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
+    for (int k = 1; k < kernel_bent_terms(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
 }
 
 SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
@@ -122,7 +151,7 @@ SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
 }
 
 SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
-                                            vi lane, vm rays, const kernel_local_crossing ends[2],
+                                            vi lane, vm rays, const kernel_local_crossing ends[2], int type,
                                             kernel_local_deviations *out)
 {
     static const float places[3] = {-0.25f, 0, 0.25f};
@@ -130,10 +159,10 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     kernel_local_iterate iterates[3];
     kernel_local_iterate *middle = &iterates[1];
     const vf tolerance = kernel_local_take(nonlinear->tolerance, lane);
-    kernel_local_chord_of(cells, nonlinear, lane, ends, &chord);
+    kernel_local_chord_of(cells, nonlinear, lane, ends, type, &chord);
     memcpy(middle->r, chord.middle, sizeof middle->r);
     for (int n = 0; n < 2; n++) {
-        kernel_local_iterate_at(&chord, 0, middle);
+        kernel_local_iterate_at(&chord, 0, type, middle);
         for (int a = 0; a < 3; a++) middle->r[a] += middle->residual[a];
     }
     for (int q = 0; q < 3; q += 2)
@@ -143,7 +172,7 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     for (int n = 0;; n++) {
         out->residual = vf_set(0);
         for (int i = 0; i < 3; i++) {
-            kernel_local_iterate_at(&chord, places[i], &iterates[i]);
+            kernel_local_iterate_at(&chord, places[i], type, &iterates[i]);
             out->residual = vf_max(kernel_local_residual_of(&iterates[i]), out->residual);
         }
         const vm open = vm_andnot(rays, vf_le(out->residual, tolerance));
@@ -152,14 +181,12 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
             for (int a = 0; a < 3; a++)
                 iterates[i].r[a] = vf_select(open, iterates[i].r[a] + iterates[i].residual[a], iterates[i].r[a]);
     }
-    vf farthest = vf_set(0);
+    vm is_near = vf_le(out->residual, kernel_local_take(nonlinear->residual_limit, lane));
     for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) farthest = vf_max(vf_abs(iterates[i].r[a]), farthest);
+        is_near = vm_and(is_near, kernel_local_is_near(type, iterates[i].r));
         out->field[i] = iterates[i].deviation;
     }
-    const vm is_near = vf_le(farthest, vf_set(0.5f + KERNEL_DEVIATION_MARGIN));
-    out->has_diverged =
-        vm_not(vm_and(is_near, vf_le(out->residual, kernel_local_take(nonlinear->residual_limit, lane))));
+    out->has_diverged = vm_not(is_near);
 }
 
 #endif

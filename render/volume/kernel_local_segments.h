@@ -1,4 +1,4 @@
-/* Segments of hexes, a ray and its cell a lane (kernel_segments.h has what segments are for):
+/* Segments of hexes, wedges and pyramids, a ray and its cell a lane (kernel_segments.h has what segments are for):
  *
  *     cells                    where are they, and what map have they?     kernel_local.h
  *     pixels of their boxes    may the ray meet the cell in the window?    by planes about it
@@ -28,9 +28,16 @@
  * P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at the quarters, 1.09 (0.67 of one chord, which crosses it in the
  * middle; 1.082 at most, times n^2, of n >= 2); and of the quartic's no more than four times
  * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2. What the polynomial itself is off is not of
- * mean zero: 2 E, and what Newton's method leaves, count whole. E may vanish where higher orders do not, so it is taken to
- * be no less than 0.01 (P + A) times the bend's square: of random hexes with bends up to 0.89 none then took more than
- * 0.61 of what it may, where without it one in ten thousand took 2.7 times that. */
+ * mean zero: 2 E, and what Newton's method leaves, count whole.
+ *
+ * E may vanish where higher orders do not, and of hexes P and A may as well: values at eight vertices can be such that
+ * the field is on its chord at all three places. So E is taken to be no less than 0.01 (P + A) N^2 + e N^2 S, where N
+ * is the bend, S the sum of |h| times the bent terms' slopes (kernel_local_deviation.h), and e is 0.0011 in hexes and
+ * 0.0004 in wedges. Of 300,000 rays in random cells of each type with bends up to 0.89, and the field that has E = 0 or all
+ * three places on the chord and its mean as far off as can be, the polynomial's mean was off by 0.27 of 2 E at most (it
+ * is the mean that counts in one segment), and the field itself by 1.3 of 2 E on average where bends are more than 0.4.
+ * Along a ray in a pyramid the field is a linear function and a piece of a conic section, whose three numbers the three
+ * places tell: e is 0. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -81,6 +88,15 @@ typedef struct kernel_local_bounds {
 typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
                                       const kernel_map *map);
 
+/* Rays that have come so far, a word each: the pixel in the tile from the first bit on, the cell's lane from
+ * KERNEL_LOCAL_CELL on, and the faces that are crossed from KERNEL_LOCAL_FACES on, three bits each. */
+typedef struct kernel_local_list {
+    int count;
+    float words[KERNEL_HEX_ROOM];
+} kernel_local_list;
+
+enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
+
 typedef struct kernel_local_stretches {
     kernel_tile_ray_segments *packets; /* the tile's */
     kernel_segment_state state;        /* what all rays have in common */
@@ -90,7 +106,8 @@ typedef struct kernel_local_stretches {
     kernel_local_faces faces;
     kernel_local_bounds bounds;
     kernel_local_nonlinear nonlinear;
-    kernel_hex_rays rays, met;
+    kernel_hex_rays rays;
+    kernel_local_list met, crossed[2]; /* crossed: by whether the first of the two faces is a triangle */
     /* By packet and lane: where the window begins and ends, side by side; the same of the ray; unit distances per t. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS], per_t[KERNEL_LOCAL_PIXELS];
 } kernel_local_stretches;
@@ -98,7 +115,7 @@ typedef struct kernel_local_stretches {
 /* Are segments of cells of this type for lanes in this frame? Not where ends are taken in double. */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
-    return f->allowance > 0 && !f->is_double && type == GRID_HEX;
+    return f->allowance > 0 && !f->is_double && kernel_local_queue_of(type) >= 0;
 }
 
 /* The packets' windows. */
@@ -135,14 +152,14 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local
 /* The lane's bounds; false where its values are for bisection. Chords end beyond the cell's values: one chord by no
  * more than three sixteenths of their range (kernel_local_strays()), several by a sixth of the parabola's most, which
  * is less than that range. */
-SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_local_stretches *b, int n)
+SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_local_stretches *b, int type, int n)
 {
+    const int count = grid_type_vertices(type);
     const kernel_pieces *t = state->pieces;
-    float values[8], low, high;
+    const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
+    float low = values[0][n], high = low;
     kernel_span span = {.map = NULL};
-    for (int i = 0; i < 8; i++) values[i] = b->faces.at[3][i][n];
-    low = high = values[0];
-    for (int i = 1; i < 8; i++) low = simd_min(values[i], low), high = simd_max(values[i], high);
+    for (int i = 1; i < count; i++) low = simd_min(values[i][n], low), high = simd_max(values[i][n], high);
     const float ends[2] = {low - 0.1875f * (high - low), high + 0.1875f * (high - low)};
     kernel_span_bound(state, ends, 2, &span);
     if (span.step_count || span.is_steep) return false;
@@ -196,7 +213,8 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_stretches *b, const ke
     const vi lane = p->rays.lane;
     const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
-    const vf bend = kernel_local_take(b->lanes.cells.bend, lane), least = 0.01f * bend * (parabola + cubic);
+    const vf bend = kernel_local_take(b->lanes.cells.bend, lane);
+    const vf least = vf_muladd(0.01f * bend, parabola + cubic, kernel_local_take(b->nonlinear.unseen, lane));
     const vf quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     const vf change = vf_abs(p->ends[1].v - p->ends[0].v) + 3.0f * (parabola + cubic);
     const vf cost = kernel_local_take(b->bounds.cost, lane);
@@ -206,7 +224,8 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_stretches *b, const ke
                   vf_muladd(kernel_local_take(b->bounds.fade, lane), depth, kernel_local_take(b->bounds.sway, lane)));
     const vf mean = 0.26f * parabola + (1.09f * cubic + 4.0f * quartic);
     out->made = (0.5f * vf_min(sway, 2.0f * cost)) * (mean * length);
-    out->rest = cost * length * (2.0f * quartic + kernel_local_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual);
+    const vf unknown = kernel_local_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
+    out->rest = cost * length * (2.0f * quartic + unknown);
     out->length = length;
 }
 
@@ -343,78 +362,147 @@ static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_tr
     }
 }
 
-/* Rays from n on of those that may meet their cells. */
-SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
-                                             const kernel_local_queue *q, int n)
+SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi words)
 {
-    const int left = b->met.count - n;
-    const vm all = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    kernel_local_pairs p;
-    kernel_local_seen seen;
-    kernel_hex_crossed crossed;
-    vf end, near, far;
-    kernel_local_rays_of(&p.rays, &t->tile, kernel_bytes(b->met.pixel + n), kernel_bytes(b->met.lane + n));
-    kernel_local_see(&b->faces, &p.rays, &seen);
-    kernel_local_find_faces(&seen, all, &crossed);
-    vm alone = crossed.alone;
-    p.active = crossed.two;
-    if (vm_any(p.active)) {
-        kernel_local_cross(&b->faces, &seen, p.rays.lane, &crossed, p.ends);
-        vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
-        vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
-        p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
-        const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
-        kernel_local_deviations_of(&b->lanes.cells, &b->nonlinear, p.rays.lane, p.active, p.ends, &p.off_chord);
-        const vm odd = vm_and(p.active, vm_or(vm_or(cut, p.off_chord.has_diverged), kernel_local_count(t, b, &p)));
-        p.active = vm_andnot(p.active, odd);
-        alone = vm_or(alone, odd);
-        kernel_local_emit(b, &p);
-    }
-    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
+    list->count += vf_compress(list->words + list->count, rays, vf_from_bits(words));
 }
 
-/* Of the rays that wait, those that may meet their cells in the window. */
+/* The rays of a list from n on; returns the lanes that have one. */
+SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
+                                      kernel_local_rays *rays)
+{
+    const int left = list->count - n;
+    const vm all = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
+    *words = vi_select(all, vi_from_bits(vf_load(list->words + n)), vi_set(0));
+    kernel_local_rays_of(rays, tile, *words, *words >> KERNEL_LOCAL_CELL);
+    return all;
+}
+
+/* Lists those of a vector of rays that cross two faces of their cells. */
+SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_stretches *b,
+                                             const kernel_local_queue *q, int type, int n)
+{
+    kernel_local_rays rays;
+    kernel_local_seen seen;
+    kernel_hex_crossed crossed;
+    vi words;
+    const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
+    kernel_local_see(&b->faces, &rays, type, &seen);
+    kernel_local_find_faces(&seen, all, type, &crossed);
+    const vm on_quad = kernel_hex_on_quad(type, 0, crossed.first);
+    words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
+    kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
+    if (type != GRID_HEX) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
+    if (__builtin_expect(vm_any(crossed.alone), 0)) kernel_local_segments_alone(t, b, q, &rays, vm_bits(crossed.alone));
+}
+
+/* The segments of rays from n on that cross two faces. */
+SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
+                                             const kernel_local_queue *q, const kernel_local_list *list, int type,
+                                             int n)
+{
+    kernel_local_pairs p;
+    kernel_local_seen seen;
+    vi words;
+    vf end, near, far;
+    p.active = kernel_local_list_take(list, &t->tile, n, &words, &p.rays);
+    const kernel_hex_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
+                                        words >> (KERNEL_LOCAL_FACES + 3) & 7};
+    kernel_local_see(&b->faces, &p.rays, type, &seen);
+    kernel_local_cross(&b->faces, &seen, p.rays.lane, &crossed, type, p.ends);
+    vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
+    vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
+    p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
+    const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
+    kernel_local_deviations_of(&b->lanes.cells, &b->nonlinear, p.rays.lane, p.active, p.ends, type, &p.off_chord);
+    const vm odd = vm_and(p.active, vm_or(vm_or(cut, p.off_chord.has_diverged), kernel_local_count(t, b, &p)));
+    p.active = vm_andnot(p.active, odd);
+    kernel_local_emit(b, &p);
+    if (__builtin_expect(vm_any(odd), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(odd));
+}
+
+/* Lists those of the rays from n on that may meet their cells in the window. */
 SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
 {
     const int left = b->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
+    const vi pixel = kernel_bytes(b->rays.pixel + n), lane = kernel_bytes(b->rays.lane + n);
     kernel_local_rays rays;
     vf near, far, begin, end;
-    kernel_local_rays_of(&rays, &t->tile, kernel_bytes(b->rays.pixel + n), kernel_bytes(b->rays.lane + n));
+    kernel_local_rays_of(&rays, &t->tile, pixel, lane);
     const vf depth = kernel_local_take(b->lanes.cells.origin[2], rays.lane);
     kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
-    for (unsigned bits = vm_bits(vm_and(active, meets)); bits; bits &= bits - 1)
-        kernel_hex_ray_add(&b->met, &b->rays, n + __builtin_ctz(bits));
+    kernel_local_list_add(&b->met, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
+}
+
+SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_stretches *b, const kernel_local_queue *q,
+                                           int type)
+{
+    for (int i = 0; i < 2; i++) b->crossed[i].count = 0;
+    for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, q, type, n);
+    for (int i = 0; i < 2; i++)
+        for (int n = 0; n < b->crossed[i].count; n += SIMD_WIDTH)
+            kernel_local_segments_lanes(t, b, q, &b->crossed[i], type, n);
+}
+
+static __attribute__((noinline)) void kernel_local_segments_hexes(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                  const kernel_local_queue *q)
+{
+    kernel_local_segments_met(t, b, q, GRID_HEX);
+}
+
+static __attribute__((noinline)) void kernel_local_segments_wedges(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                   const kernel_local_queue *q)
+{
+    kernel_local_segments_met(t, b, q, GRID_WEDGE);
+}
+
+static __attribute__((noinline)) void kernel_local_segments_pyramids(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                     const kernel_local_queue *q)
+{
+    kernel_local_segments_met(t, b, q, GRID_PYRAMID);
 }
 
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                 const kernel_local_queue *q)
+                                                                 const kernel_local_queue *q, int type)
 {
     kernel_hex_rays_close(&b->rays);
     b->met.count = 0;
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
-    kernel_hex_rays_close(&b->met);
-    for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_lanes(t, b, q, n);
+    if (type == GRID_HEX)
+        kernel_local_segments_hexes(t, b, q);
+    else if (type == GRID_WEDGE)
+        kernel_local_segments_wedges(t, b, q);
+    else
+        kernel_local_segments_pyramids(t, b, q);
     b->rays.count = 0;
 }
 
 /* ---- batches ---- */
 
 /* Places the queue's cells; returns those that show, and in lanes those of them that are for lanes. */
-static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                      unsigned all, unsigned *lanes)
+SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, kernel_local_stretches *b,
+                                                    unsigned *lanes, int type)
 {
     vf lists[5][8];
-    kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, 8, lists[4]);
-    const unsigned showing = kernel_local_place(t, &b->lanes, GRID_HEX, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes) & all;
+    kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, grid_type_vertices(type), lists[4]);
+    const unsigned showing = kernel_local_place(t, &b->lanes, type, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes);
+    kernel_local_faces_of(lists, type, &b->faces);
+    kernel_local_nonlinear_of(&b->lanes.cells, type, &b->nonlinear);
+    return showing;
+}
+
+static __attribute__((noinline)) unsigned kernel_local_segments_place(const kernel_tile_trace *t,
+                                                                      kernel_local_stretches *b, int type, unsigned all,
+                                                                      unsigned *lanes)
+{
+    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes) & all;
     *lanes &= all;
-    kernel_local_faces_of(lists, &b->faces);
-    kernel_local_nonlinear_of(&b->lanes.cells, &b->nonlinear);
     for (unsigned more = *lanes; more; more &= more - 1) {
         const int n = __builtin_ctz(more);
-        if (!kernel_local_bound(&b->state, b, n)) *lanes &= ~(1u << n);
+        if (!kernel_local_bound(&b->state, b, type, n)) *lanes &= ~(1u << n);
     }
     return showing;
 }
@@ -447,23 +535,25 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
     }
 }
 
-/* The cells that wait. */
-static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b)
+/* The cells that wait in a queue. */
+static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                int queue)
 {
-    kernel_local_queue *q = &b->lanes.queues[0];
+    static const int types[KERNEL_LOCAL_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
+    kernel_local_queue *q = &b->lanes.queues[queue];
     unsigned placed;
     if (!q->count) return;
     const unsigned all = kernel_local_fetch_all(t, &b->lanes, q);
-    const unsigned showing = kernel_local_segments_place(t, b, all, &placed);
+    const unsigned showing = kernel_local_segments_place(t, b, types[queue], all, &placed);
     b->rays.count = 0;
     for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
         kernel_hex_rays_of(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_segments_cast(t, b, q);
+        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_segments_cast(t, b, q, types[queue]);
     }
-    kernel_local_segments_cast(t, b, q);
+    kernel_local_segments_cast(t, b, q, types[queue]);
     for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         kernel_tile_meet_cell(t, 0, b->lanes.part, q->cell[n], false, q->blocks[n], b->lanes.take);
@@ -472,15 +562,22 @@ static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trac
     kernel_local_segments_shorten(t, b);
 }
 
-/* A cell of a type that fits waits. */
-SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_stretches *b, int part, uint32_t cell,
-                                            unsigned blocks, unsigned box)
+SIMD_INLINE void kernel_local_segments_end(kernel_tile_trace *t, kernel_local_stretches *b)
 {
+    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++) kernel_local_segments_run(t, b, i);
+}
+
+/* A cell of a type that fits waits. */
+SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_stretches *b, int part, int type,
+                                            uint32_t cell, unsigned blocks, unsigned box)
+{
+    const int queue = kernel_local_queue_of(type);
     if (part != b->lanes.part) {
-        kernel_local_segments_run(t, b);
+        kernel_local_segments_end(t, b);
         b->lanes.part = part;
     }
-    if (kernel_local_push(t, &b->lanes, &b->lanes.queues[0], cell, blocks, box)) kernel_local_segments_run(t, b);
+    if (kernel_local_push(t, &b->lanes, &b->lanes.queues[queue], cell, blocks, box))
+        kernel_local_segments_run(t, b, queue);
 }
 
 #endif

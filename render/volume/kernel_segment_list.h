@@ -392,7 +392,8 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
 /* Into how many subintervals, as a real number, to cut the stretch, and how far its field is off the line between the
  * values at its ends. By error: the deviation from the line at a quarter, the half and three
  * quarters, half as much again (the three see 7/8 of a cubic's), goes as the square of a subinterval, and its mean is
- * two thirds of it. Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
+ * two thirds of it. A fourth place, at an eighth, tells of fields in hexes that are on the line at the other three.
+ * Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
  * / (1 + depth), with the opacity as the least of the extinction. Where a step of the opacity is among the values no
  * number is enough, nor where a steep ramp is among them and asks for too many, nor where a narrow one is in which the
  * values' rounding alone would take an eighth of what is allowed. */
@@ -402,11 +403,11 @@ SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *
     const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
     vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
-    for (int quarter = 1; quarter < 4; quarter++) {
-        const float share = 0.25f * (float)quarter;
+    for (int eighth = 1; eighth < 8; eighth += 1 + (eighth > 1)) {
+        const float share = 0.125f * (float)eighth;
         const vf v = kernel_value_at(p, span->map, span->interval, rays, t0 + length * share);
         off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
-        opacity += kernel_opacity(transfer, v);
+        if (eighth > 1) opacity += kernel_opacity(transfer, v);
     }
     const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));

@@ -78,7 +78,7 @@ static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell,
     const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
     if (!kernel_local_segments_fit(t->frame, type)) return false;
     kernel_local_stretches *b = &t->thread->tile_segments->stretches;
-    kernel_local_segments_wait(t, b, part, cell, blocks, kernel_local_box(blocks, box));
+    kernel_local_segments_wait(t, b, part, type, cell, blocks, kernel_local_box(blocks, box));
     return true;
 }
 
@@ -146,7 +146,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         kernel_visit_open(t, &kernel_segments_visitor, blocks);
     else
         kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
-    kernel_local_segments_run(t, &s->stretches);
+    kernel_local_segments_end(t, &s->stretches);
 }
 
 /* Learn from the window how deep the next one is to be: so that some ray has three quarters of its room filled. */
