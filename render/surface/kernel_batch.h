@@ -22,6 +22,7 @@
 #include "kernel_placed.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
+#include "kernel_tet_rays.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -121,120 +122,28 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, i
 
 /* ---- lanes are pixels ---- */
 
-/* Rays with their cells' numbers. */
-typedef struct kernel_batch_rays {
-    vm active;
-    vi lane, column, row; /* in the batch; of the tile */
-    vf far;
-    vf u, v, x[4], y[4], z[4], f[4];
-    int32_t at[SIMD_WIDTH]; /* packet of the tile * SIMD_WIDTH + lane in it */
-} kernel_batch_rays;
-
-SIMD_INLINE void kernel_batch_project(const kernel_batch *b, const kernel_tile *tile, const kernel_batch_rays *r,
-                                      vf x[4], vf y[4])
+/* kernel_tet_surface() on the rays: those that hit, and where. */
+SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, float t_near, const kernel_tet_rays *r,
+                                vf far, vf *out)
 {
-    const vf origin_x = kernel_batch_of_tile(tile->origin_x, r->column);
-    const vf origin_y = kernel_batch_of_tile(tile->origin_y, r->row);
-    const vf slope_x = kernel_batch_of_tile(tile->slope_x, r->column);
-    const vf slope_y = kernel_batch_of_tile(tile->slope_y, r->row);
-    for (int i = 0; i < 4; i++) {
-        const vf z = vf_permute(b->tets.at[2][i], r->lane);
-        x[i] = (vf_permute(b->tets.at[0][i], r->lane) - origin_x) - slope_x * z;
-        y[i] = (vf_permute(b->tets.at[1][i], r->lane) - origin_y) - slope_y * z;
-    }
-}
-
-/* kernel_tet_edges_exactly(). */
-static __attribute__((noinline)) void kernel_batch_edges_exactly(const kernel_batch *b, const kernel_tile *tile,
-                                                                 const kernel_batch_rays *r, vf e[KERNEL_TET_EDGES])
-{
-    vf x[4], y[4];
-    kernel_batch_project(b, tile, r, x, y);
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const vm doubt = vm_and(r->active, vm_not(vf_lt(vf_permute(b->tets.bound[n], r->lane), vf_abs(e[n]))));
-        if (vm_any(doubt)) e[n] = vf_select(doubt, kernel_edge_between(x[i], y[i], x[j], y[j]), e[n]);
-    }
-}
-
-SIMD_INLINE kernel_sums kernel_batch_sums(const kernel_batch_rays *r, const signed char face[3], vf ij, vf jk, vf ik)
-{
-    const vf *z = r->z, *f = r->f;
-    const int i = face[0], j = face[1], k = face[2];
-    return (kernel_sums){.depth = vf_muladd(ij, z[k], vf_muladd(-ik, z[j], jk * z[i])),
-                         .value = vf_muladd(ij, f[k], vf_muladd(-ik, f[j], jk * f[i])),
-                         .weight = kernel_weight(ij, jk, ik)};
-}
-
-/* kernel_tet_mend(). */
-static __attribute__((noinline)) void kernel_batch_mend(const kernel_batch *b, const kernel_tile *tile,
-                                                        const kernel_batch_rays *r, const vf e[KERNEL_TET_EDGES],
-                                                        const vm weak[4], kernel_sums sums[4])
-{
-    vf x[4], y[4];
-    kernel_batch_project(b, tile, r, x, y);
-    for (int n = 0; n < 4; n++) {
-        if (!vm_any(weak[n])) continue;
-        const signed char *face = kernel_tet_face[n];
-        const int i = face[0], j = face[1], k = face[2];
-        const vf ij = vf_select(weak[n], kernel_edge_between(x[i], y[i], x[j], y[j]), e[face[3]]);
-        const vf jk = vf_select(weak[n], kernel_edge_between(x[j], y[j], x[k], y[k]), e[face[4]]);
-        const vf ik = vf_select(weak[n], kernel_edge_between(x[i], y[i], x[k], y[k]), e[face[5]]);
-        sums[n] = kernel_batch_sums(r, face, ij, jk, ik);
-    }
-}
-
-/* kernel_tet_interval() and kernel_tet_surface(): rays that hit, and where. */
-SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, float t_near, kernel_batch_rays *r,
-                                vf *out)
-{
-    vf e[KERNEL_TET_EDGES], least = vf_set(INFINITY);
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        e[n] = vf_muladd(vf_permute(b->tets.cv[n], r->lane), r->v,
-                         vf_muladd(vf_permute(b->tets.cu[n], r->lane), r->u, vf_permute(b->tets.c[n], r->lane)));
-        least = vf_min(vf_abs(e[n]), least);
-    }
-    const vm sure = vf_lt(vf_permute(b->tets.doubt, r->lane), least);
-    if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_batch_edges_exactly(b, tile, r, e);
-    vm hit[4], weak[4], any_hit = vm_none(), any_weak = vm_none();
-    for (int n = 0; n < 4; n++) {
-        const signed char *face = kernel_tet_face[n];
-        hit[n] = kernel_inside(r->active, e[face[3]], e[face[4]], e[face[5]]);
-        any_hit = vm_or(any_hit, hit[n]);
-    }
-    if (!vm_any(any_hit)) return any_hit;
-    kernel_sums sums[4];
-    for (int i = 0; i < 4; i++) {
-        r->z[i] = vf_permute(b->tets.at[2][i], r->lane);
-        r->f[i] = vf_permute(b->tets.f[i], r->lane);
-    }
-    for (int n = 0; n < 4; n++) {
-        const signed char *face = kernel_tet_face[n];
-        sums[n] = kernel_batch_sums(r, face, e[face[3]], e[face[4]], e[face[5]]);
-        weak[n] = vm_and(hit[n], vf_lt(vf_abs(sums[n].weight), vf_permute(b->tets.least[n], r->lane)));
-        any_weak = vm_or(any_weak, weak[n]);
-    }
-    if (__builtin_expect(vm_any(any_weak), 0)) kernel_batch_mend(b, tile, r, e, weak, sums);
-    const kernel_ends ends = kernel_tet_choose(hit, sums);
-    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
-    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
-    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
-    const vm swap = vf_lt(t_b, t_a);
-    const vf t_in = vf_select(swap, t_b, t_a), t_out = vf_select(swap, t_a, t_b);
-    const vf v_in = vf_select(swap, v_b, v_a);
-    const vf v_out = kernel_end_in_cell(v_in, vf_select(swap, v_a, v_b), b->is_of_faces);
-    const vm near = vm_and(any_hit, vm_and(vf_le(t_in, r->far), vf_le(vf_set(t_near), t_out)));
-    const vm change = vm_and(near, vm_xor(vf_lt(v_in, vf_set(0)), vf_lt(v_out, vf_set(0))));
+    kernel_interval i;
+    kernel_tet_rays_interval(&b->tets, tile, r, &i);
+    if (!vm_any(i.mask)) return i.mask;
+    const vf v_out = kernel_end_in_cell(i.v_in, i.v_out, b->is_of_faces);
+    const vm near = vm_and(i.mask, vm_and(vf_le(i.t_in, far), vf_le(vf_set(t_near), i.t_out)));
+    const vm change = vm_and(near, vm_xor(vf_lt(i.v_in, vf_set(0)), vf_lt(v_out, vf_set(0))));
     if (!vm_any(change)) return change;
-    *out = kernel_secant(t_in, v_in, t_out, v_out);
-    return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, r->far)));
+    *out = kernel_secant(i.t_in, i.v_in, i.t_out, v_out);
+    return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, far)));
 }
 
 /* Returns the blocks in which something is nearer. */
-static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const kernel_batch_rays *r,
-                                    const uint8_t *lanes, unsigned hit, vf depth)
+static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
+                                    unsigned hit, vf depth)
 {
     unsigned blocks = 0;
+    int32_t at[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
     if (!b->has_normals) kernel_batch_normals(b, t->frame);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
@@ -245,35 +154,26 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const
                                     .depth = depth[i],
                                     .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]},
                                     .colour = {colour[0], colour[1], colour[2]}};
-        blocks |= kernel_ray_accept(t, r->at[i], &one);
+        blocks |= kernel_ray_accept(t, at[i], &one);
     }
     return blocks;
 }
 
 SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 {
-    const kernel_tile *tile = &t->tile;
-    const bool flat = t->frame->job->camera.is_orthographic;
     unsigned nearer = 0;
     for (int first = 0; first < b->ray_count; first += SIMD_WIDTH) {
         const int left = b->ray_count - first;
-        kernel_batch_rays r;
+        kernel_tet_rays r;
         vf depth;
         r.active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-        r.lane = kernel_bytes(b->lane + first) & (SIMD_WIDTH - 1);
-        const vi pixel = kernel_bytes(b->pixel + first);
-        r.column = pixel & (KERNEL_TILE - 1);
-        r.row = pixel >> 4;
+        kernel_tet_rays_of(&r, t->frame, &t->tile, kernel_bytes(b->pixel + first), kernel_bytes(b->lane + first));
         const vi at = kernel_batch_at(r.column, r.row);
-        r.far = kernel_batch_far(t, at);
-        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->near), r.lane), r.far));
+        const vf far = kernel_batch_far(t, at);
+        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->near), r.lane), far));
         if (!vm_any(r.active)) continue;
-        r.u = kernel_batch_of_tile(flat ? tile->origin_x : tile->slope_x, r.column);
-        r.v = kernel_batch_of_tile(flat ? tile->origin_y : tile->slope_y, r.row);
-        const vm hit = kernel_batch_hit(b, tile, t->t_near, &r, &depth);
-        if (!vm_any(hit)) continue;
-        memcpy(r.at, &at, sizeof r.at);
-        nearer |= kernel_batch_accept(t, b, &r, b->lane + first, vm_bits(hit), depth);
+        const vm hit = kernel_batch_hit(b, &t->tile, t->t_near, &r, far, &depth);
+        if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, at, b->lane + first, vm_bits(hit), depth);
     }
     for (; nearer; nearer &= nearer - 1) {
         const int block = __builtin_ctz(nearer);
