@@ -52,6 +52,12 @@ static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t coun
     return c;
 }
 
+/* Do the mesh's indices have room in lanes? */
+SIMD_INLINE bool kernel_arrays_fit(const grid *g)
+{
+    return g->vertex_count < INT32_MAX && g->cell_count < INT32_MAX;
+}
+
 static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const grid_field *field)
 {
     const int64_t count = field->is_cell_centred ? g->cell_count : g->vertex_count;
@@ -59,7 +65,7 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     memset(p, 0, sizeof *p);
     p->cells = g;
     p->type = g->cell_types ? GRID_NO_TYPE : g->cell_type;
-    p->has_lanes = g->vertex_count < INT32_MAX && g->cell_count < INT32_MAX;
+    p->has_lanes = kernel_arrays_fit(g);
     p->own = field->own;
     p->is_by_cell = field->is_cell_centred;
     if (field->component >= 0) values.data += field->component * field->component_stride;
@@ -138,10 +144,17 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
             for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex[i][n] * p->asked[k].stride);
 }
 
-/* The vertices of a tet into a lane, of a mesh that has no active records. */
-SIMD_INLINE void kernel_arrays_tet(const kernel_arrays *p, uint32_t cell, int32_t (*out)[SIMD_WIDTH], int lane)
+/* The vertices of a cell, each room after the one before, and what they have on its way from memory. */
+SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out, int room)
 {
-    kernel_arrays_indices(p, &cell, 1, 4, out, lane);
+    const grid_array c = p->cells->connectivity;
+    const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
+    for (int i = 0; i < vertices; i++, at += c.stride) {
+        const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
+        const int32_t vertex = (int32_t)(index - c.base);
+        for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex * p->asked[k].stride);
+        out[i * room] = vertex;
+    }
 }
 
 /* The vertices of cells of one type into lanes from the given one on, and what they have on its way from memory. Active

@@ -8,11 +8,11 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_interest.h"
 #include "kernel_local.h"
 #include "kernel_placed_hexes.h"
-#include "kernel_prefetch.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -21,19 +21,22 @@
 
 enum {
     KERNEL_LOCAL_TYPES = 3, /* hexes, wedges, pyramids */
-    KERNEL_LOCAL_AHEAD = 6  /* so many cells queue between a cell's indices and its vertices on their way from memory */
+    KERNEL_LOCAL_AHEAD = 8, /* so many cells wait for their indices from memory, and as many for their numbers */
+    KERNEL_LOCAL_ROOM = SIMD_WIDTH + 2 * KERNEL_LOCAL_AHEAD
 };
 
-/* Cells of one type that wait. */
+/* Cells of one type that wait. Those of a vector are taken from the front when the room is full. */
 typedef struct kernel_local_queue {
-    int count;
-    uint32_t cell[SIMD_WIDTH];
-    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
+    int count, known; /* the first known have their vertices */
+    uint32_t cell[KERNEL_LOCAL_ROOM];
+    uint16_t blocks[KERNEL_LOCAL_ROOM], box[KERNEL_LOCAL_ROOM];
+    int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
 typedef struct kernel_local_lanes {
     kernel_tile_take *take; /* what is done with cells that are not for lanes */
     int volume, part;
+    kernel_arrays arrays; /* the part's */
     kernel_local_queue queues[KERNEL_LOCAL_TYPES];
     double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH]; /* as the caller has them */
     kernel_local_cells cells;
@@ -46,7 +49,15 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, ker
     l->take = take;
     l->volume = volume;
     l->part = -1;
-    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++) l->queues[i].count = 0;
+    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
+}
+
+/* Cells that wait from now on are of this part: none of another waits. */
+SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
+{
+    l->part = part;
+    kernel_arrays_begin(&l->arrays, t->frame->job->parts[part].cells,
+                        &t->frame->job->volumes[l->volume].field.fields[part]);
 }
 
 SIMD_INLINE int kernel_local_queue_of(int type)
@@ -56,44 +67,24 @@ SIMD_INLINE int kernel_local_queue_of(int type)
 
 /* ---- cells ---- */
 
-/* An array's numbers at the vertices, into a lane. */
-SIMD_INLINE void kernel_local_column(const grid_array *a, const int64_t *vertices, int count, double (*out)[SIMD_WIDTH],
-                                     int lane)
+/* Fetches the first cells, of so many vertices. */
+SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_queue *q, int vertices)
 {
-    const char *data = a->data;
-    if (a->is_integer)
-        for (int i = 0; i < count; i++) out[i][lane] = grid_array_number(a, vertices[i]);
-    else if (a->is_wide)
-        for (int i = 0; i < count; i++) out[i][lane] = *(const double *)(const void *)(data + vertices[i] * a->stride);
-    else
-        for (int i = 0; i < count; i++)
-            out[i][lane] = (double)*(const float *)(const void *)(data + vertices[i] * a->stride);
-}
-
-/* The field at them; NaN where the cell is not drawn. */
-SIMD_INLINE void kernel_local_scalars(const grid_field *field, uint32_t cell, const int64_t *vertices, int count,
-                                      double (*out)[SIMD_WIDTH], int lane)
-{
-    double values[GRID_MAX_CELL_VERTICES] = {0};
-    if (field->component >= 0 && !field->is_cell_centred && !field->own) {
-        grid_array a = field->values;
-        a.data += field->component * field->component_stride;
-        kernel_local_column(&a, vertices, count, out, lane);
-        return;
+    const kernel_arrays *p = &l->arrays;
+    const kernel_whole none = kernel_whole_set(NAN);
+    const vm drawn = vm_from_bits(kernel_arrays_drawn(p, q->cell, (1u << SIMD_WIDTH) - 1));
+    for (int i = 0; i < vertices; i++) {
+        vi vertex;
+        memcpy(&vertex, q->vertex[i], sizeof vertex);
+        for (int a = 0; a < 3; a++) {
+            const kernel_whole place = kernel_numbers_take(&p->coordinates[a], vertex);
+            memcpy(l->world[a][i], &place, sizeof place);
+        }
+        if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, q->cell, sizeof vertex);
+        kernel_whole value = kernel_numbers_take(&p->values, vertex);
+        if (__builtin_expect(p->own != NULL, 0)) value = kernel_whole_select(drawn, &value, &none);
+        memcpy(l->scalars[i], &value, sizeof value);
     }
-    const bool is_finite = grid_cell_values(field, cell, vertices, count, values);
-    for (int i = 0; i < count; i++) out[i][lane] = is_finite ? values[i] : (double)NAN;
-}
-
-/* A cell into the lane, from arrays of any layout. */
-SIMD_INLINE void kernel_local_fetch(const kernel_tile_trace *t, kernel_local_lanes *l, uint32_t cell, int lane)
-{
-    const grid *g = t->frame->job->parts[l->part].cells;
-    const grid_field *field = &t->frame->job->volumes[l->volume].field.fields[l->part];
-    int64_t vertices[GRID_MAX_CELL_VERTICES] = {0};
-    const int count = grid_cell_vertices(g, cell, vertices);
-    for (int a = 0; a < 3; a++) kernel_local_column(&g->coordinates[a], vertices, count, l->world[a], lane);
-    kernel_local_scalars(field, cell, vertices, count, l->scalars, lane);
 }
 
 /* The field in the transfer function's domain, as kernel_cell_domain() has it; returns the lanes that show. */
@@ -182,55 +173,55 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
     return vm_bits(shows);
 }
 
-/* Asks memory for the vertices of queued cells first .. end - 1, whose indices have been asked for before. */
-SIMD_INLINE void kernel_local_prefetch(const kernel_tile_trace *t, const kernel_local_lanes *l,
-                                       const kernel_local_queue *q, int first, int end)
+/* Reads the vertices of queued cells up to an end. */
+SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_queue *q, int end, int type)
 {
-    const grid *g = t->frame->job->parts[l->part].cells;
-    const grid_field *field = &t->frame->job->volumes[l->volume].field.fields[l->part];
-    for (int n = first < 0 ? 0 : first; n < end; n++) kernel_prefetch_vertices(g, field, q->cell[n]);
+    for (; q->known < end; q->known++)
+        kernel_arrays_vertices(&l->arrays, q->cell[q->known], grid_type_vertices(type), q->vertex[0] + q->known,
+                               KERNEL_LOCAL_ROOM);
 }
 
-/* The queue's cells are fetched; returns their lanes. */
-SIMD_INLINE unsigned kernel_local_fetch_all(const kernel_tile_trace *t, kernel_local_lanes *l,
-                                            const kernel_local_queue *q)
+/* Fetches the first cells of the queue, as many as there are lanes; returns the lanes that have one. Others get the
+ * first cell. */
+SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
-    kernel_local_prefetch(t, l, q, q->count - KERNEL_LOCAL_AHEAD, q->count);
-    for (int n = 0; n < q->count; n++) kernel_local_fetch(t, l, q->cell[n], n);
+    const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
+    kernel_local_learn(l, q, count, type);
+    for (int n = count; n < SIMD_WIDTH; n++) {
+        q->cell[n] = q->cell[0];
+        for (int i = 0; i < vertices; i++) q->vertex[i][n] = q->vertex[i][0];
+    }
+    kernel_local_fetch(l, q, vertices);
     l->alone = -1;
-    return (1u << q->count) - 1;
+    return (1u << count) - 1;
 }
 
-/* Queues a cell; returns whether the queue is full. */
-SIMD_INLINE bool kernel_local_push(const kernel_tile_trace *t, const kernel_local_lanes *l, kernel_local_queue *q,
-                                   uint32_t cell, unsigned blocks, unsigned box)
+/* Takes these cells out of the queue. */
+SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
+{
+    enum { LEFT = KERNEL_LOCAL_ROOM - SIMD_WIDTH };
+    q->count = q->count > SIMD_WIDTH ? q->count - SIMD_WIDTH : 0;
+    q->known = q->known > SIMD_WIDTH ? q->known - SIMD_WIDTH : 0;
+    if (!q->count) return;
+    memmove(q->cell, q->cell + SIMD_WIDTH, LEFT * sizeof *q->cell);
+    memmove(q->blocks, q->blocks + SIMD_WIDTH, LEFT * sizeof *q->blocks);
+    memmove(q->box, q->box + SIMD_WIDTH, LEFT * sizeof *q->box);
+    for (int i = 0; i < 8; i++) memmove(q->vertex[i], q->vertex[i] + SIMD_WIDTH, LEFT * sizeof *q->vertex[i]);
+}
+
+/* Queues a cell, whose indices have been prefetched; returns whether the queue is full. */
+SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_queue *q, uint32_t cell, unsigned blocks,
+                                   unsigned box, int type)
 {
     const int n = q->count++;
     q->cell[n] = cell;
     q->blocks[n] = (uint16_t)blocks;
     q->box[n] = (uint16_t)box;
-    kernel_local_prefetch(t, l, q, n - KERNEL_LOCAL_AHEAD, n - KERNEL_LOCAL_AHEAD + 1);
-    return q->count == SIMD_WIDTH;
+    kernel_local_learn(l, q, q->count - KERNEL_LOCAL_AHEAD, type);
+    return q->count == KERNEL_LOCAL_ROOM;
 }
 
 /* ---- pixels ---- */
-
-/* Returns the box of pixels, ends included, as a candidate has it (kernel_types.h); that of the blocks where box is
- * negative. */
-SIMD_INLINE unsigned kernel_local_box(unsigned blocks, int box)
-{
-    if (box >= 0) return (unsigned)box;
-    int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
-    for (; blocks; blocks &= blocks - 1) {
-        const int x = __builtin_ctz(blocks) % KERNEL_BLOCKS_ACROSS, y = __builtin_ctz(blocks) / KERNEL_BLOCKS_ACROSS;
-        x0 = x < x0 ? x : x0;
-        x1 = x > x1 ? x : x1;
-        y0 = y < y0 ? y : y0;
-        y1 = y > y1 ? y : y1;
-    }
-    return (unsigned)(x0 * KERNEL_BLOCK) | (unsigned)(x1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 4 |
-           (unsigned)(y0 * KERNEL_BLOCK) << 8 | (unsigned)(y1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 12;
-}
 
 /* From where to where the rays may be inside of their cells, after depth. */
 SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_local_rays *rays, vf depth,

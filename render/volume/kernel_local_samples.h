@@ -218,14 +218,18 @@ static __attribute__((noinline)) unsigned kernel_local_place_any(kernel_tile_tra
     return kernel_local_place(t, &b->lanes, GRID_PYRAMID, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
-/* The cells that wait in a queue. */
+static __attribute__((noinline)) unsigned kernel_local_fetch_any(kernel_local_batch *b, kernel_local_queue *q, int type)
+{
+    return KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
+}
+
+/* The first cells that wait in a queue. */
 static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_batch *b, int queue)
 {
     static const int types[KERNEL_LOCAL_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     kernel_local_queue *q = &b->lanes.queues[queue];
     unsigned placed;
-    if (!q->count) return;
-    const unsigned all = kernel_local_fetch_all(t, &b->lanes, q);
+    const unsigned all = kernel_local_fetch_any(b, q, types[queue]);
     const unsigned showing = kernel_local_place_any(t, b, types[queue], &placed) & all;
     placed &= all;
     b->sample_count = b->rays.count = 0;
@@ -242,12 +246,13 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
         const int n = __builtin_ctz(lanes);
         kernel_tile_meet_cell(t, b->lanes.volume, b->lanes.part, q->cell[n], true, q->blocks[n], b->lanes.take);
     }
-    q->count = 0;
+    kernel_local_pop(q);
 }
 
 SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_batch *b)
 {
-    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++) kernel_local_run(t, b, i);
+    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++)
+        while (b->lanes.queues[i].count) kernel_local_run(t, b, i);
 }
 
 /* A cell of a type that fits waits. */
@@ -258,9 +263,9 @@ SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_batch *b, 
     kernel_local_queue *q = &b->lanes.queues[queue];
     if (part != b->lanes.part) {
         kernel_local_end(t, b);
-        b->lanes.part = part;
+        kernel_local_lanes_turn(t, &b->lanes, part);
     }
-    if (kernel_local_push(t, &b->lanes, q, cell, blocks, box)) kernel_local_run(t, b, queue);
+    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes, q, cell, blocks, box)) kernel_local_run(t, b, queue);
 }
 
 #endif

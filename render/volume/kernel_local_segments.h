@@ -535,48 +535,49 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
     }
 }
 
-/* The cells that wait in a queue. */
+/* Traces the first cells of a queue. */
 static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                 int queue)
 {
     static const int types[KERNEL_LOCAL_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
+    const int type = types[queue];
     kernel_local_queue *q = &b->lanes.queues[queue];
     unsigned placed;
-    if (!q->count) return;
-    const unsigned all = kernel_local_fetch_all(t, &b->lanes, q);
-    const unsigned showing = kernel_local_segments_place(t, b, types[queue], all, &placed);
+    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
+    const unsigned showing = kernel_local_segments_place(t, b, type, all, &placed);
     b->rays.count = 0;
     for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
         kernel_hex_rays_of(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_segments_cast(t, b, q, types[queue]);
+        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_segments_cast(t, b, q, type);
     }
-    kernel_local_segments_cast(t, b, q, types[queue]);
+    kernel_local_segments_cast(t, b, q, type);
     for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         kernel_tile_meet_cell(t, 0, b->lanes.part, q->cell[n], false, q->blocks[n], b->lanes.take);
     }
-    q->count = 0;
+    kernel_local_pop(q);
     kernel_local_segments_shorten(t, b);
 }
 
 SIMD_INLINE void kernel_local_segments_end(kernel_tile_trace *t, kernel_local_stretches *b)
 {
-    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++) kernel_local_segments_run(t, b, i);
+    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++)
+        while (b->lanes.queues[i].count) kernel_local_segments_run(t, b, i);
 }
 
-/* A cell of a type that fits waits. */
+/* Queues a cell of a type that fits. */
 SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_stretches *b, int part, int type,
                                             uint32_t cell, unsigned blocks, unsigned box)
 {
     const int queue = kernel_local_queue_of(type);
     if (part != b->lanes.part) {
         kernel_local_segments_end(t, b);
-        b->lanes.part = part;
+        kernel_local_lanes_turn(t, &b->lanes, part);
     }
-    if (kernel_local_push(t, &b->lanes, &b->lanes.queues[queue], cell, blocks, box))
+    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes, &b->lanes.queues[queue], cell, blocks, box))
         kernel_local_segments_run(t, b, queue);
 }
 

@@ -10,6 +10,7 @@
 #define RENDER_KERNEL_TILE_CELLS_H
 
 #include <math.h>
+#include <string.h>
 
 #include "grid.h"
 #include "kernel_arrays.h"
@@ -30,7 +31,15 @@
 #include "render.h"
 #include "simd.h"
 
-enum { KERNEL_OPEN_PIECE = 16 };
+enum {
+    KERNEL_OPEN_PIECE = 16,
+    KERNEL_WAIT_AHEAD = 8, /* so many tets wait for their indices to come from memory, and as many for their numbers */
+    KERNEL_WAIT_ROOM = SIMD_WIDTH + 2 * KERNEL_WAIT_AHEAD
+};
+
+/* Takes those of the tets placed together, in the given lanes, that are better taken so than each alone. Returns the
+ * other lanes. */
+typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
 
 /* The tile's cells of a volume. The first open_count items begin before the last window's end and do not end before its
  * begin; next is the first item that is still to come. */
@@ -43,10 +52,13 @@ typedef struct kernel_tile_cells {
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
-    /* Tets that wait to be placed together, with the blocks that they may meet. */
-    int pending;
-    uint32_t wait_cell[SIMD_WIDTH], wait_blocks[SIMD_WIDTH];
-    int32_t wait_vertices[4][SIMD_WIDTH];
+    /* Tets that wait to be placed together, with the blocks and the box of pixels that they may meet. Those of a vector
+     * are taken from the front when the room is full. */
+    int pending, known; /* the first known have their vertices */
+    uint32_t wait_cell[KERNEL_WAIT_ROOM];
+    uint16_t wait_blocks[KERNEL_WAIT_ROOM], wait_box[KERNEL_WAIT_ROOM];
+    int32_t wait_vertices[4][KERNEL_WAIT_ROOM];
+    kernel_tile_take_tets *take_tets; /* NULL: each is taken alone */
 } kernel_tile_cells;
 
 /* Ready the fetched cell for rays of blocks, which are a pencil or are not; returns the blocks that it may show in. */
@@ -98,6 +110,25 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
 }
 
+enum { KERNEL_ALL_PIXELS = -1 };
+
+/* Returns the box of pixels, ends included, as a candidate has it (kernel_types.h); that of the blocks where box is
+ * KERNEL_ALL_PIXELS. */
+SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
+{
+    if (box >= 0) return (unsigned)box;
+    int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
+    for (; blocks; blocks &= blocks - 1) {
+        const int x = __builtin_ctz(blocks) % KERNEL_BLOCKS_ACROSS, y = __builtin_ctz(blocks) / KERNEL_BLOCKS_ACROSS;
+        x0 = x < x0 ? x : x0;
+        x1 = x > x1 ? x : x1;
+        y0 = y < y0 ? y : y0;
+        y1 = y > y1 ? y : y1;
+    }
+    return (unsigned)(x0 * KERNEL_BLOCK) | (unsigned)(x1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 4 |
+           (unsigned)(y0 * KERNEL_BLOCK) << 8 | (unsigned)(y1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 12;
+}
+
 /* ---- tets, as many at once as there are lanes ---- */
 
 /* kernel_cell_domain(). */
@@ -133,30 +164,72 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
-/* Places the pending tets and hands them to take. */
-static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                               kernel_tile_take *take)
+/* Reads the vertices of pending tets up to an end. */
+SIMD_INLINE void kernel_tile_learn_pending(kernel_tile_cells *cells, int end)
 {
-    const int count = cells->pending;
-    const bool is_double = t->frame->is_double;
-    if (!count) return;
+    for (; cells->known < end; cells->known++)
+        kernel_arrays_vertices(&cells->arrays, cells->wait_cell[cells->known], 4,
+                               cells->wait_vertices[0] + cells->known, KERNEL_WAIT_ROOM);
+}
+
+/* Places the first pending tets, as many as there are lanes; returns those that show and that the rays have not yet
+ * ended before. */
+SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
+{
     const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
+    int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
-    cells->pending = 0;
-    kernel_place_tets(&cells->placed, &cells->arrays, t->frame, &t->tile, cells->wait_vertices, count);
+    unsigned lanes = 0;
+    kernel_tile_learn_pending(cells, count);
+    for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->wait_vertices[i], sizeof vertices[i]);
+    kernel_place_tets(&cells->placed, &cells->arrays, t->frame, &t->tile, vertices, count);
     kernel_placed_domain(&cells->placed, transfer);
     unsigned candidates = kernel_placed_showing(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
     candidates = kernel_arrays_drawn(&cells->arrays, cells->wait_cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
-        unsigned blocks = cells->wait_blocks[n] & kernel_blocks_beyond(t, near[n]);
-        if (!blocks) continue;
+        cells->wait_blocks[n] &= (uint16_t)kernel_blocks_beyond(t, near[n]);
+        lanes |= (unsigned)(cells->wait_blocks[n] != 0) << n;
+    }
+    return lanes;
+}
+
+/* Moves the pending tets behind the first vector to the front. */
+SIMD_INLINE void kernel_tile_pop_pending(kernel_tile_cells *cells)
+{
+    enum { LEFT = KERNEL_WAIT_ROOM - SIMD_WIDTH };
+    cells->pending = cells->pending > SIMD_WIDTH ? cells->pending - SIMD_WIDTH : 0;
+    cells->known = cells->known > SIMD_WIDTH ? cells->known - SIMD_WIDTH : 0;
+    if (!cells->pending) return;
+    memmove(cells->wait_cell, cells->wait_cell + SIMD_WIDTH, LEFT * sizeof *cells->wait_cell);
+    memmove(cells->wait_blocks, cells->wait_blocks + SIMD_WIDTH, LEFT * sizeof *cells->wait_blocks);
+    memmove(cells->wait_box, cells->wait_box + SIMD_WIDTH, LEFT * sizeof *cells->wait_box);
+    for (int i = 0; i < 4; i++)
+        memmove(cells->wait_vertices[i], cells->wait_vertices[i] + SIMD_WIDTH, LEFT * sizeof *cells->wait_vertices[i]);
+}
+
+/* Places the first pending tets and hands them to take. */
+static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                            kernel_tile_take *take)
+{
+    const int count = cells->pending < SIMD_WIDTH ? cells->pending : SIMD_WIDTH;
+    const bool is_double = t->frame->is_double;
+    unsigned lanes = kernel_tile_place_pending(t, cells, count);
+    if (cells->take_tets && lanes) lanes = cells->take_tets(t, lanes);
+    for (; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
         kernel_placed_cell(&cells->placed, n, &cells->cell);
         if (is_double) kernel_placed_exactly(&cells->placed, n, &cells->cell);
-        blocks &= kernel_tet_blocks(&cells->block_rays, &cells->cell);
+        const unsigned blocks = cells->wait_blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
         cells->cell.index = cells->wait_cell[n];
         if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
     }
+    kernel_tile_pop_pending(cells);
+}
+
+SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
+{
+    while (cells->pending) kernel_tile_take_some(t, cells, take);
 }
 
 /* From now on pending tets are of this volume and part. Returns whether its tets are placed in lanes; they are not
@@ -174,20 +247,19 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
     return cells->arrays.has_lanes && !cells->arrays.is_by_cell;
 }
 
-/* Adds a tet to the pending ones, and places these once they fill a vector. */
+/* Adds a tet to the pending ones, and places some of these once there is no more room. box: kernel_tile_box(). */
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
-                                  kernel_tile_take *take)
+                                  unsigned box, kernel_tile_take *take)
 {
     const int n = cells->pending++;
-    kernel_arrays_tet(&cells->arrays, cell, cells->wait_vertices, n);
     cells->wait_cell[n] = cell;
-    cells->wait_blocks[n] = blocks;
-    if (cells->pending == SIMD_WIDTH) kernel_tile_take_pending(t, cells, take);
+    cells->wait_blocks[n] = (uint16_t)blocks;
+    cells->wait_box[n] = (uint16_t)box;
+    kernel_tile_learn_pending(cells, cells->pending - KERNEL_WAIT_AHEAD);
+    if (cells->pending == KERNEL_WAIT_ROOM) kernel_tile_take_some(t, cells, take);
 }
 
 /* ---- from trees ---- */
-
-enum { KERNEL_ALL_PIXELS = -1 };
 
 /* How a volume's cells are taken, those for lanes and others. */
 typedef struct kernel_cell_visitor {
@@ -203,11 +275,12 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_v
 {
     const grid *g = t->frame->job->parts[part].cells;
     kernel_tile_cells *pending = t->thread->tile_cells;
-    kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
     const bool waits = kernel_tile_wait_for(t, pending, volume, part, visitor->take);
+    if (!waits) kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
+    const unsigned box = kernel_tile_box(blocks, KERNEL_ALL_PIXELS);
     for (int n = 0; n < count; n++)
         if (waits && kernel_arrays_type(&pending->arrays, cells[n]) == GRID_TET)
-            kernel_tile_wait(t, pending, cells[n], blocks, visitor->take);
+            kernel_tile_wait(t, pending, cells[n], blocks, box, visitor->take);
         else
             kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
@@ -291,11 +364,12 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 }
 
 /* Begins the tile, before its first window; returns false if it is known to have no cells. */
-SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
+SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_tets *take_tets)
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
-    cells->pending = 0;
+    cells->pending = cells->known = 0;
+    cells->take_tets = take_tets;
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;
     cells->count = kernel_bin(f, f->volume_candidates, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
@@ -324,7 +398,7 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
 {
     const int part = (int)item->source;
     if (kernel_tile_wait_for(t, cells, 0, part, take) && kernel_arrays_type(&cells->arrays, item->cell) == GRID_TET)
-        kernel_tile_wait(t, cells, item->cell, blocks, take);
+        kernel_tile_wait(t, cells, item->cell, blocks, item->box, take);
     else
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }

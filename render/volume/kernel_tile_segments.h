@@ -18,6 +18,7 @@
 #include <math.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
 #include "kernel_double.h"
@@ -75,10 +76,11 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
 
 static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box)
 {
-    const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
-    if (!kernel_local_segments_fit(t->frame, type)) return false;
+    const grid *g = t->frame->job->parts[part].cells;
+    const int type = grid_cell_type(g, cell);
+    if (!kernel_arrays_fit(g) || !kernel_local_segments_fit(t->frame, type)) return false;
     kernel_local_stretches *b = &t->thread->tile_segments->stretches;
-    kernel_local_segments_wait(t, b, part, type, cell, blocks, kernel_local_box(blocks, box));
+    kernel_local_segments_wait(t, b, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
 }
 
@@ -169,7 +171,7 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (!kernel_tile_cells_begin(t)) return;
+    if (!kernel_tile_cells_begin(t, NULL)) return;
     const kernel_placement reach = kernel_tile_reach(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);

@@ -18,6 +18,7 @@
 #include <math.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
 #include "kernel_crossings.h"
@@ -25,6 +26,7 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
+#include "kernel_tet_samples.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
@@ -78,10 +80,16 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
 
 static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box)
 {
-    const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
-    if (!kernel_local_fits(t->frame, type)) return false;
-    kernel_local_wait(t, &t->thread->tile_volume->batch, part, type, cell, blocks, kernel_local_box(blocks, box));
+    const grid *g = t->frame->job->parts[part].cells;
+    const int type = grid_cell_type(g, cell);
+    if (!kernel_arrays_fit(g) || !kernel_local_fits(t->frame, type)) return false;
+    kernel_local_wait(t, &t->thread->tile_volume->batch, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
+}
+
+static unsigned kernel_samples_take_tets(kernel_tile_trace *t, unsigned lanes)
+{
+    return kernel_tet_samples(t, &t->thread->tile_volume->batch, lanes);
 }
 
 static const kernel_cell_visitor kernel_samples_visitor = {true, kernel_tile_samples, kernel_samples_queue};
@@ -164,7 +172,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    if (!kernel_tile_cells_begin(t)) return;
+    if (!kernel_tile_cells_begin(t, kernel_tet_samples_fit(t->frame) ? kernel_samples_take_tets : NULL)) return;
     const kernel_placement reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;
     int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;
