@@ -176,6 +176,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
         render_candidates_find_volume(frame, states, threads);
         statistics->volume_ms = 1e3 * (now() - start);
     }
+    if (job->volume_count) render_volumes_cover(frame);
     frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
     if (has_memory) {
         const kernel_table *kernels = render_kernels();

@@ -333,6 +333,16 @@ static void trace_tile_samples(kernel_tile_trace *t)
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
+/* May the tile have samples or segments of volumes? */
+static bool has_volume(const kernel_frame *f, int x0, int y0)
+{
+    kernel_tile_candidate *items;
+    if (!f->volume_count || x0 > f->cover[0][1] || x0 + KERNEL_TILE <= f->cover[0][0] || y0 > f->cover[1][1] ||
+        y0 + KERNEL_TILE <= f->cover[1][0])
+        return false;
+    return !f->volume_candidates || kernel_bin(f, f->volume_candidates, f->volume_starts, x0, y0, &items);
+}
+
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
@@ -342,12 +352,13 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     }
     kernel_tile_trace *t = thread->tile;
     kernel_tile_candidate *items;
-    if (f->candidates && !f->volume_count && !kernel_candidates_in_tile(f, x0, y0, &items)) return;
+    const bool fogs = has_volume(f, x0, y0);
+    if (!fogs && (!f->surface_count || (f->candidates && !kernel_candidates_in_tile(f, x0, y0, &items)))) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);
-    if (!f->volume_count) return;
+    if (!fogs) return;
     if (f->has_segments && f->job->separate_samples)
         trace_tile_apart(t);
     else if (f->has_segments)

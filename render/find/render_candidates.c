@@ -8,11 +8,16 @@
 #include "render_kernels.h"
 #include "render_subtrees.h"
 
+#include <math.h>
 #include <omp.h>
 
 #include "memory.h"
+#include "mmbvh.h"
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
+
+/* So many cells a pixel that their tree covers are small (docs/decisions/find.md). */
+enum { SMALL_CELLS = 8 };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
@@ -133,6 +138,86 @@ static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32
     return sum;
 }
 
+/* ---- where volumes are ---------------------------------------------------------------------------------------- */
+
+/* The first and the last place of something along columns or rows of pixels. */
+typedef struct span {
+    double low, high;
+} span;
+
+/* Widens the spans, of columns and of rows, by a point in the space of trees. Returns its depth from the eye, or 1 for
+ * orthographic cameras. */
+static double widen(const kernel_frame *f, const double point[3], span spans[2])
+{
+    const render_camera *c = &f->job->camera;
+    const render_space *s = &f->job->space;
+    double right = 0, up = 0, forward = 0;
+    for (int a = 0; a < 3; a++) {
+        const double from_eye = point[a] / s->scale + s->origin[a] - c->eye[a];
+        right += from_eye * c->right[a];
+        up += from_eye * c->up[a];
+        forward += from_eye * c->forward[a];
+    }
+    const double depth = c->is_orthographic ? 1 : forward;
+    const double at[2] = {(right / depth - f->slope_x0) / f->slope_dx, (up / depth - f->slope_y0) / f->slope_dy};
+    for (int a = 0; a < 2; a++) {
+        spans[a].low = fmin(spans[a].low, at[a]);
+        spans[a].high = fmax(spans[a].high, at[a]);
+    }
+    return depth;
+}
+
+/* Widens the spans by all corners of the tree's box, and returns the least of their depths. */
+static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans[2])
+{
+    float lower[4], upper[4];
+    double least = INFINITY;
+    mmbvh_node_box(tree, 0, lower, upper);
+    for (int corner = 0; corner < 8; corner++) {
+        double point[3];
+        for (int a = 0; a < 3; a++) point[a] = (double)(corner >> a & 1 ? upper[a] : lower[a]);
+        least = fmin(widen(f, point, spans), least);
+    }
+    return least;
+}
+
+/* Are the volume's cells so small that to list them costs more than it spares? A listed cell is fetched twice, once for
+ * its pixels and once for its samples; tiles that go down the trees themselves fetch it once. */
+static bool is_of_small_cells(const kernel_frame *f)
+{
+    const render_job *job = f->job;
+    double cells = 0, pixels = 0;
+    for (int part = 0; part < job->part_count; part++) {
+        const mmbvh *tree = job->parts[part].tree;
+        span spans[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+        if (!job->volumes[0].field.ranges[part].low || !tree->node_count) continue;
+        if (!(widen_by_tree(f, tree, spans) > 0)) return false;
+        cells += (double)tree->cell_count;
+        pixels += (spans[0].high - spans[0].low) * (spans[1].high - spans[1].low);
+    }
+    return cells > SMALL_CELLS * pixels;
+}
+
+/* Rays and bounds of trees are off by what kernel_tree_planes() allows them, and pixels reach half a pixel beyond their
+ * middles. */
+void render_volumes_cover(kernel_frame *f)
+{
+    const render_job *job = f->job;
+    const int most[2] = {job->camera.width - 1, job->camera.height - 1};
+    span spans[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    double least = INFINITY, size = 2;
+    for (int part = 0; part < job->part_count; part++)
+        if (job->parts[part].tree->node_count) least = fmin(widen_by_tree(f, job->parts[part].tree, spans), least);
+    for (int a = 0; a < 3; a++)
+        size = fmax(2 + fabs((job->camera.eye[a] - job->space.origin[a]) * job->space.scale), size);
+    for (int a = 0; a < 2; a++) {
+        const double pad = 1 + 32 * 6e-8 * size / (least * job->space.scale) / fabs(a ? f->slope_dy : f->slope_dx);
+        const bool is_known = least > 0 && pad < 1e6;
+        f->cover[a][0] = is_known ? (int)fmin(fmax(spans[a].low - pad, 0), most[a] + 1) : 0;
+        f->cover[a][1] = is_known ? (int)fmax(fmin(spans[a].high + pad, most[a]), -1) : most[a];
+    }
+}
+
 /* ---- all of it ------------------------------------------------------------------------------------------------ */
 
 typedef struct search {
@@ -202,6 +287,7 @@ void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int t
 
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
+    if (is_of_small_cells(frame)) return;
     frame->volume_candidates = find(frame, true, thread_of, threads, &frame->volume_starts);
 }
 

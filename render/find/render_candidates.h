@@ -9,6 +9,8 @@
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* As above, for the only volume's cells: fills frame->volume_candidates. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
+/* Sets frame->cover, from the bounds of all trees. */
+void render_volumes_cover(kernel_frame *frame);
 void render_candidates_free(kernel_frame *frame);
 
 #endif
