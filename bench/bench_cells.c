@@ -7,7 +7,7 @@
 #include "bench_command.h"
 #include "bench_scene.h"
 
-enum { PICTURES = 5, LAYOUTS = 7, AWAY_PIXELS = 130 };
+enum { PICTURES = 7, LAYOUTS = 7, AWAY_PIXELS = 130 };
 
 static const double everything_values[2] = {-2.2, 2.2};
 static const float everything_opacities[2] = {0.05f, 0.3f};
@@ -17,13 +17,23 @@ typedef struct picture {
     bool is_surface, shows_everything;
     double max_error; /* 0: samples */
     double step;      /* of the bench's step, half a cube's side */
+    double unit;      /* of the opacity; 0: the bench's */
 } picture;
+
+/* Dense: a ray has lost its light after a tenth of its way through the cube, at 25 to 180 optical depths a unit. */
+static const double dense_unit = 0.002;
 
 static const picture pictures[PICTURES] = {{"isosurface", .is_surface = true},
                                            {"volume", .step = 1},
                                            {"volume everywhere", .shows_everything = true, .step = 1},
                                            {"volume quarter step", .step = 0.5},
-                                           {"volume max_error 1e-2", .max_error = 1e-2, .step = 1}};
+                                           {"volume max_error 1e-2", .max_error = 1e-2, .step = 1},
+                                           {"volume dense", .shows_everything = true, .step = 1, .unit = dense_unit},
+                                           {"volume dense max_error 1e-2",
+                                            .shows_everything = true,
+                                            .max_error = 1e-2,
+                                            .step = 1,
+                                            .unit = dense_unit}};
 
 static const struct {
     const char *name;
@@ -46,6 +56,7 @@ static void show(bench_scene *s, const picture *p)
     s->job.step = p->step / s->subject.n;
     s->job.integration = p->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
     s->job.max_error = p->max_error;
+    s->transfer.unit_distance = p->unit > 0 ? p->unit : bench_unit_distance;
     if (!p->shows_everything) return;
     s->transfer.low = everything_values[0], s->transfer.high = everything_values[1];
     s->transfer.opacity_count = 2;
@@ -56,6 +67,7 @@ static void show(bench_scene *s, const picture *p)
 /* Sets the transfer function back to what show() found. */
 static void show_band(bench_scene *s)
 {
+    s->transfer.unit_distance = bench_unit_distance;
     s->transfer.low = bench_knots[0], s->transfer.high = bench_knots[BENCH_KNOTS - 1];
     s->transfer.opacity_count = BENCH_KNOTS;
     s->transfer.opacity_values = bench_knots;
@@ -69,6 +81,19 @@ static void time_frame(bench_scene *s, int number, bench_series *series)
     bench_end(began, number, series);
 }
 
+/* Samples that all light is lost between are far from the integral, and are compared with the same samples in double. */
+static void print_dense_error(bench_scene *s, const picture *p)
+{
+    free(s->integrals); /* those of the usual function */
+    s->integrals = NULL;
+    if (p->max_error > 0)
+        bench_scene_integral_error(s, p->name);
+    else
+        bench_scene_sample_error(s, p->name);
+    free(s->integrals);
+    s->integrals = NULL;
+}
+
 static void measure_types(bench_scene *s, const bench_command *command)
 {
     bench_scene_build(s);
@@ -79,6 +104,8 @@ static void measure_types(bench_scene *s, const bench_command *command)
         bench_print_series(&s->subject, pictures[i].name, &series);
         if (pictures[i].is_surface)
             bench_scene_surface_error(s, pictures[i].name);
+        else if (pictures[i].unit > 0)
+            print_dense_error(s, &pictures[i]);
         else if (!pictures[i].shows_everything)
             bench_scene_integral_error(s, pictures[i].name);
         show_band(s);
