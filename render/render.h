@@ -317,6 +317,7 @@ typedef struct render_job {
 typedef struct render_statistics {
     int64_t rays; /* traced: one a pixel */
     int64_t map_failures;
+    int64_t volume_cells; /* that tiles placed for volumes: a cell once for each tile and window of depth it is in */
     double surface_ms, volume_ms;
 } render_statistics;
 

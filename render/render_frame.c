@@ -151,6 +151,7 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);
         statistics->map_failures += states[i].map_failures;
+        statistics->volume_cells += states[i].volume_cells;
     }
     statistics->surface_ms += 1e3 * surface;
     statistics->volume_ms += 1e3 * volume;

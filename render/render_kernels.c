@@ -405,6 +405,7 @@ static void begin(kernel_thread *thread)
     m->tile.poly = &m->tile_poly;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;
+    kernel_depth_forget(&m->volume.depth);
 }
 
 const kernel_table KERNEL_TABLE = {SIMD_WIDTH,          sizeof(kernel_memory),  begin,

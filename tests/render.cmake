@@ -72,6 +72,10 @@ insitu_render_program(test_segments)
 insitu_add_split_test(segments $<TARGET_FILE:test_segments>)
 set_tests_properties(segments PROPERTIES TIMEOUT 180)
 
+insitu_render_program(test_opaque_media)
+add_test(NAME opaque_media COMMAND test_opaque_media)
+set_tests_properties(opaque_media PROPERTIES TIMEOUT 120)
+
 insitu_render_program(test_segment_ends)
 add_test(NAME segment_ends COMMAND test_segment_ends)
 set_tests_properties(segment_ends PROPERTIES TIMEOUT 120)

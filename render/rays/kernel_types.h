@@ -285,7 +285,7 @@ typedef struct kernel_thread {
     render_waiting_list waiting;
     bool (*grow_waiting)(render_waiting_list *list);
     bool out_of_memory;
-    int64_t map_failures;
+    int64_t map_failures, volume_cells; /* render_statistics */
     /* The tile's polyhedra (render_polyhedra.h); NULL where no mesh has any. */
     struct polyhedron_store *polyhedra;
     struct polyhedron *(*find_polyhedron)(struct polyhedron_store *store, const grid *g, const grid_field *field,

@@ -20,7 +20,11 @@
 #include "render_face_error.h"
 #include "simd.h"
 
-/* The light left in front below which nothing shows: far below the 1e-6 that ranks may differ by. */
+/* The light left in front of a place below which what is there and behind it is left out. From there on colours of at
+ * most 1 are seen through that much, with what is left out and without it, so that a channel is off by no more: a tenth
+ * of the 1e-6 that partitions may differ by, of which rounding takes most. A rank counts its own cells alone. Other
+ * ranks' only take more light, so that it leaves out less than one rank would that has all, and the bound holds of all
+ * ranks together: the first place that any of them leaves out has no more light than its own cells leave. */
 #define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
 /* The samples of a window: NaN where this rank has none. */
@@ -180,6 +184,7 @@ SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, v
     b->light = vf_select(next, b->within, b->light);
     b->stretch = vf_select(has, stretch, b->stretch);
     b->within = vf_select(has, b->within * clear, b->within);
+    b->t_first = vf_select(fresh, t_in, b->t_first);
     b->t_last = vf_select(has, vf_select(fresh, t_out, vf_max(b->t_last, t_out)), b->t_last);
     b->open = vm_or(b->open, has);
 }

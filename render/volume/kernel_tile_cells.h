@@ -33,6 +33,8 @@
 
 enum {
     KERNEL_OPEN_PIECE = 16,
+    KERNEL_SORT_PIECE = 64,
+    KERNEL_SORT_ENDS = 48,
     KERNEL_WAIT_AHEAD = 8, /* so many tets wait for their indices to come from memory, and as many for their numbers */
     KERNEL_WAIT_ROOM = SIMD_WIDTH + 2 * KERNEL_WAIT_AHEAD
 };
@@ -42,10 +44,13 @@ enum {
 typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
 
 /* The tile's cells of a volume. The first open_count items begin before the last window's end and do not end before its
- * begin; next is the first item that is still to come. */
+ * begin; next is the first item that is still to come. Only items before `sorted` are in order: a tile that light leaves
+ * early does not look at the others. Those before each of ends, the last of which is the nearest, are no farther than
+ * those from it on. */
 typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
+    int sorted, end_count, ends[KERNEL_SORT_ENDS];
     kernel_cell cell;     /* the one under way, */
     kernel_map map;       /* and its map */
     kernel_arrays arrays; /* of the volume's field on the part: */
@@ -101,6 +106,7 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_cell *c = &cells->cell;
     const grid *g = t->frame->job->parts[part].cells;
+    t->thread->volume_cells++;
     kernel_cell_fetch(c, g, &t->frame->job->volumes[volume].field.fields[part], index);
     if (c->type == GRID_POLYHEDRON) {
         take(t, part, c, NULL, blocks);
@@ -176,6 +182,7 @@ SIMD_INLINE void kernel_tile_learn_pending(kernel_tile_cells *cells, int end)
  * ended before. */
 SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
 {
+    t->thread->volume_cells += count;
     const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
     int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
@@ -363,6 +370,20 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
     }
 }
 
+/* Sorts at least one item more. */
+static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *cells)
+{
+    kernel_tile_candidate *items = cells->items + cells->sorted;
+    int count = cells->ends[cells->end_count - 1] - cells->sorted;
+    while (count > KERNEL_SORT_PIECE && cells->end_count < KERNEL_SORT_ENDS) {
+        count = kernel_depth_bin_of(items, count);
+        cells->ends[cells->end_count++] = cells->sorted + count;
+    }
+    kernel_order_by_depth(items, count);
+    cells->sorted += count;
+    cells->end_count--;
+}
+
 /* Begins the tile, before its first window; returns false if it is known to have no cells. */
 SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_tets *take_tets)
 {
@@ -373,8 +394,10 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;
     cells->count = kernel_bin(f, f->volume_candidates, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
-    cells->open_count = cells->next = 0;
-    kernel_order_by_depth(cells->items, cells->count);
+    cells->open_count = cells->next = cells->sorted = 0;
+    cells->end_count = 1;
+    cells->ends[0] = cells->count;
+    if (cells->count) kernel_tile_cells_sort(cells);
     return cells->count > 0;
 }
 
@@ -386,8 +409,11 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     int count = 0;
     for (int n = 0; n < cells->open_count; n++)
         if (!(items[n].far < t->t_near)) items[count++] = items[n];
-    for (; cells->next < cells->count && items[cells->next].near <= far; cells->next++)
+    for (; cells->next < cells->count; cells->next++) {
+        if (cells->next == cells->sorted) kernel_tile_cells_sort(cells);
+        if (!(items[cells->next].near <= far)) break;
         if (!(items[cells->next].far < t->t_near)) items[count++] = items[cells->next];
+    }
     cells->open_count = count;
 }
 
@@ -436,6 +462,12 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
 }
 
 /* ---- windows ---- */
+
+/* Where the tile's first cell begins, where that is known; else +inf. */
+SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
+{
+    return t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
+}
 
 /* The blocks that any tree's box may meet, and the depths between which. */
 SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)

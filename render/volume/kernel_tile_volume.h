@@ -29,6 +29,7 @@
 #include "kernel_tet_samples.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
+#include "kernel_tile_depth.h"
 #include "kernel_tile_trace.h"
 #include "mmbvh.h"
 #include "render.h"
@@ -37,6 +38,7 @@
 typedef struct kernel_tile_volume {
     kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
     int volume; /* under way */
+    kernel_tile_depth depth;
     kernel_local_batch batch;
 } kernel_tile_volume;
 
@@ -168,28 +170,48 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     return true;
 }
 
+/* How many samples the window from sample first on is to have. */
+SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const kernel_packet *p, int first)
+{
+    enum { LEAST = 8 };
+    const int most = p->frame->job->sample_group, least = most < LEAST ? most : LEAST;
+    const float wanted = kernel_depth_wanted(&v->depth, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
+    return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
+}
+
+/* Blends the samples of a window, front to back. */
+SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volume *v, const int *packets, int count,
+                                          int samples)
+{
+    for (int n = 0; n < count; n++) {
+        const int i = packets[n];
+        kernel_tile_ray_samples *r = &v->packets[i];
+        if (vm_any(t->packets[i].active)) kernel_blend_window(&t->packets[i], &r->blend, &r->samples, &t->hits[i]);
+        kernel_depth_add(&v->depth, r->active, &r->blend);
+    }
+    kernel_depth_end_window(&v->depth, (float)samples * t->packets[packets[0]].sample_step[0]);
+}
+
 /* Behind the tile's opaque surfaces, whose hits are in the packets. */
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
     if (!kernel_tile_cells_begin(t, kernel_tet_samples_fit(t->frame) ? kernel_samples_take_tets : NULL)) return;
-    const kernel_placement reach = kernel_tile_reach(t);
+    kernel_placement reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;
+    const float cells_near = kernel_tile_cells_near(t);
+    if (cells_near < INFINITY) reach.near = fmaxf(reach.near, cells_near);
     int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;
     const int count = kernel_tile_volume_begin(t, blocks, packets);
     for (int n = 0; n < count; n++)
         kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
                                  &last);
-    const int group = t->frame->job->sample_group;
-    for (int from = first; from <= last; from += group) {
-        const int to = last - from < group ? last : from + group - 1;
-        if (!kernel_tile_window(t, v, blocks, from, to)) break;
-        if (t->frame->job->separate_samples) continue;
-        for (int n = 0; n < count; n++) {
-            const int i = packets[n];
-            if (vm_any(t->packets[i].active))
-                kernel_blend_window(&t->packets[i], &v->packets[i].blend, &v->packets[i].samples, &t->hits[i]);
-        }
+    kernel_depth_begin(&v->depth, cells_near);
+    for (int from = first, to; from <= last; from = to) {
+        const int samples = kernel_tile_window_samples(v, &t->packets[packets[0]], from);
+        to = last - from < samples ? last + 1 : from + samples;
+        if (!kernel_tile_window(t, v, blocks, from, to - 1)) break;
+        if (!t->frame->job->separate_samples) kernel_tile_window_blend(t, v, packets, count, to - from);
     }
     for (int n = 0; n < count; n++) {
         t->packets[packets[n]].active = v->packets[packets[n]].active;
