@@ -81,7 +81,7 @@ static void time_frame(bench_scene *s, int number, bench_series *series)
     bench_end(began, number, series);
 }
 
-/* Samples that all light is lost between are far from the integral, and are compared with the same samples in double. */
+/* Samples between which all light is lost are far from the integral: they are compared with the same ones in double. */
 static void print_dense_error(bench_scene *s, const picture *p)
 {
     free(s->integrals); /* those of the usual function */

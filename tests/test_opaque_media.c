@@ -24,7 +24,7 @@ static double front_to_back(const double position[3])
     return 0.5 - (2.4 * position[0] + 1.6 * position[1] + 3 * position[2]) / (2 * (2.4 + 1.6 + 3));
 }
 
-/* The same optical depth everywhere, `depth` through a distance of 1; black up to the middle plane, and white behind it.
+/* The same optical depth everywhere, `depth` through a distance of 1; black up to the middle plane, white behind it.
  * Rays come to that plane with any light between all of theirs and none. */
 static void set_medium(render_fixture *f, method how, double depth)
 {
@@ -83,9 +83,9 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
     if (!(worst <= most)) fail_msg("%s: off by %g", what, worst);
 }
 
-/* Light of less than 1e-7 of a ray's is left out, of colours up to 1. A thousand times as much would show as nearly 1e-4,
- * some ten times what samples may be off (fixture_usual_bounds), and segments: values at their ends are off by up to 4e-7
- * of the function's domain (docs/decisions/volume.md), and colours by as many times that as there are entries. */
+/* Light of less than 1e-7 of a ray's is left out, of colours up to 1. A thousand times as much would show as nearly
+ * 1e-4, some ten times what samples may be off (fixture_usual_bounds), and segments: values at their ends are off by up
+ * to 4e-7 of the function's domain (docs/decisions/volume.md), and colours by as many times that as there are entries. */
 static void pictures_are_those_of_all_cells(void **state)
 {
     (void)state;

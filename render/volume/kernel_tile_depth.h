@@ -5,10 +5,10 @@
  *                  \___                               as deep as light goes:              |====|=|
  *             0 --------x----------------->  depth
  *
- * Neighbouring tiles lose their light in much the same depth, so the last tile's is expected of this one. Where light is
- * left after it, the brightest ray is expected to go on losing it at the rate of the window before. Rays that keep their
- * light have windows as deep as there is room, as every boundary between windows has cells placed twice. Windows do not
- * show in the picture (kernel_tile_volume.h): all that is expected here is only a matter of time. */
+ * Neighbouring tiles lose their light in much the same depth, so the last tile's is expected of this one. Where light
+ * is left after it, the brightest ray is expected to go on losing it at the rate of the window before. Rays that keep
+ * their light have windows as deep as there is room, as every boundary between windows has cells placed twice. Windows
+ * do not show in the picture (kernel_tile_volume.h): all that is expected here is only a matter of time. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
