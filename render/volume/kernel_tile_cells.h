@@ -45,8 +45,8 @@ typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
 
 /* The tile's cells of a volume. The first open_count items begin before the last window's end and do not end before its
  * begin; next is the first item that is still to come. Only items before `sorted` are in order: a tile that light
- * leaves early does not look at the others. Those before each of ends, the last of which is the nearest, are no farther than
- * those from it on. */
+ * leaves early does not look at the others. Those before each of ends, the last of which is the nearest, are no farther
+ * than those from it on. */
 typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
