@@ -26,7 +26,6 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
-#include "kernel_tet_samples.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_depth.h"
