@@ -183,7 +183,7 @@ SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_s
     *extents = z + 0.25f * (x + y);
 }
 
-enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2, KERNEL_MAX_LINES = 18 };
+enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
 typedef struct kernel_cell {
     uint32_t serial, index; /* the cache's key: tile, cell, */

@@ -1,14 +1,12 @@
-/* Rays of several hexes, wedges or pyramids side by side (kernel_polys.h), and of several tets (kernel_batch.h): which
- * two faces of its cell a ray crosses, and where. A lane takes its cell's numbers out of the batch's vectors. */
+/* Rays of several hexes, wedges or pyramids side by side (kernel_polys.h): which two faces of its cell a ray crosses, and
+ * where. A lane takes its cell's numbers out of the batch's vectors. */
 #ifndef RENDER_KERNEL_HEX_RAYS_H
 #define RENDER_KERNEL_HEX_RAYS_H
 
 #include <math.h>
 #include <string.h>
 
-#include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
 #include "kernel_placed_hexes.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
@@ -57,12 +55,6 @@ SIMD_INLINE void kernel_hex_ray_add(kernel_hex_rays *to, const kernel_hex_rays *
     to->count++;
 }
 
-/* A cell's lines on the rays: the sides of each, and the least of all. */
-typedef struct kernel_poly_sides {
-    vm negative[KERNEL_MAX_LINES];
-    vf least;
-} kernel_poly_sides;
-
 SIMD_INLINE void kernel_poly_side(const kernel_placed_polys *h, const kernel_hex_packet *p, int n, kernel_poly_sides *s)
 {
     const vf e = vf_muladd(kernel_hex_take(h->cv[n], p->lane), p->v,
@@ -79,15 +71,6 @@ SIMD_INLINE void kernel_poly_sides_of(const kernel_placed_polys *h, const kernel
     for (int n = 0; n < shape->edge_count; n++) kernel_poly_side(h, p, n, s);
     for (int face = 0; face < shape->face_count; face++)
         if (shape->faces[face].count == 4) kernel_poly_side(h, p, shape->edge_count + face, s);
-}
-
-/* Tells on which rays the sides of a face's edges, taken around it, are negative. */
-SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_poly_sides *s, vm around[4])
-{
-    for (int i = 0; i < shape->faces[face].count; i++) {
-        const signed char *edge = shape->faces[face].sides[i];
-        around[i] = edge[1] ? vm_not(s->negative[(int)edge[0]]) : s->negative[(int)edge[0]];
-    }
 }
 
 /* kernel_halves_once() of a quad whose diagonal is from the loop's vertex 1 where turn is set, else from vertex 0. */
@@ -162,14 +145,6 @@ SIMD_INLINE vf kernel_hex_pick(const float of[8][SIMD_WIDTH], int count, vi lane
     for (int i = 0; 4 * i < count; i++)
         two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
-}
-
-/* A vertex's own coordinate, 0 or 1, of each ray's own vertex. */
-SIMD_INLINE vf kernel_hex_own(const kernel_shape *shape, int count, int axis, vi corner)
-{
-    int bits = 0;
-    for (int i = 0; i < count; i++) bits |= (shape->corners[i][axis] > 0) << i;
-    return vf_from_vi(vi_set(bits) >> corner & 1);
 }
 
 SIMD_INLINE vi kernel_face_word(const kernel_placed_polys *h, vi lane, vi face)
@@ -280,16 +255,6 @@ SIMD_INLINE void kernel_hex_place_select(vm m, const kernel_hex_place *a, const 
     for (int i = 0; i < 3; i++) out->r[i] = vf_select(m, a->r[i], b->r[i]);
 }
 
-/* Rays whose face of this number, the first or the last of two, is a quad. Faces are in the shape's order, so that of a
- * wedge, whose triangles come first, the last is a quad but where both are triangles; of a pyramid none is. */
-SIMD_INLINE vm kernel_hex_on_quad(int type, int n, vi face)
-{
-    if (type == GRID_HEX) return vm_all_lanes();
-    const vf number = vf_from_vi(face);
-    if (type == GRID_WEDGE) return vf_lt(vf_set(1.5f), number);
-    return n ? vm_none() : vf_lt(number, vf_set(0.5f));
-}
-
 SIMD_INLINE void kernel_poly_cross(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vi faces,
                                    kernel_hex_place out[2])
 {
@@ -336,142 +301,6 @@ SIMD_INLINE void kernel_hex_ends_add(const kernel_hex_rays *met, int n, const ke
         }
         kernel_hex_ray_add(rays, met, n + i);
     }
-}
-
-/* ---- tets (kernel_placed.h) ----
- *
- * Each ray has a tet of its own: where does it come in and go out? Every operation is that of a packet and one cell
- * (kernel_crossings.h) in the same order, so that a crossing has the same bits however it came to be found. */
-
-/* Pixels of the tile, with their cells' lanes. */
-typedef struct kernel_tet_rays {
-    vm active;
-    vi lane, column, row;
-    vf u, v;
-} kernel_tet_rays;
-
-SIMD_INLINE void kernel_tet_rays_of(kernel_tet_rays *r, const kernel_frame *f, const kernel_tile *tile, vi pixel,
-                                    vi lane)
-{
-    const bool flat = f->job->camera.is_orthographic;
-    r->lane = lane & (SIMD_WIDTH - 1);
-    r->column = pixel & (KERNEL_TILE - 1);
-    r->row = pixel >> 4;
-    r->u = kernel_batch_of_tile(flat ? tile->origin_x : tile->slope_x, r->column);
-    r->v = kernel_batch_of_tile(flat ? tile->origin_y : tile->slope_y, r->row);
-}
-
-SIMD_INLINE void kernel_tet_rays_project(const kernel_placed *tets, const kernel_tile *tile, const kernel_tet_rays *r,
-                                         vf x[4], vf y[4])
-{
-    const vf origin_x = kernel_batch_of_tile(tile->origin_x, r->column);
-    const vf origin_y = kernel_batch_of_tile(tile->origin_y, r->row);
-    const vf slope_x = kernel_batch_of_tile(tile->slope_x, r->column);
-    const vf slope_y = kernel_batch_of_tile(tile->slope_y, r->row);
-    for (int i = 0; i < 4; i++) {
-        const vf z = vf_permute(tets->at[2][i], r->lane);
-        x[i] = (vf_permute(tets->at[0][i], r->lane) - origin_x) - slope_x * z;
-        y[i] = (vf_permute(tets->at[1][i], r->lane) - origin_y) - slope_y * z;
-    }
-}
-
-/* kernel_tet_edges_exactly(). */
-static __attribute__((noinline)) void kernel_tet_rays_exactly(const kernel_placed *tets, const kernel_tile *tile,
-                                                              const kernel_tet_rays *r, vf e[KERNEL_TET_EDGES])
-{
-    vf x[4], y[4];
-    kernel_tet_rays_project(tets, tile, r, x, y);
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const vm doubt = vm_and(r->active, vm_not(vf_lt(vf_permute(tets->bound[n], r->lane), vf_abs(e[n]))));
-        if (vm_any(doubt)) e[n] = vf_select(doubt, kernel_edge_between(x[i], y[i], x[j], y[j]), e[n]);
-    }
-}
-
-/* The rays' vertices as sums of a crossed triangle take them. */
-typedef struct kernel_tet_vertices {
-    vf z[4], f[4];
-} kernel_tet_vertices;
-
-SIMD_INLINE kernel_sums kernel_tet_rays_sums(const kernel_tet_vertices *v, const signed char face[3], vf ij, vf jk,
-                                             vf ik)
-{
-    const vf *z = v->z, *f = v->f;
-    const int i = face[0], j = face[1], k = face[2];
-    return (kernel_sums){.depth = vf_muladd(ij, z[k], vf_muladd(-ik, z[j], jk * z[i])),
-                         .value = vf_muladd(ij, f[k], vf_muladd(-ik, f[j], jk * f[i])),
-                         .weight = kernel_weight(ij, jk, ik)};
-}
-
-/* kernel_tet_mend(). */
-static __attribute__((noinline)) void kernel_tet_rays_mend(const kernel_placed *tets, const kernel_tile *tile,
-                                                           const kernel_tet_rays *r, const kernel_tet_vertices *v,
-                                                           const vf e[KERNEL_TET_EDGES], const vm weak[4],
-                                                           kernel_sums sums[4])
-{
-    vf x[4], y[4];
-    kernel_tet_rays_project(tets, tile, r, x, y);
-    for (int n = 0; n < 4; n++) {
-        if (!vm_any(weak[n])) continue;
-        const signed char *face = kernel_tet_face[n];
-        const int i = face[0], j = face[1], k = face[2];
-        const vf ij = vf_select(weak[n], kernel_edge_between(x[i], y[i], x[j], y[j]), e[face[3]]);
-        const vf jk = vf_select(weak[n], kernel_edge_between(x[j], y[j], x[k], y[k]), e[face[4]]);
-        const vf ik = vf_select(weak[n], kernel_edge_between(x[i], y[i], x[k], y[k]), e[face[5]]);
-        sums[n] = kernel_tet_rays_sums(v, face, ij, jk, ik);
-    }
-}
-
-/* The edge functions on the rays. */
-SIMD_INLINE void kernel_tet_rays_edges(const kernel_placed *tets, const kernel_tile *tile, const kernel_tet_rays *r,
-                                       vf e[KERNEL_TET_EDGES])
-{
-    vf least = vf_set(INFINITY);
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        e[n] = vf_muladd(vf_permute(tets->cv[n], r->lane), r->v,
-                         vf_muladd(vf_permute(tets->cu[n], r->lane), r->u, vf_permute(tets->c[n], r->lane)));
-        least = vf_min(vf_abs(e[n]), least);
-    }
-    const vm sure = vf_lt(vf_permute(tets->doubt, r->lane), least);
-    if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_tet_rays_exactly(tets, tile, r, e);
-}
-
-/* kernel_tet_interval(). */
-SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *tets, const kernel_tile *tile, const kernel_tet_rays *r,
-                                          kernel_interval *out)
-{
-    vf e[KERNEL_TET_EDGES];
-    vm hit[4], weak[4], any_weak = vm_none();
-    kernel_tet_vertices v;
-    kernel_sums sums[4];
-    kernel_tet_rays_edges(tets, tile, r, e);
-    out->mask = vm_none();
-    for (int n = 0; n < 4; n++) {
-        const signed char *face = kernel_tet_face[n];
-        hit[n] = kernel_inside(r->active, e[face[3]], e[face[4]], e[face[5]]);
-        out->mask = vm_or(out->mask, hit[n]);
-    }
-    if (!vm_any(out->mask)) return;
-    for (int i = 0; i < 4; i++) {
-        v.z[i] = vf_permute(tets->at[2][i], r->lane);
-        v.f[i] = vf_permute(tets->f[i], r->lane);
-    }
-    for (int n = 0; n < 4; n++) {
-        const signed char *face = kernel_tet_face[n];
-        sums[n] = kernel_tet_rays_sums(&v, face, e[face[3]], e[face[4]], e[face[5]]);
-        weak[n] = vm_and(hit[n], vf_lt(vf_abs(sums[n].weight), vf_permute(tets->least[n], r->lane)));
-        any_weak = vm_or(any_weak, weak[n]);
-    }
-    if (__builtin_expect(vm_any(any_weak), 0)) kernel_tet_rays_mend(tets, tile, r, &v, e, weak, sums);
-    const kernel_ends ends = kernel_tet_choose(hit, sums);
-    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
-    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
-    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
-    const vm swap = vf_lt(t_b, t_a);
-    out->t_in = vf_select(swap, t_b, t_a);
-    out->t_out = vf_select(swap, t_a, t_b);
-    out->v_in = vf_select(swap, v_b, v_a);
-    out->v_out = vf_select(swap, v_a, v_b);
 }
 
 #endif

@@ -13,6 +13,8 @@ static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2},
 static const signed char kernel_tet_face[4][6] = {
     {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
 
+enum { KERNEL_MAX_LINES = 18 }; /* a hex has 12 edges and 6 diagonals */
+
 typedef struct kernel_shape {
     int edge_count;
     signed char edges[12][2];
@@ -66,6 +68,39 @@ SIMD_INLINE int kernel_shape_number(int type)
 SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 {
     return &kernel_shapes[kernel_shape_number(type)];
+}
+
+/* A cell's lines on the rays: the sides of each, and the least of all. */
+typedef struct kernel_poly_sides {
+    vm negative[KERNEL_MAX_LINES];
+    vf least;
+} kernel_poly_sides;
+
+/* Tells on which rays the sides of a face's edges, taken around it, are negative. */
+SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_poly_sides *s, vm around[4])
+{
+    for (int i = 0; i < shape->faces[face].count; i++) {
+        const signed char *edge = shape->faces[face].sides[i];
+        around[i] = edge[1] ? vm_not(s->negative[(int)edge[0]]) : s->negative[(int)edge[0]];
+    }
+}
+
+/* Returns the own coordinate on an axis, 0 or 1, of each ray's corner. */
+SIMD_INLINE vf kernel_hex_own(const kernel_shape *shape, int count, int axis, vi corner)
+{
+    int bits = 0;
+    for (int i = 0; i < count; i++) bits |= (shape->corners[i][axis] > 0) << i;
+    return vf_from_vi(vi_set(bits) >> corner & 1);
+}
+
+/* Rays whose face of this number, the first or the last of two, is a quad. Faces are in the shape's order, so that of a
+ * wedge, whose triangles come first, the last is a quad but where both are triangles; of a pyramid none is. */
+SIMD_INLINE vm kernel_hex_on_quad(int type, int n, vi face)
+{
+    if (type == GRID_HEX) return vm_all_lanes();
+    const vf number = vf_from_vi(face);
+    if (type == GRID_WEDGE) return vf_lt(vf_set(1.5f), number);
+    return n ? vm_none() : vf_lt(number, vf_set(0.5f));
 }
 
 /* Calls a function, whose last argument is the type, with a constant for a hex, wedge or pyramid: inlined, it has loops

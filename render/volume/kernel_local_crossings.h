@@ -9,7 +9,6 @@
 
 #include "grid.h"
 #include "kernel_crossings.h"
-#include "kernel_hex_rays.h"
 #include "kernel_local.h"
 #include "kernel_placed_hexes.h"
 #include "kernel_quad.h"

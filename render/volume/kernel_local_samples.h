@@ -23,6 +23,7 @@
 #include "kernel_packet.h"
 #include "kernel_placed.h"
 #include "kernel_samples.h"
+#include "kernel_tet_rays.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
