@@ -295,7 +295,7 @@ int main(int argc, char **argv)
     bench_scene_show_volume(&scene);
     measure_layer(&b, "volume", false);
     bench_icet_free(b.icet);
-    base_free(b.group.claims);
+    comp_claims_free(b.group.claims);
     base_free(b.out.rgba);
     base_free(b.out.depth);
     bench_scene_free(&scene);

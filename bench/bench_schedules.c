@@ -7,12 +7,14 @@
 #include <stdlib.h>
 
 #include "comp_cost.h"
+#include "comp_grid.h"
 
 /* The load of 1920 × 1080 pixels, of which the object covers half; the busiest rank has twice the mean. */
 static comp_load load_of(int ranks)
 {
     const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);
-    return (comp_load){(int64_t)(2 * covered * layers / ranks), 11};
+    const comp_grid grid = comp_grid_of(1920, 1080, ranks);
+    return (comp_load){(int64_t)(2 * covered * layers / ranks), 11, comp_grid_block_pixels(&grid)};
 }
 
 static void print(const char *name, const comp_route *route, const comp_load *load)

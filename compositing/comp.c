@@ -30,11 +30,6 @@ typedef struct composition {
     uint64_t *loads; /* of all ranks, in fragments */
 } composition;
 
-comp_claim *comp_claims_create(int ranks)
-{
-    return base_alloc((comp_most_blocks(ranks) + COMP_AGREED_CLAIMS) * sizeof(comp_claim));
-}
-
 static composition composition_of(const comp_group *group, const float background[4], image *out,
                                   comp_statistics *statistics)
 {
@@ -62,29 +57,35 @@ static void choose_route(composition *c, int64_t fragments)
 {
     enum { USUAL_RADIX = 8 };
     const comp_group *g = c->group;
-    const comp_load load = {fragments, usual_bytes};
+    const comp_load load = {fragments, usual_bytes, comp_grid_block_pixels(&c->grid)};
     c->route = g->schedule == COMP_AUTOMATIC ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_usual_machine)
                                              : comp_route_of(g->schedule, c->route.ranks, g->nodes, USUAL_RADIX);
     if (g->longest_dense) c->route.longest_dense = g->longest_dense;
     c->statistics->schedule = c->route.schedule;
 }
 
-/* A rank beyond the owners leaves what it would own to its partner. */
+/* Takes a claim's owner for its partner, if it is a rank beyond the owners: these own nothing. */
+static void fold_vote(const comp_route *route, int32_t *vote)
+{
+    const int place = comp_route_place(route, comp_vote_rank(*vote));
+    *vote = comp_vote_of(*vote, place < route->owners ? place : place - route->owners);
+}
+
 static void choose_owners(composition *c)
 {
-    comp_claim *const claims = c->group->claims;
+    comp_claim *const claims = c->group->claims->items;
     c->owners.count = c->route.owners;
-    comp_claims_level(claims, c->grid.blocks, c->loads, c->route.ranks);
-    for (uint32_t b = 0; b < c->grid.blocks; b++) {
-        const int place = claims[b].vote ? comp_route_place(&c->route, comp_vote_rank(claims[b].vote)) : -1;
-        c->owners.places[b] = place < c->route.owners ? place : place - c->route.owners;
-    }
+    for (uint32_t b = 0; b < c->grid.blocks; b++)
+        if (claims[b].vote) fold_vote(&c->route, &claims[b].vote);
+    comp_claims_level(claims, c->grid.blocks, c->loads, c->route.owners);
+    for (uint32_t b = 0; b < c->grid.blocks; b++)
+        c->owners.places[b] = claims[b].vote ? comp_vote_rank(claims[b].vote) : -1;
 }
 
 /* Claims each block by how many fragments this rank has there. */
 static void claim(composition *c)
 {
-    comp_claim *const claims = c->group->claims;
+    comp_claim *const claims = c->group->claims->items;
     const uint32_t ranges = c->strips.starts[c->grid.strips];
     for (uint32_t r = 0; r < ranges; r++)
         claims[comp_grid_block(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
@@ -164,7 +165,7 @@ static insitu_status begin(composition *c, int threads, base_error *error)
     c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
     c->grid = comp_grid_of((uint32_t)c->out->width, (uint32_t)c->out->height, ranks);
     c->grid.threads = threads > 0 ? threads : omp_get_max_threads();
-    memset(c->group->claims, 0, c->grid.blocks * sizeof *c->group->claims);
+    memset(c->group->claims->items, 0, c->grid.blocks * sizeof *c->group->claims->items);
     return INSITU_OK;
 }
 

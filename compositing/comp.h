@@ -16,7 +16,7 @@
 #include <mpi.h>
 #include <stdbool.h>
 
-#include "comp_grid.h"
+#include "comp_agree.h"
 #include "comp_route.h"
 #include "error.h"
 #include "fragment.h"
@@ -29,12 +29,8 @@ typedef struct comp_group {
     comp_nodes nodes;
     comp_schedule schedule; /* COMP_AUTOMATIC: chosen for each picture */
     int longest_dense;      /* rounds of more partners are sparse (comp_mail.h); 0: as comp_route.h has it */
-    comp_claim *claims;     /* comp_claims_create()'s */
+    comp_claims *claims;    /* comp_claims_create()'s */
 } comp_group;
-
-/* Memory in which so many ranks agree on owners, to be given back by base_free(). It is made once, because a rank that
- * lacks memory for a picture has to take part in the agreement on its status. NULL: no memory. */
-comp_claim *comp_claims_create(int ranks);
 
 /* Blend one pixel's fragments in place: sorted by (t_in, surface before volume, then bits), blended front to back over
  * background (linear premultiplied RGBA). out_rgba gets 4 floats, out_depth the nearest surface's t_in or +infinity.

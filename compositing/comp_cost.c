@@ -4,13 +4,14 @@
 
 const comp_machine comp_usual_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* Number of fragments that go to one owner together: those of one of the renderer's tiles. */
-enum { TOGETHER = 256 };
+/* A rank's fragments come by the renderer's tiles, so that those of a tile, or of a smaller block, have one owner. */
+enum { TILE_PIXELS = 256 };
 
 /* Number of partners in a round for which a rank has fragments. */
 static double partners_of(const comp_route *route, int round, const comp_load *load)
 {
-    const double all = route->radix[round] - 1, own = ceil((double)load->fragments / TOGETHER);
+    const uint32_t together = load->block_pixels < TILE_PIXELS ? load->block_pixels : TILE_PIXELS;
+    const double all = route->radix[round] - 1, own = ceil((double)load->fragments / together);
     return comp_route_is_dense(route, round) || own > all ? all : own;
 }
 

@@ -122,6 +122,6 @@ void comp_claims_level(comp_claim *claims, uint32_t blocks, uint64_t *loads, int
         const int taker = find_taker(&t, fragments);
         *load -= fragments;
         loads[taker] += fragments;
-        claims[b].vote = (int32_t)((uint32_t)claims[b].vote & ~0xfffffu) | taker;
+        claims[b].vote = comp_vote_of(claims[b].vote, taker);
     }
 }

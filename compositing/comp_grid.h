@@ -37,6 +37,12 @@ static inline uint32_t comp_most_blocks(int ranks)
     return 2 * counted * COMP_RANK_BLOCKS > few ? 2 * counted * COMP_RANK_BLOCKS : few;
 }
 
+/* The pixels of a block that is not cut by the picture's border. */
+static inline uint32_t comp_grid_block_pixels(const comp_grid *grid)
+{
+    return COMP_LANES << (grid->shift_x + grid->shift_y + grid->row_shift);
+}
+
 static inline uint32_t comp_grid_block(const comp_grid *grid, uint32_t strip)
 {
     if (grid->blocks == grid->strips) return strip;
@@ -96,6 +102,12 @@ int32_t comp_vote(uint32_t block, int rank, int64_t fragments);
 static inline int comp_vote_rank(int32_t vote)
 {
     return vote & 0xfffff;
+}
+
+/* The same vote for another rank. */
+static inline int32_t comp_vote_of(int32_t vote, int rank)
+{
+    return (int32_t)(((uint32_t)vote & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
 
 /* Makes a claim that of both. */

@@ -55,7 +55,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     fragment_list *own = &end->writers[number].list;
     const bool folds = frame->job->reproducible && frame->job->volume_count && !frame->job->separate_samples;
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
-#pragma omp for schedule(dynamic, 4)
+#pragma omp for schedule(dynamic, KERNEL_TILE_RUN)
     for (int tile = 0; tile < columns * rows; tile++) {
         if (thread->out_of_memory) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);

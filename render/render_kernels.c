@@ -343,6 +343,12 @@ static bool has_volume(const kernel_frame *f, int x0, int y0)
     return !f->volume_candidates || kernel_bin(f, f->volume_candidates, f->volume_starts, x0, y0, &items);
 }
 
+static bool begins_run(const kernel_frame *f, int x0, int y0)
+{
+    const int columns = (f->job->camera.width - 1) / KERNEL_TILE + 1;
+    return (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE) % KERNEL_TILE_RUN == 0;
+}
+
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
@@ -350,6 +356,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
         trace_packets(f, thread, x0, y0);
         return;
     }
+    if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
     kernel_tile_candidate *items;
     const bool fogs = has_volume(f, x0, y0);
@@ -405,7 +412,6 @@ static void begin(kernel_thread *thread)
     m->tile.poly = &m->tile_poly;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;
-    kernel_depth_forget(&m->volume.depth);
 }
 
 const kernel_table KERNEL_TABLE = {SIMD_WIDTH,          sizeof(kernel_memory),  begin,

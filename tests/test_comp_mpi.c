@@ -408,7 +408,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(image_without_pixels_is_refused),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    base_free(group.claims);
+    comp_claims_free(group.claims);
     MPI_Comm_free(&comm);
     MPI_Finalize();
     return failed;

@@ -328,7 +328,7 @@ static void the_cheapest_route_is_chosen(void **context)
     const int counts[] = {2, 3, 5, 7, 8, 16, 32, 64, 127, 1000, 4000, 32768, 97336, 100000};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         const int ranks = counts[i], node = ranks % 8 == 0 && ranks > 8 ? 8 : 1;
-        const comp_load load = {(int64_t)(4e6 / pow(ranks, 2.0 / 3)), 11};
+        const comp_load load = {(int64_t)(4e6 / pow(ranks, 2.0 / 3)), 11, 256};
         const comp_route best = comp_cheapest_route(ranks, (comp_nodes){node, false}, &load, &comp_usual_machine);
         const comp_cost cost = comp_cost_of(&best, &load, &comp_usual_machine);
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
@@ -345,7 +345,7 @@ static void costs_are_those_of_the_model(void **context)
 {
     (void)context;
     const comp_machine machine = {1, 10, 100, 0, 0, 0};
-    const comp_load load = {800, 2};
+    const comp_load load = {800, 2, 512};
     const comp_route route = comp_route_of(COMP_DIRECT, 8, (comp_nodes){1, false}, 0);
     const comp_cost cost = comp_cost_of(&route, &load, &machine);
     assert_true(cost.messages == 7 && cost.bytes == 1400);

@@ -360,7 +360,7 @@ static void draw(subject *s, double max_error, picture *out)
     const session_frame_target where = {MPI_COMM_SELF, group, fixture_background, MAX_FRAGMENTS};
     if (session_draw_frame(&where, &s->f.job, &target, &out->frame, &error) != INSITU_OK)
         fail_msg("session_draw_frame: %s", error.message);
-    base_free(group.claims);
+    comp_claims_free(group.claims);
 }
 
 static double pixel_difference(const picture *a, const picture *b, int pixel)

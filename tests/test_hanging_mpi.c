@@ -66,7 +66,7 @@ static int64_t draw(render_fixture *f, MPI_Comm comm, bool is_alone, image *out)
     const comp_group group = {comm, {1, false}, COMP_AUTOMATIC, 0, comp_claims_create(ranks)};
     const session_frame_target target = {comm, group, fixture_background, MANY};
     if (session_draw_frame(&target, &f->job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);
-    base_free(group.claims);
+    comp_claims_free(group.claims);
     return frame.overlaps;
 }
 

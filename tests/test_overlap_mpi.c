@@ -159,7 +159,7 @@ static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool
     const session_frame_target target = {comm, group, fixture_background, d->fragment_limit};
     assert_non_null(group.claims);
     if (session_draw_frame(&target, &s.f.job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);
-    base_free(group.claims);
+    comp_claims_free(group.claims);
     fixture_free(&s.f);
     return frame.overlaps;
 }

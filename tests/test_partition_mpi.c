@@ -74,7 +74,7 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
     assert_non_null(group.claims);
     assert_int_equal(comp_composite(&group, &list, fixture_background, 0, out, NULL, &error), INSITU_OK);
     base_free(list.items);
-    base_free(group.claims);
+    comp_claims_free(group.claims);
     fixture_free(&f);
 }
 

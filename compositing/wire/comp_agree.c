@@ -3,6 +3,8 @@
  */
 #include "comp_agree.h"
 
+#include "memory.h"
+
 insitu_status comp_mpi_status(int code, base_error *error)
 {
     if (code == MPI_SUCCESS) return INSITU_OK;
@@ -44,26 +46,32 @@ static void add_claims(void *in, void *sum, int *count, MPI_Datatype *type)
 
 _Static_assert(sizeof(comp_claim) == 2 * sizeof(int), "a claim is MPI_2INT");
 
-static int reduce_claims(MPI_Comm comm, comp_claim *claims, int count)
+comp_claims *comp_claims_create(int ranks)
 {
-    MPI_Op op;
-    int code = MPI_Op_create(add_claims, 1, &op);
-    if (code != MPI_SUCCESS) return code;
-    code = MPI_Allreduce(MPI_IN_PLACE, claims, count, MPI_2INT, op, comm);
-    MPI_Op_free(&op);
-    return code;
+    comp_claims *claims = base_alloc(sizeof *claims + (comp_most_blocks(ranks) + 2) * sizeof *claims->items);
+    if (!claims || MPI_Op_create(add_claims, 1, &claims->add) == MPI_SUCCESS) return claims;
+    base_free(claims);
+    return NULL;
 }
 
-insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claim *claims, int count,
+void comp_claims_free(comp_claims *claims)
+{
+    if (claims) MPI_Op_free(&claims->add);
+    base_free(claims);
+}
+
+insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claims *claims, int count,
                                 base_error *error)
 {
     enum { SHIFT = 20, MASK = (1 << SHIFT) - 1 };
+    comp_claim *const items = claims->items;
     int rank = 0;
     MPI_Comm_rank(comm, &rank);
-    claims[count] = (comp_claim){own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0, 0};
-    claims[count + 1] = (comp_claim){(int32_t)(*greatest < INT32_MAX ? *greatest : INT32_MAX), 0};
-    const insitu_status status = comp_mpi_status(reduce_claims(comm, claims, count + 2), error);
+    items[count] = (comp_claim){own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0, 0};
+    items[count + 1] = (comp_claim){(int32_t)(*greatest < INT32_MAX ? *greatest : INT32_MAX), 0};
+    const insitu_status status = comp_mpi_status(
+        MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
     if (status != INSITU_OK) return status;
-    *greatest = claims[count + 1].vote;
-    return tell(own, (insitu_status)(claims[count].vote >> SHIFT), MASK - (claims[count].vote & MASK), error);
+    *greatest = items[count + 1].vote;
+    return tell(own, (insitu_status)(items[count].vote >> SHIFT), MASK - (items[count].vote & MASK), error);
 }

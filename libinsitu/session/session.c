@@ -57,7 +57,7 @@ static void free_session(insitu_session *session)
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
     session_report_free(&session->report);
-    base_free(session->team.claims);
+    comp_claims_free(session->team.claims);
     base_free(session);
 }
 
@@ -71,7 +71,10 @@ static insitu_status create(const session_team *team, const session_scene_source
         session->team = *team;
         session->team.claims = comp_claims_create(team->ranks);
     }
-    if (!session || !session->team.claims) session_no_memory(error, (int64_t)sizeof *session, "the session");
+    if (!session) session_no_memory(error, (int64_t)sizeof *session, "the session");
+    if (session && !session->team.claims)
+        base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory for the owners of blocks of %d ranks", source->call,
+                  team->ranks);
     if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no place for the session", source->call);
     insitu_status status = session_agree(team->comm, error);
     if (status) goto fail;

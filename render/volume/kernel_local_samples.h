@@ -235,7 +235,7 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
     const unsigned all = kernel_local_fetch_any(b, q, types[queue]);
     const unsigned showing = kernel_local_place_any(t, b, types[queue], &placed) & all;
     placed &= all;
-    t->thread->volume_cells += __builtin_popcount(all);
+    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~placed));
     b->sample_count = b->rays.count = 0;
     for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);

@@ -545,7 +545,7 @@ static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trac
     unsigned placed;
     const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
     const unsigned showing = kernel_local_segments_place(t, b, type, all, &placed);
-    t->thread->volume_cells += __builtin_popcount(all);
+    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~placed));
     b->rays.count = 0;
     for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);

@@ -7,8 +7,11 @@
  *
  * Neighbouring tiles lose their light in much the same depth, so the last tile's is expected of this one. Where light
  * is left after it, the brightest ray is expected to go on losing it at the rate of the window before. Rays that keep
- * their light have windows as deep as there is room, as every boundary between windows has cells placed twice. Windows
- * do not show in the picture (kernel_tile_volume.h): all that is expected here is only a matter of time. */
+ * their light have windows as deep as there is room, as every boundary between windows has cells placed twice.
+ *
+ * Samples do not depend on windows (kernel_tile_volume.h). Which cells are seen to overlap behind what takes all light
+ * does, and so whether a pixel is drawn a second time. Therefore a tile learns only from those before it in its run of
+ * KERNEL_TILE_RUN tiles, which one thread draws in order: pictures have the same bits with any number of threads. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
@@ -31,7 +34,7 @@ typedef struct kernel_tile_depth {
     float brightest, first, last; /* first: where they begin; last: where those that are dark end */
 } kernel_tile_depth;
 
-/* Before the thread's first tile. */
+/* Begins a run of tiles. */
 SIMD_INLINE void kernel_depth_forget(kernel_tile_depth *d)
 {
     d->dark = INFINITY;
@@ -86,6 +89,7 @@ SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
     d->before = d->brightest > 0 ? d->brightest : 1;
     d->begin = simd_min(d->first, d->begin);
     d->has_met = d->has_met || d->met;
+    if (d->begin == INFINITY) d->dark *= 2; /* nothing has been met yet, so that what is expected says little */
     if (d->own_dark == INFINITY && d->ended > 0 && 2 * d->ended >= d->met) d->own_dark = d->last - d->begin;
     kernel_depth_begin_window(d);
 }
