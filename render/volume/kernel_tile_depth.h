@@ -10,8 +10,8 @@
  * their light have windows as deep as there is room, as every boundary between windows has cells placed twice.
  *
  * Samples do not depend on windows (kernel_tile_volume.h). Which cells are seen to overlap behind what takes all light
- * does, and so whether a pixel is drawn a second time. Therefore a tile learns only from those before it in its run of
- * KERNEL_TILE_RUN tiles, which one thread draws in order: pictures have the same bits with any number of threads. */
+ * does, and so whether a pixel is drawn a second time. So that windows do not depend on the number of threads, a tile
+ * learns only from those before it in its run of KERNEL_TILE_RUN tiles, which one thread draws in order. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
