@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "kernel_crossings.h"
 #include "kernel_packet.h"
 #include "kernel_placed_hexes.h"
 #include "kernel_quad.h"
