@@ -56,7 +56,9 @@ comp_claims *comp_claims_create(int ranks)
 
 void comp_claims_free(comp_claims *claims)
 {
-    if (claims) MPI_Op_free(&claims->add);
+    int is_finalized = 0;
+    MPI_Finalized(&is_finalized);
+    if (claims && !is_finalized) MPI_Op_free(&claims->add);
     base_free(claims);
 }
 

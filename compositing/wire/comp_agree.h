@@ -15,7 +15,7 @@ typedef struct comp_claims {
     comp_claim items[]; /* of blocks, and two more */
 } comp_claims;
 
-/* Makes what so many ranks need for any picture; NULL: no memory. Local. Freed before MPI_Finalize(). */
+/* Makes what so many ranks need for any picture; NULL: no memory. Local. May be freed after MPI_Finalize(). */
 comp_claims *comp_claims_create(int ranks);
 void comp_claims_free(comp_claims *claims);
 
