@@ -27,6 +27,13 @@ static inline double kernel_corners_most(kernel_corners v)
     return most;
 }
 
+static inline void kernel_domain_corners(int type, kernel_corners r[3])
+{
+    const kernel_domain *domain = kernel_domain_of(type);
+    for (int n = 0; n < 8; n++)
+        for (int a = 0; a < 3; a++) r[a][n] = domain->corners[n][a];
+}
+
 /* Derivatives of the products r s, r q, s q, r s q at the centre and the corners, there the extreme ones. */
 typedef struct kernel_slopes {
     double centre[4][3];
@@ -35,12 +42,10 @@ typedef struct kernel_slopes {
 
 static inline void kernel_domain_slopes(int type, kernel_slopes *out)
 {
-    const kernel_domain *domain = kernel_domain_of(type);
-    const double *c = domain->centre;
+    const double *c = kernel_domain_of(type)->centre;
     kernel_corners r[3];
     memset(out, 0, sizeof *out);
-    for (int n = 0; n < 8; n++)
-        for (int a = 0; a < 3; a++) r[a][n] = domain->corners[n][a];
+    kernel_domain_corners(type, r);
     if (type == GRID_PYRAMID) {
         for (int a = 0; a < 3; a++) {
             out->centre[0][a] = a == 2 ? -c[a] : c[a];
@@ -138,10 +143,8 @@ static inline void kernel_corner_gradient(const double c[8], const kernel_slopes
 /* E's largest value at the corners of the domain, and so in it. */
 static inline double kernel_bounds_error(const double e[8], int type)
 {
-    const kernel_domain *domain = type == GRID_WEDGE ? &kernel_wedge_domain : &kernel_box_domain;
     kernel_corners r[3];
-    for (int n = 0; n < 8; n++)
-        for (int a = 0; a < 3; a++) r[a][n] = domain->corners[n][a];
+    kernel_domain_corners(type, r);
     if (type == GRID_PYRAMID) r[0] *= r[2], r[1] *= r[2];
     const kernel_corners m = type == GRID_PYRAMID ? r[0] * r[1] / r[2] : r[0] * r[1];
     const kernel_corners at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + m * e[4] +

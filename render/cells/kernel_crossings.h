@@ -231,6 +231,23 @@ SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sum
     return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
 }
 
+/* Divides the ends by their weights, and puts the nearer one first. */
+SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, kernel_interval *out)
+{
+    const vf scale_a = 1.0f / ends->a.weight, scale_b = 1.0f / ends->b.weight;
+    const vf t_a = ends->a.depth * scale_a, t_b = ends->b.depth * scale_b;
+    const vf v_a = ends->a.value * scale_a, v_b = ends->b.value * scale_b;
+    const vm swap = vf_lt(t_b, t_a);
+    out->t_in = vf_select(swap, t_b, t_a);
+    out->t_out = vf_select(swap, t_a, t_b);
+    out->v_in = vf_select(swap, v_b, v_a);
+    out->v_out = vf_select(swap, v_a, v_b);
+    if (!has_colour) return;
+    const vf w_a = ends->a.colour * scale_a, w_b = ends->b.colour * scale_b;
+    out->w_in = vf_select(swap, w_b, w_a);
+    out->w_out = vf_select(swap, w_a, w_b);
+}
+
 /* Chooses as kernel_tet_choose() does, with edges projected again for rays whose weights are not good enough. */
 static __attribute__((noinline, cold)) kernel_ends
 kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour)
@@ -286,18 +303,7 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
                   vm_or(kernel_weak(hit[2], sums[2].weight, least[2]), kernel_weak(hit[3], sums[3].weight, least[3])));
         if (__builtin_expect(vm_any(weak), 0)) ends = kernel_tet_mend(p, c, rays, e, has_colour);
     }
-    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
-    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
-    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
-    const vm swap = vf_lt(t_b, t_a);
-    out->t_in = vf_select(swap, t_b, t_a);
-    out->t_out = vf_select(swap, t_a, t_b);
-    out->v_in = vf_select(swap, v_b, v_a);
-    out->v_out = vf_select(swap, v_a, v_b);
-    if (!has_colour) return;
-    const vf w_a = ends.a.colour * scale_a, w_b = ends.b.colour * scale_b;
-    out->w_in = vf_select(swap, w_b, w_a);
-    out->w_out = vf_select(swap, w_a, w_b);
+    kernel_ends_order(&ends, has_colour, out);
 }
 
 /* Hexes, wedges and pyramids: cells with quads, which a ray may go into more than once (kernel_cell.h). */

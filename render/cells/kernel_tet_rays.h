@@ -135,14 +135,7 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *tets, const kerne
     }
     if (__builtin_expect(vm_any(any_weak), 0)) kernel_tet_rays_mend(tets, tile, r, &v, e, weak, sums);
     const kernel_ends ends = kernel_tet_choose(hit, sums);
-    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
-    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
-    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
-    const vm swap = vf_lt(t_b, t_a);
-    out->t_in = vf_select(swap, t_b, t_a);
-    out->t_out = vf_select(swap, t_a, t_b);
-    out->v_in = vf_select(swap, v_b, v_a);
-    out->v_out = vf_select(swap, v_a, v_b);
+    kernel_ends_order(&ends, false, out);
 }
 
 #endif
