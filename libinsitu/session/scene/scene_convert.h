@@ -80,6 +80,10 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
+/* Copies the texts of a list into an array of their number, to be freed by the caller, after an error too. path NULL:
+ * there are none. */
+insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
+
 /* The meshes that a layer names. layer: its path. */
 insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
 

@@ -35,20 +35,11 @@ static insitu_status convert_bars(const scene_document *d, const char *path, con
                                   scene_decorations *out)
 {
     char labels_path[SCENE_PATH_SIZE + 8];
-    const char *labels[SCENE_MAX_NAMES];
     snprintf(labels_path, sizeof labels_path, "%s.colour_bar.labels", path);
     out->has_bars = in != NULL;
     out->bars_at = in && in->at ? (scene_anchor)*in->at : SCENE_RIGHT;
     out->tick_count = in && in->ticks ? *in->ticks : 6;
-    const int count = in ? scene_document_texts(d, labels_path, labels, SCENE_MAX_NAMES) : 0;
-    out->labels = base_calloc((size_t)count, sizeof *out->labels);
-    if (!out->labels) return scene_no_memory(d);
-    while (out->label_count < count) {
-        char *label = base_strdup(labels[out->label_count]);
-        if (!label) return scene_no_memory(d);
-        out->labels[out->label_count++] = label;
-    }
-    return INSITU_OK;
+    return scene_copy_texts(d, in ? labels_path : NULL, &out->labels, &out->label_count);
 }
 
 insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,

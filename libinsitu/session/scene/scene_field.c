@@ -29,21 +29,26 @@ static insitu_status convert_component(const scene_document *d, const char *path
     return INSITU_OK;
 }
 
+insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count)
+{
+    const char *texts[SCENE_MAX_NAMES];
+    const int count = path ? scene_document_texts(d, path, texts, SCENE_MAX_NAMES) : 0;
+    *out = base_calloc((size_t)count, sizeof **out);
+    if (!*out) return scene_no_memory(d);
+    while (*out_count < count) {
+        char *text = base_strdup(texts[*out_count]);
+        if (!text) return scene_no_memory(d);
+        (*out)[(*out_count)++] = text;
+    }
+    return INSITU_OK;
+}
+
 insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out)
 {
     char path[SCENE_PATH_SIZE + 8];
-    const char *names[SCENE_MAX_NAMES];
     snprintf(path, sizeof path, "%s.mesh", layer);
-    const int count = scene_document_texts(d, path, names, SCENE_MAX_NAMES);
     out->meshes_line = scene_document_line(d, path);
-    out->meshes = base_calloc((size_t)count, sizeof *out->meshes);
-    if (!out->meshes) return scene_no_memory(d);
-    while (out->mesh_count < count) {
-        char *name = base_strdup(names[out->mesh_count]);
-        if (!name) return scene_no_memory(d);
-        out->meshes[out->mesh_count++] = name;
-    }
-    return INSITU_OK;
+    return scene_copy_texts(d, path, &out->meshes, &out->mesh_count);
 }
 
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
