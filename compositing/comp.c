@@ -89,10 +89,7 @@ static void claim(composition *c)
     const uint32_t ranges = c->strips.starts[c->grid.strips];
     for (uint32_t r = 0; r < ranges; r++)
         claims[comp_grid_block(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
-    for (uint32_t r = 0; r < ranges; r++) {
-        const uint32_t block = comp_grid_block(&c->grid, c->strips.ranges[r].strip);
-        if (!claims[block].vote) claims[block].vote = comp_vote(block, c->room.rank, claims[block].fragments);
-    }
+    for (uint32_t b = 0; b < c->grid.blocks; b++) claims[b].vote = comp_vote(b, c->room.rank, claims[b].fragments);
 }
 
 /* Allocates what the three phases need. */

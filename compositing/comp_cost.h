@@ -21,7 +21,7 @@ extern const comp_machine comp_usual_machine;
 /* The load of the busiest rank. */
 typedef struct comp_load {
     int64_t fragments;
-    double bytes; /* that a fragment takes on its way (comp_sheet.h) */
+    double bytes;          /* that a fragment takes on its way (comp_sheet.h) */
     uint32_t block_pixels; /* of a block, all of which one rank owns (comp_grid.h) */
 } comp_load;
 

@@ -71,8 +71,8 @@ insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *great
     MPI_Comm_rank(comm, &rank);
     items[count] = (comp_claim){own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0, 0};
     items[count + 1] = (comp_claim){(int32_t)(*greatest < INT32_MAX ? *greatest : INT32_MAX), 0};
-    const insitu_status status = comp_mpi_status(
-        MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
+    const insitu_status status =
+        comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
     if (status != INSITU_OK) return status;
     *greatest = items[count + 1].vote;
     return tell(own, (insitu_status)(items[count].vote >> SHIFT), MASK - (items[count].vote & MASK), error);

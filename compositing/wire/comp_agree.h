@@ -24,8 +24,7 @@ void comp_claims_free(comp_claims *claims);
 insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, base_error *error);
 
 /* The same, and each of so many claims becomes that of all ranks, in the same reduction. *greatest is taken for
- * INT32_MAX if it is more. Of more than 2^20 ranks some are taken for
- * others in messages. */
+ * INT32_MAX if it is more. Of more than 2^20 ranks some are taken for others in messages. */
 insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claims *claims, int count,
                                 base_error *error);
 

@@ -12,7 +12,7 @@
 enum {
     KERNEL_TILE = 16,
     KERNEL_TILE_RUN = 4, /* so many tiles, row by row, are drawn by one thread after each other */
-    KERNEL_BLOCK = 4, /* pixels along its side */
+    KERNEL_BLOCK = 4,    /* pixels along its side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
     KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS,
     KERNEL_ACTIVE_FLOATS = 4 /* of a vertex */

@@ -33,11 +33,11 @@
  * E may vanish where higher orders do not, and of hexes P and A may as well: values at eight vertices can be such that
  * the field is on its chord at all three places. So E is taken to be no less than 0.01 (P + A) N^2 + e N^2 S, where N
  * is the bend, S the sum of |h| times the bent terms' slopes (kernel_local_deviation.h), and e is 0.0011 in hexes and
- * 0.0004 in wedges. Of 300,000 rays in random cells of each type with bends up to 0.89, and the field that has E = 0 or all
- * three places on the chord and its mean as far off as can be, the polynomial's mean was off by 0.27 of 2 E at most (it
- * is the mean that counts in one segment), and the field itself by 1.3 of 2 E on average where bends are more than 0.4.
- * Along a ray in a pyramid the field is a linear function and a piece of a conic section, whose three numbers the three
- * places tell: e is 0. */
+ * 0.0004 in wedges. Of 300,000 rays in random cells of each type with bends up to 0.89, and the field that has E = 0 or
+ * all three places on the chord and its mean as far off as can be, the polynomial's mean was off by 0.27 of 2 E at most
+ * (it is the mean that counts in one segment), and the field itself by 1.3 of 2 E on average where bends are more than
+ * 0.4. Along a ray in a pyramid the field is a linear function and a piece of a conic section, whose three numbers the
+ * three places tell: e is 0. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
