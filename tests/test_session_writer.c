@@ -151,7 +151,7 @@ static void what_waits_is_bounded(void **state)
     everywhere(insitu_destroy(&session) == INSITU_OK);
     everywhere(own_rank ? caught_count == 0 : caught_count == 8);
     for (int i = 0; i < caught_count; i++) {
-        char path[16];
+        char path[24];
         snprintf(path, sizeof path, "a%d.png", i);
         assert_string_equal(caught[i].path, path);
     }
