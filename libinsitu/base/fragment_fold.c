@@ -84,6 +84,6 @@ int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin
 {
     fold_part part = {begin, end, out, 0};
     const int32_t stretch = fragment_stretch(sorted[0].t_in);
-    fold_node(&part, sorted, count, stretch << FRAGMENT_HALVINGS, FRAGMENT_HALVINGS);
+    fold_node(&part, sorted, count, stretch * (1 << FRAGMENT_HALVINGS), FRAGMENT_HALVINGS);
     return part.count;
 }
