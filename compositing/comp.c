@@ -135,18 +135,14 @@ static insitu_status merge_alone(composition *c, base_error *error)
 
 static insitu_status run_phases(composition *c, fragment_list *items, base_error *error)
 {
-    const double start = MPI_Wtime();
     comp_messages held = {NULL, NULL}, finished = {NULL, NULL};
     const comp_canvas canvas = {&c->grid, c->merged.background, c->out};
     insitu_status status = comp_exchange(&c->room, &c->route, &c->strips, &c->owners, &held, INSITU_OK, error);
-    c->statistics->exchange_ms = milliseconds_since(start);
     status = merge_owned(c, &held, &finished, status, error);
     comp_messages_free(&held);
     base_free(items->items);
     *items = (fragment_list){NULL, 0, 0};
-    const double gather_start = MPI_Wtime();
     status = comp_gather(&c->room, &c->route, &canvas, &finished, status, error);
-    c->statistics->gather_ms = milliseconds_since(gather_start);
     c->statistics->sent_bytes = c->room.sent_bytes;
     c->statistics->sent_messages = c->room.sent_messages;
     return status;

@@ -56,7 +56,7 @@ typedef struct comp_statistics {
     int64_t sent_fragments; /* by this rank, own ones included */
     int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels, passed-on ones included */
     int64_t sent_messages;
-    double exchange_ms, merge_ms, gather_ms;
+    double merge_ms;
     comp_schedule schedule;
     bool has_failed; /* the error is this rank's own */
 } comp_statistics;
