@@ -64,19 +64,11 @@ static void choose_route(composition *c, int64_t fragments)
     c->statistics->schedule = c->route.schedule;
 }
 
-/* Takes a claim's owner for its partner, if it is a rank beyond the owners: these own nothing. */
-static void fold_vote(const comp_route *route, int32_t *vote)
-{
-    const int place = comp_route_place(route, comp_vote_rank(*vote));
-    *vote = comp_vote_of(*vote, place < route->owners ? place : place - route->owners);
-}
-
 static void choose_owners(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
     c->owners.count = c->route.owners;
-    for (uint32_t b = 0; b < c->grid.blocks; b++)
-        if (claims[b].vote) fold_vote(&c->route, &claims[b].vote);
+    comp_route_fold(&c->route, claims, c->grid.blocks);
     comp_claims_level(claims, c->grid.blocks, c->loads, c->route.owners);
     for (uint32_t b = 0; b < c->grid.blocks; b++)
         c->owners.places[b] = claims[b].vote ? comp_vote_rank(claims[b].vote) : -1;

@@ -76,6 +76,15 @@ int comp_route_stride(const comp_route *route, int round)
     return stride;
 }
 
+void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks)
+{
+    for (uint32_t b = 0; b < blocks; b++) {
+        if (!claims[b].vote) continue;
+        const int place = comp_route_place(route, comp_vote_rank(claims[b].vote));
+        claims[b].vote = comp_vote_of(claims[b].vote, place < route->owners ? place : place - route->owners);
+    }
+}
+
 const char *comp_schedule_name(comp_schedule schedule)
 {
     static const char *const names[COMP_SCHEDULE_COUNT] = {"automatic", "direct", "nodes", "radix", "binary"};

@@ -19,6 +19,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "comp_grid.h"
+
 enum { COMP_MOST_ROUNDS = 32, COMP_LONGEST_DENSE = 64 };
 
 typedef enum comp_schedule {
@@ -72,6 +74,9 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
 {
     return route->radix[round] <= route->longest_dense;
 }
+
+/* Makes the claims' owners places. Ranks beyond the route's owners own nothing: their partners own it for them. */
+void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* "direct", "nodes", "radix", "binary". */
 const char *comp_schedule_name(comp_schedule schedule);

@@ -15,6 +15,7 @@
 
 #include "comp.h"
 #include "comp_grid.h"
+#include "comp_route.h"
 #include "comp_strips.h"
 #include "comp_tiles.h"
 #include "memory.h"
@@ -486,6 +487,36 @@ static void owners_share_what_they_have(void **context)
         }
         assert_true(check_levels(grid.blocks, ranks[n]) <= 1.1);
     }
+}
+
+/* Gives all ranks' votes by lot to places of the route, and sees that they share the blocks to a tenth. */
+static void check_folded(const comp_route *route)
+{
+    const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
+    claim_shape(&grid, span_of_disc);
+    for (uint32_t b = 0; b < grid.blocks; b++)
+        claims[b].vote = comp_vote(b, (int)(next_random() % (uint32_t)route->ranks), claims[b].fragments);
+    comp_route_fold(route, claims, grid.blocks);
+    for (uint32_t b = 0; b < grid.blocks; b++) assert_true(comp_vote_rank(claims[b].vote) < route->owners);
+    assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
+}
+
+/* The same where fewer places own blocks than there are ranks, whose partners win more lots than others. */
+static void fewer_owners_than_ranks_share_all(void **context)
+{
+    (void)context;
+    static const int ranks[][2] = {{3, 1},  {5, 1},   {7, 1},   {12, 4},
+                                   {33, 3}, {100, 4}, {191, 1}, {996, 12}}; /* of a node */
+    int folded = 0;
+    state = 23;
+    for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++)
+        for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++)
+            for (int is_cyclic = 0; is_cyclic < 2; is_cyclic++) {
+                const comp_route route = comp_route_of(s, ranks[n][0], (comp_nodes){ranks[n][1], is_cyclic}, 8);
+                folded += route.owners < route.ranks;
+                check_folded(&route);
+            }
+    assert_true(folded >= 20);
 }
 
 /* Who wins block b of so many. */
@@ -995,6 +1026,7 @@ int main(void)
         cmocka_unit_test(claims_add_up),
         cmocka_unit_test(owners_share_what_all_have),
         cmocka_unit_test(owners_share_what_they_have),
+        cmocka_unit_test(fewer_owners_than_ranks_share_all),
         cmocka_unit_test(unfair_lots_are_levelled),
         cmocka_unit_test(strips_hand_over_all),
         cmocka_unit_test(pixels_beyond_the_image_are_seen),
