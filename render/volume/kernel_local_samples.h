@@ -176,6 +176,13 @@ SIMD_INLINE void kernel_local_fill(kernel_tile_trace *t, kernel_local_batch *b, 
 
 /* ---- pixels ---- */
 
+/* The window's sample to begin with, of its number negated. Rays that miss the window may have any number: they begin
+ * beyond its last sample, so that no lane's number is too large for an int. */
+SIMD_INLINE vf kernel_local_first(const kernel_local_batch *b, vf negated)
+{
+    return vf_min(vf_max(-negated, vf_set(0)), vf_set((float)b->count));
+}
+
 /* The samples that rays from n on may have in their cells. */
 SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batch *b, int type, int n)
 {
@@ -190,7 +197,7 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;
     const float zero = (float)b->first;
-    vf number = vf_max(-vf_floor(b->pad - ((begin + near) * inverse - zero)), vf_set(0));
+    vf number = kernel_local_first(b, vf_floor(b->pad - ((begin + near) * inverse - zero)));
     const vf last = vf_min(vf_floor((end * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
     for (vm more = vm_and(active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
@@ -325,7 +332,7 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
     const vf inverse = 1.0f / step, length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
     const float zero = (float)b->first;
-    vf number = vf_max(-vf_floor(b->pad - ((i->t_in - base) * inverse - zero)), vf_set(0));
+    vf number = kernel_local_first(b, vf_floor(b->pad - ((i->t_in - base) * inverse - zero)));
     const vf last = vf_min(vf_floor(((i->t_out - base) * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
     for (vm more = vm_and(i->mask, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
         const vi whole = vi_from_vf(number);
