@@ -125,6 +125,12 @@ static insitu_status merge_alone(composition *c, base_error *error)
     return merge_owned(c, &(comp_messages){NULL, NULL}, &(comp_messages){NULL, NULL}, INSITU_OK, error);
 }
 
+static void give_back(fragment_list *items)
+{
+    base_free(items->items);
+    *items = (fragment_list){NULL, 0, 0};
+}
+
 static insitu_status run_phases(composition *c, fragment_list *items, base_error *error)
 {
     comp_messages held = {NULL, NULL}, finished = {NULL, NULL};
@@ -132,8 +138,7 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     insitu_status status = comp_exchange(&c->room, &c->route, &c->strips, &c->owners, &held, INSITU_OK, error);
     status = merge_owned(c, &held, &finished, status, error);
     comp_messages_free(&held);
-    base_free(items->items);
-    *items = (fragment_list){NULL, 0, 0};
+    give_back(items);
     status = comp_gather(&c->room, &c->route, &canvas, &finished, status, error);
     c->statistics->sent_bytes = c->room.sent_bytes;
     c->statistics->sent_messages = c->room.sent_messages;
@@ -190,8 +195,7 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     comp_mailroom_close(&c->room);
     base_free(c->owners.places);
     base_free(c->loads);
-    base_free(items->items);
-    *items = (fragment_list){NULL, 0, 0};
+    give_back(items);
     return c->out->deep ? gather_deep(c, status, error) : status;
 }
 
@@ -204,7 +208,9 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     composition c = composition_of(group, background, out, statistics);
     int64_t none = 0;
     const insitu_status status = begin(&c, threads, error);
-    return status ? status : composite(&c, items, &none, error);
+    if (!status) return composite(&c, items, &none, error);
+    give_back(items);
+    return status;
 }
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
@@ -232,7 +238,10 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
     base_error here = {INSITU_OK, ""};
     if (!error) error = &here;
     insitu_status status = begin(&c, threads, error);
-    if (status) return status;
+    if (status) {
+        give_back(items);
+        return status;
+    }
     c.merged.overlaps = base_calloc(pixel_set_bytes(pixel_count(&c)), 1);
     if (!c.merged.overlaps && !error->status)
         base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",

@@ -2,8 +2,8 @@
  *
  * Blocks of pixels are owned by ranks that have much there (comp_grid.h). Every rank sends each owner its fragments (on
  * the ways of comp_route.h), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels.
- * Fragments need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result
- * depends on the set of fragments alone, not on ranks, order of arrival or threads.
+ * Fragments need not be sorted; none that can show is dropped; a rank may have any number in a pixel, or none. The
+ * result depends on the set of fragments alone, not on ranks, order of arrival or threads.
  *
  * Sorting by t makes the right picture where fragments do not overlap. Volume fragments that overlap, because cells do,
  * can be put right only by the room that made them: comp_composite_overlaps() tells the pixels in which they do. Any
@@ -28,7 +28,7 @@ typedef struct comp_group {
     MPI_Comm comm; /* used by compositing alone */
     comp_nodes nodes;
     comp_schedule schedule; /* COMP_AUTOMATIC: chosen for each picture */
-    int longest_dense;      /* rounds of more partners are sparse (comp_mail.h); 0: as comp_route.h has it */
+    int longest_dense;      /* rounds of more ranks are sparse (comp_mail.h); 0: as comp_route.h has it */
     comp_claims *claims;    /* comp_claims_create()'s */
 } comp_group;
 

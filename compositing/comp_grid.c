@@ -9,6 +9,7 @@
 #include "comp_grid.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 static void count_blocks(comp_grid *g)
 {
@@ -20,7 +21,8 @@ static void count_blocks(comp_grid *g)
 
 static void merge_blocks(comp_grid *g)
 {
-    if (g->shift_x <= g->shift_y)
+    const bool are_beside = g->blocks_across > 1, are_below = g->blocks > g->blocks_across;
+    if (are_beside && (g->shift_x <= g->shift_y || !are_below))
         g->shift_x++;
     else
         g->shift_y++;

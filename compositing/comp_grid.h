@@ -40,7 +40,7 @@ static inline uint32_t comp_most_blocks(int ranks)
 /* The pixels of a block that is not cut by the picture's border. */
 static inline uint32_t comp_grid_block_pixels(const comp_grid *grid)
 {
-    return COMP_LANES << (grid->shift_x + grid->shift_y + grid->row_shift);
+    return (uint32_t)COMP_LANES << (grid->shift_x + grid->shift_y + grid->row_shift);
 }
 
 static inline uint32_t comp_grid_block(const comp_grid *grid, uint32_t strip)

@@ -60,6 +60,8 @@ insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int
     if (tiles->scratch && (tiles->overlaps || !finds_overlaps)) return INSITU_OK;
     base_free(tiles->scratch);
     base_free(tiles->overlaps);
+    tiles->scratch = NULL;
+    tiles->overlaps = NULL;
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels", (long long)pixels);
 }
 

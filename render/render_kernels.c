@@ -1,6 +1,6 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
- * its surfaces first, so that volumes know where opaque ones end them. A tile is traced in one traversal, or packet by
- * packet. */
+ * its surfaces first, so that volumes know where opaque ones end them. It is traced by the cells that are binned there,
+ * in one traversal, or packet by packet. */
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_batch.h"

@@ -7,7 +7,7 @@
 #include "image.h"
 
 /* Owners send up a tree of places: within a node to its first place, among nodes in a heap of COMP_GATHER_FAN children
- * each. */
+ * each. A route that knows no nodes takes each rank for one. */
 enum { COMP_GATHER_FAN = 64 };
 
 /* The place to which a place >= 1 sends, and how many places send to one. */

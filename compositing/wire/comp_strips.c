@@ -90,7 +90,8 @@ insitu_status comp_strips_make(const comp_grid *grid, const fragment_list *list,
     part parts[MOST_PARTS] = {{NULL, 0, 0, INSITU_OK}};
     const int count = parts_of(grid, list->count);
     if (list->count > UINT32_MAX)
-        return base_fail(error, INSITU_ERROR_MEMORY, "compositing: %lld fragments are more than a rank can send",
+        return base_fail(error, INSITU_ERROR_MEMORY,
+                         "compositing: %lld fragments of one rank are more than can be composited",
                          (long long)list->count);
 #pragma omp parallel for num_threads(count) schedule(static, 1)
     for (int k = 0; k < count; k++)

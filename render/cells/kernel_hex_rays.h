@@ -1,5 +1,5 @@
-/* Rays of several hexes, wedges or pyramids side by side (kernel_polys.h): which two faces of its cell a ray crosses, and
- * where. A lane takes its cell's numbers out of the batch's vectors. */
+/* Rays of several hexes, wedges or pyramids side by side (kernel_polys.h, kernel_occlusion_hexes.h): which two faces of
+ * its cell a ray crosses, and where. A lane takes its cell's numbers out of the batch's vectors. */
 #ifndef RENDER_KERNEL_HEX_RAYS_H
 #define RENDER_KERNEL_HEX_RAYS_H
 

@@ -1,7 +1,7 @@
 /* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
  * kernel_cell_order() and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes.
- * Vertices are put in order first, so that all else comes in order. What
- * is computed in double is computed in two halves. */
+ * Vertices are put in order first, so that all else comes in order. What is computed in double is computed in two
+ * halves. */
 #ifndef RENDER_KERNEL_PLACED_H
 #define RENDER_KERNEL_PLACED_H
 

@@ -1,8 +1,8 @@
-/* Isosurfaces by one traversal a frame: the trees are gone down once for the whole picture, and each cell that the
- * surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may show in; the
- * cells are then binned by tile (render_candidates.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace
- * them from the nearest on, blocks that know of something nearer left out (render_kernels.c, kernel_batch.h; of
- * the volume kernel_tile_cells.h):
+/* Isosurfaces and volumes by one traversal a frame: the trees are gone down once for the whole picture, and each cell
+ * that the surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may
+ * show in; the cells are then binned by tile (render_candidates.c; sort-middle, in the terms of Molnar et al. 1994),
+ * and tiles trace them from the nearest on, blocks that know of something nearer left out (render_kernels.c,
+ * kernel_batch.h; of the volume kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *

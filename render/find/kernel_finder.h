@@ -1,5 +1,5 @@
 /* The search of a subtree for the cells that show (kernel_candidates.h), and the pixels that a cell alone may show in.
- * Isosurfaces are looked for in many cells at once (kernel_candidate_surfaces.h, kernel_candidate_volumes.h), but for
+ * Cells are looked for in many cells at once (kernel_candidate_surfaces.h, kernel_candidate_volumes.h), but for
  * those whose numbers are too large, too small or NaN for lanes. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H

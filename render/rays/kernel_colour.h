@@ -1,4 +1,4 @@
-/* Colours: transfer functions, exponentials, and shading. */
+/* Colours: transfer functions, opacity of samples, and shading. */
 #ifndef RENDER_KERNEL_COLOUR_H
 #define RENDER_KERNEL_COLOUR_H
 

@@ -1,4 +1,5 @@
-/* The tile being traced: its rays, and its blocks' nearest hits. Packets are set up when a cell meets their block. */
+/* The tile being traced: its rays, its blocks' nearest hits, its way down a tree, and lists of pixels of several cells
+ * side by side. Packets are set up when a cell meets their block. */
 #ifndef RENDER_KERNEL_TILE_TRACE_H
 #define RENDER_KERNEL_TILE_TRACE_H
 

@@ -8,8 +8,8 @@
  *     rays with a root      where is it, and its normal?            Newton's method
  *     other rays            what roots are there?                   kernel_roots.h
  *
- * Where the field is known to be monotone along all of the
- * tile's rays (kernel_roots.h), the signs at the faces tell of the root; rays of other cells are searched for roots.
+ * Where the field is known to be monotone along all of the tile's rays (kernel_roots.h), the signs at the faces tell of
+ * the root; rays of other cells are searched for roots.
  * Rays of which an edge function is in doubt, or which cross not just two of a cell's faces once each, are for the cell
  * alone (kernel_surface.h). Every operation is that of a cell alone in the same order, so that a hit has the same bits
  * however it came to be found. */

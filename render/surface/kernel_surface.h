@@ -4,7 +4,8 @@
  * exact, and scaled by a power of two. Whether the surface crosses an interval an odd number of times is decided by the
  * signs at its two faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a
  * face exactly one has a crossing next to it. Neubauer's method takes one crossing where there is an odd number and
- * none where there is an even one; the robust finder (kernel_roots.h) finds all. */
+ * none where there is an even one; the robust finder (kernel_roots.h) finds all. The second half has
+ * polyhedra (kernel_polyhedron.h). */
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
 

@@ -5,9 +5,12 @@
  *     pixels of their boxes   which samples may be in the cell?           by planes about it
  *     samples                 where in the cell, and what is the field?   Newton's method
  *
- * A sample belongs to the cell that has it inside by the cell's own coordinates. Faces are where one of these is at its
- * end, and so that is what the crossings of faces say, but for rounding: samples near a face are decided by these
- * (kernel_crossings.h), which neighbours have in common to the bit. Cells that are bent too much go that way whole. */
+ * Tets of up to 12 pixels have a ray and its tet a lane (kernel_tet_rays.h), and the ends of its interval decide.
+ *
+ * A sample of the others belongs to the cell that has it inside by the cell's own coordinates. Faces are where one of
+ * these is at its end, and so that is what the crossings of faces say, but for rounding: samples near a face are
+ * decided by these (kernel_crossings.h), which neighbours have in common to the bit. Cells that are bent too much go
+ * that way whole. */
 #ifndef RENDER_KERNEL_LOCAL_SAMPLES_H
 #define RENDER_KERNEL_LOCAL_SAMPLES_H
 

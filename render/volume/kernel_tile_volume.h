@@ -1,5 +1,6 @@
 /* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. Hexes, wedges and
- * pyramids are taken many at once, with a sample a lane (kernel_local_samples.h). Other cells are fetched, placed and
+ * pyramids are taken many at once, with a sample a lane, and tets of few pixels with a ray and its tet a lane
+ * (kernel_local_samples.h). Other cells are fetched, placed and
  * given their lines once a window (kernel_tile_cells.h), and go to the packets of the blocks that they may meet, where
  * they fill the samples that they own. A window is so many samples that most rays have one or two:
  *
@@ -115,8 +116,7 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samp
     kernel_packet_lanes(p, &lanes);
     kernel_packet_samples(p, &lanes);
     r->active = p->active;
-    r->blend = (kernel_blend){
-        .open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
+    r->blend = (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
     r->samples.marked = vf_set(INFINITY);
     const vf end = vf_min(p->t_far, vf_set(far));
     const vf from = (near - p->sample_base) * p->sample_inverse, to = (end - p->sample_base) * p->sample_inverse;
