@@ -269,6 +269,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     const insitu_status status = insitu_step(session, cycle, 0);
     told_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
     everywhere(caught_count == 0);
+    input_free(&input);
     create();
     describe();
     everywhere(hand_over(session, &input) == INSITU_OK);
