@@ -445,6 +445,19 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lane
     return vm_and(wanted, vm_not(vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat)));
 }
 
+/* The last step, from residuals in double. */
+SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
+                                    const kernel_point *low, const kernel_point *high, kernel_point *out)
+{
+    kernel_point last = *out;
+    kernel_residual residual;
+    residual.m = kernel_product_at(map->is_pyramid, out->r);
+    kernel_residuals(rays, map, out, residual.off, &residual.value);
+    /* At a double root the field's slope is rounding, and a step by it leads away. */
+    const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
+    kernel_place_move(vm_andnot(wanted, away), &last, out);
+}
+
 /* The roots between low and high by such steps, the last of them from residuals in double. Returns those of wanted on
  * which they do not converge. */
 SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
@@ -468,14 +481,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
         open = kernel_polish_step(rays, map, low, high, open, &residual, out);
     }
     const vm close = vm_andnot(wanted, open);
-    if (vm_any(close)) {
-        kernel_point last = *out;
-        residual.m = kernel_product_at(map->is_pyramid, out->r);
-        kernel_residuals(rays, map, out, residual.off, &residual.value);
-        /* At a double root the field's slope is rounding, and a step by it leads away. */
-        const vm away = kernel_polish_step(rays, map, low, high, close, &residual, &last);
-        kernel_place_move(vm_andnot(close, away), &last, out);
-    }
+    if (vm_any(close)) kernel_polish_last(rays, map, close, low, high, out);
     return open;
 }
 
