@@ -200,12 +200,7 @@ static void contract(const batch *b, kernel_contracted *out, kernel_polys_bounds
     kernel_polys_bound(b->type, b->at, &b->beam, bounds);
     sight_of(b, bounds, &ray);
     contraction_of(&bounds->contractions, &c);
-    if (b->type == GRID_HEX)
-        kernel_contract(GRID_HEX, &c, &ray, vm_all_lanes(), out);
-    else if (b->type == GRID_WEDGE)
-        kernel_contract(GRID_WEDGE, &c, &ray, vm_all_lanes(), out);
-    else
-        kernel_contract(GRID_PYRAMID, &c, &ray, vm_all_lanes(), out);
+    KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
     map_of(b, &map);
     at.t = out->t + vf_load(b->at[2][0]);
     memcpy(at.r, out->r, sizeof at.r);
@@ -289,7 +284,7 @@ static double depth_bound(const batch *b, int lane, double t)
         low = fmin(low, (double)b->at[2][i][lane]);
         high = fmax(high, (double)b->at[2][i][lane]);
     }
-    return 6e-8 * (fabs(t) + (high - low));
+    return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
 static void judge(const batch *b, int lane, const kernel_contracted *at, count *n)

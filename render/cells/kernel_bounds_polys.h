@@ -331,10 +331,10 @@ SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const 
     const kernel_half blur = kernel_half_sqrt(own) + speed * value * 5e-7 + 1e-6;
     const kernel_half rim = 2 * ((face + blur) / rest) + 4e-6;
     const kernel_half_mask contracts = r->is_regular & (kernel_half_mask)(r->rise > 0) &
-                                       (kernel_half_mask)(rate < 0.95) & (kernel_half_mask)(rim < 0.015625);
+                                       (kernel_half_mask)(rate < 0.9) & (kernel_half_mask)(rim < 0.015625);
     kernel_half_store(out->grow, half,
                       kernel_half_select(contracts, 1.0001 * rate / rest, kernel_half_all((double)INFINITY)));
-    kernel_half_store(out->blur, half, type == GRID_PYRAMID ? blur + face : blur);
+    kernel_half_store(out->blur, half, blur);
     kernel_half_store(out->rim, half, rim);
 }
 
@@ -437,6 +437,24 @@ static __attribute__((noinline)) void kernel_polys_bound(int type, const float a
                                                          const kernel_beam *beam, kernel_polys_bounds *out)
 {
     for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
+}
+
+/* The contraction of the first lane's cell. */
+SIMD_INLINE void kernel_polys_bounds_lane(const kernel_polys_bounds *b, int type, kernel_cell_contraction *out)
+{
+    const kernel_contractions *c = &b->contractions;
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++) out->normal[i][a] = b->normal[i][a][0];
+        for (int k = 0; k < kernel_bent_terms(type); k++) out->bent[k][i] = c->bent[k][i][0];
+        out->gradient[i] = b->gradient[i][0];
+        out->offset[i] = c->offset[i][0];
+    }
+    for (int k = 0; k < kernel_bent_terms(type); k++) out->field[k] = c->field[k][0];
+    out->level = b->level[0];
+    out->middle = c->middle[0];
+    out->grow = c->grow[0];
+    out->blur = c->blur[0];
+    out->rim = c->rim[0];
 }
 
 #endif

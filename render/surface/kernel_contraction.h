@@ -30,17 +30,21 @@
 #include <math.h>
 
 #include "grid.h"
+#include "kernel_bounds.h"
+#include "kernel_bounds_polys.h"
 #include "kernel_cell.h"
 #include "kernel_local.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_roots.h"
+#include "kernel_shapes.h"
 #include "simd.h"
 
 enum { KERNEL_CONTRACTION_STEPS = 7 };
 
-/* r from which one step of Newton's method is the last: the error goes as its square. */
-#define KERNEL_CONTRACTION_END 4e-5f
+/* How far r may be off so that one step of Newton's method is the last: that leaves 2 K / (1 - K) times its square, as
+ * f's slope changes by some 4 K a length, 1.8e-7 at most. */
+#define KERNEL_CONTRACTION_END 1e-4f
 
 /* A ray as its cell has it: y and w as above, from the ray's place at the depth of vertex 0 on, and L there and its
  * slope. */
@@ -135,11 +139,13 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);
-    return vf_lt(2.0f * most + 8.0f * c->blur, 0.999f * kernel_dot(s, s));
+    vf blur = 8.0f * c->blur;
+    if (type == GRID_PYRAMID) blur = 4.0f * c->rim; /* twice what faces are off by, as D is no wider */
+    return vf_lt(2.0f * most + blur, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(int type, const kernel_contraction *c, const kernel_sight *ray, vm rays,
-                                 kernel_contracted *out)
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight *ray, vm rays, kernel_contracted *out,
+                                 int type)
 {
     const int terms = kernel_bent_terms(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
@@ -180,12 +186,69 @@ SIMD_INLINE void kernel_contract(int type, const kernel_contraction *c, const ke
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];
 }
 
-/* The last step to crossings of contractions. */
-SIMD_INLINE void kernel_polish_known(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, kernel_point *at)
+/* The last step to crossings of contractions. Changes the map's tolerance. */
+SIMD_INLINE void kernel_polish_known(const kernel_rays *rays, kernel_map_lanes *map, vm wanted, kernel_point *at)
 {
     const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
+    map->tolerance = 4 * KERNEL_CONTRACTION_END;
     at->value = vf_set(0);
     kernel_polish_last(rays, map, wanted, &low, &high, at);
+}
+
+/* ---- a cell alone ---- */
+
+/* The same numbers of one cell, and of L. */
+static __attribute__((noinline)) void kernel_poly_contraction(kernel_poly *poly, const kernel_cell *c,
+                                                              const kernel_beam *beam)
+{
+    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
+    float at[4][8][SIMD_WIDTH];
+    kernel_polys_bounds lanes;
+    for (int n = 0; n < 4; n++)
+        for (int i = 0; i < 8; i++)
+            for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
+    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, beam, &lanes);
+    kernel_polys_bounds_lane(&lanes, c->type, &poly->contraction);
+    poly->has_contraction = true;
+}
+
+/* The cell's numbers in all lanes, and its rays. */
+SIMD_INLINE void kernel_contraction_spread(const kernel_cell_contraction *c, int type, kernel_contraction *out)
+{
+    for (int i = 0; i < 3; i++) out->offset[i] = vf_set(c->offset[i]);
+    for (int k = 0; k < kernel_bent_terms(type); k++) {
+        for (int i = 0; i < 3; i++) out->bent[k][i] = vf_set(c->bent[k][i]);
+        out->field[k] = vf_set(c->field[k]);
+    }
+    out->middle = vf_set(c->middle);
+    out->grow = vf_set(c->grow);
+    out->blur = vf_set(c->blur);
+    out->rim = vf_set(c->rim);
+}
+
+SIMD_INLINE void kernel_contract_cell_of(const kernel_poly *poly, const kernel_rays *rays, vm wanted,
+                                         kernel_contracted *out, int type)
+{
+    const kernel_cell_contraction *c = &poly->contraction;
+    vf origin[3], normal[3][3], gradient[3];
+    kernel_contraction contraction;
+    kernel_sight ray;
+    for (int a = 0; a < 3; a++) {
+        origin[a] = vf_set(poly->map.origin[a]);
+        gradient[a] = vf_set(c->gradient[a]);
+        for (int i = 0; i < 3; i++) normal[i][a] = vf_set(c->normal[i][a]);
+    }
+    kernel_sight_of(rays, origin, (const vf(*)[3])normal, gradient, vf_set(c->level), &ray);
+    kernel_contraction_spread(c, type, &contraction);
+    kernel_contract(&contraction, &ray, wanted, out, type);
+    out->t += origin[2];
+}
+
+/* Decides rays of a packet in a cell; poly is set up. */
+static __attribute__((noinline)) void kernel_contract_cell(const kernel_poly *poly, int type, const kernel_rays *rays,
+                                                           vm wanted, kernel_contracted *out)
+{
+    KERNEL_OF_TYPE(type, kernel_contract_cell_of, poly, rays, wanted, out);
 }
 
 #endif

@@ -209,7 +209,7 @@ SIMD_INLINE void kernel_polys_contract_of(const kernel_tile_trace *t, kernel_pol
         p.active = vm_andnot(p.active, kernel_polys_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
         kernel_polys_contraction(h, p.lane, type, &c);
-        kernel_contract(type, &c, &ray, p.active, &at);
+        kernel_contract(&c, &ray, p.active, &at, type);
         const vf depth = at.t + kernel_hex_take(h->placed.at[2][0], p.lane);
         for (unsigned bits = vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))); bits; bits &= bits - 1)
             kernel_hex_ray_add(&h->rays, &left, n + __builtin_ctz(bits));
