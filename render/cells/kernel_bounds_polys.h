@@ -15,9 +15,9 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* What a ray's one crossing is found by (surface/kernel_contraction.h): Y = inverse (X - vertex 0) + offset is r + N(r),
- * with r from the domain's middle, of a pyramid from the apex, and N's terms bent; the field is L + middle and terms
- * field of the same products. */
+/* What a ray's one crossing is found by (surface/kernel_contraction.h): Y = inverse (X - vertex 0) + offset is r +
+ * N(r), with r from the domain's middle, of a pyramid from the apex, and N's terms bent; the field is L + middle and
+ * terms field of the same products. */
 typedef struct kernel_contractions {
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
     float grow[SIMD_WIDTH]; /* K / (1 - K) of the contraction's constant K; infinite where there is none */
@@ -54,10 +54,7 @@ static const kernel_slope_table kernel_slope_tables[3] = {
      {4, 4, 4},
      {{0, 2, 4, 6}, {0, 4, 1, 5}, {0, 1, 2, 3}},
      {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}}},
-    {6,
-     {2, 2, 3},
-     {{0, 3}, {0, 3}, {0, 1, 2}},
-     {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
+    {6, {2, 2, 3}, {{0, 3}, {0, 3}, {0, 1, 2}}, {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
     {8,
      {2, 2, 2},
      {{0, 1}, {0, 2}, {0, 4}},
@@ -309,13 +306,22 @@ typedef struct kernel_half_rates {
     kernel_half_mask is_regular;
 } kernel_half_rates;
 
-/* The contraction's constant, and the bounds of rounding. */
+/* The contraction's constant K, and the bounds of rounding, in the cell's own coordinates r. With u = 6e-8, e the
+ * vertices' extents from vertex 0 and wide the most of a ray's |x| and |y| and of the vertices':
+ * - y and w have some 4 u of |inverse| times wide across and times e, of inverse's own rounding among them: an eighth
+ * of the 2e-6 that kernel_bounds.h takes for a face's places, and 3e-7 e.
+ * - L and E have 4 u of 1, which values are below, of the gradient times wide across and e along the ray, and as much
+ * for the gradient's own rounding: 5e-7. Over the field's slope, times |w|, that moves r.
+ * - An iteration adds some units of r, and near a pyramid's apex k is no less than 1e-6: 1e-6.
+ * Faces have their crossings within gap of the ray, and values within KERNEL_FACE_BAND of what the field is there
+ * (kernel_bounds_jump()). Either moves the root by itself over 1 - K. rim is twice the sum. */
 SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const kernel_half_rates *r, int half,
                                   kernel_contractions *out)
 {
     const kernel_half zero = {0}, one = zero + 1, speed = r->w / r->rise, wide = r->across * 5e5;
     const kernel_half rate = r->theta + r->slant * speed * 1.0001, rest = one - rate;
-    kernel_half extent[3], own = zero, value = one + (kernel_half_abs(r->gradient[0]) + kernel_half_abs(r->gradient[1])) * wide;
+    kernel_half extent[3], own = zero,
+                           value = one + (kernel_half_abs(r->gradient[0]) + kernel_half_abs(r->gradient[1])) * wide;
     for (int a = 0; a < 3; a++) {
         extent[a] = kernel_half_abs(b->apart[a][1]);
         for (int n = 2; n < grid_type_vertices(type); n++)

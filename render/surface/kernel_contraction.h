@@ -1,8 +1,8 @@
 /* A ray's one crossing in a cell that is bent little, without the faces.
  *
- * With J0 the Jacobian at the middle of the cell's domain, Y = J0^-1 X is r + N(r), and with L linear in space the field
- * is L(X) + E(r) (kernel_bounds.h); N and E have the products of the domain's coordinates alone. On a ray X = X0 + t d,
- * with y = J0^-1 X0 and w = J0^-1 d, the two equations
+ * With J0 the Jacobian at the middle of the cell's domain, Y = J0^-1 X is r + N(r), and with L linear in space the
+ * field is L(X) + E(r) (kernel_bounds.h); N and E have the products of the domain's coordinates alone. On a ray X = X0
+ * + t d, with y = J0^-1 X0 and w = J0^-1 d, the two equations
  *
  *     r + N(r) = y + t w                          r is on the ray
  *     L(X0) + t grad L . d + E(r) = 0             the field is the isovalue there
@@ -65,8 +65,8 @@ typedef struct kernel_contracted {
 } kernel_contracted;
 
 /* origin: vertex 0; normal: J0^-1; gradient and level: L's, at vertex 0. */
-SIMD_INLINE void kernel_sight_of(const kernel_rays *rays, const vf origin[3], const vf normal[3][3], const vf gradient[3],
-                                 vf level, kernel_sight *out)
+SIMD_INLINE void kernel_sight_of(const kernel_rays *rays, const vf origin[3], const vf normal[3][3],
+                                 const vf gradient[3], vf level, kernel_sight *out)
 {
     const vf *g = gradient;
     const vf x = (rays->origin_x + rays->slope_x * origin[2]) - origin[0];

@@ -3,7 +3,8 @@
  * has no crossing to look for. So rays of several cells are put side by side, and what goes on of them is put side by
  * side again:
  *
- *     pixels of boxes       which faces does the ray cross?         signs of edge functions
+ *     pixels of boxes       is the one crossing known, or none?     kernel_contraction.h
+ *     undecided rays        which faces does the ray cross?         signs of edge functions
  *     rays in two faces     where, and what is the field there?     patches
  *     rays with a root      where is it, and its normal?            Newton's method
  *     other rays            what roots are there?                   kernel_roots.h
@@ -114,8 +115,11 @@ static __attribute__((noinline)) unsigned kernel_polys_alone(kernel_tile_trace *
             }
         }
         kernel_packet *p = &t->packets[at[i] / SIMD_WIDTH];
-        kernel_surface_state state = {
-            .surface = t->surface, .layer = t->layer, .hits = &t->hits[at[i] / SIMD_WIDTH], .is_opaque = true};
+        kernel_surface_state state = {.surface = t->surface,
+                                      .layer = t->layer,
+                                      .hits = &t->hits[at[i] / SIMD_WIDTH],
+                                      .is_opaque = true,
+                                      .is_contracted = true};
         p->is_nearer = false;
         kernel_poly_ready(h, n);
         kernel_cell_surface(p, &state, &h->cells[n], &h->polys[n], h->own->value[n],
@@ -190,20 +194,37 @@ SIMD_INLINE void kernel_polys_contraction(const kernel_polys *h, vi lane, int ty
     out->rim = kernel_hex_take(c->rim, lane);
 }
 
-/* Rays whose one crossing is known are found, as places in found_ends[0]; those that have none in their cells are left
- * out, and the others stay. */
+/* Crossings that are known, at these depths, are found, as places in found_ends[0]; of the others only those that are
+ * undecided stay, moved to kept and on. Returns how many are kept then. */
+SIMD_INLINE int kernel_polys_part(kernel_polys *h, int n, const kernel_contracted *at, vf depth, unsigned undecided,
+                                  int kept)
+{
+    for (unsigned bits = vm_bits(at->one); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits), to = h->found.count;
+        h->found_ends.t[0][to] = depth[i];
+        for (int a = 0; a < 3; a++) h->found_ends.r[0][a][to] = at->r[a][i];
+        kernel_hex_ray_add(&h->found, &h->rays, n + i);
+    }
+    for (; undecided; undecided &= undecided - 1) {
+        const int i = n + __builtin_ctz(undecided);
+        h->rays.pixel[kept] = h->rays.pixel[i];
+        h->rays.lane[kept] = h->rays.lane[i];
+        kept++;
+    }
+    return kept;
+}
+
+/* What is known of rays without faces. */
 SIMD_INLINE void kernel_polys_contract_of(const kernel_tile_trace *t, kernel_polys *h, int type)
 {
-    const int count = h->rays.count;
+    int kept = 0;
     h->found.count = 0;
-    kernel_hex_rays left = h->rays;
-    h->rays.count = 0;
-    for (int n = 0; n < count; n += SIMD_WIDTH) {
+    for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_hex_packet p;
         kernel_sight ray;
         kernel_contraction c;
         kernel_contracted at;
-        kernel_hex_packet_begin(&p, t, &left, n);
+        kernel_hex_packet_begin(&p, t, &h->rays, n);
         p.active = vm_and(p.active, vf_le(kernel_hex_take(h->own->near, p.lane), p.far));
         kernel_polys_sight(h, &p, &ray);
         p.active = vm_andnot(p.active, kernel_polys_beside(h, p.lane, &ray));
@@ -211,15 +232,9 @@ SIMD_INLINE void kernel_polys_contract_of(const kernel_tile_trace *t, kernel_pol
         kernel_polys_contraction(h, p.lane, type, &c);
         kernel_contract(&c, &ray, p.active, &at, type);
         const vf depth = at.t + kernel_hex_take(h->placed.at[2][0], p.lane);
-        for (unsigned bits = vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))); bits; bits &= bits - 1)
-            kernel_hex_ray_add(&h->rays, &left, n + __builtin_ctz(bits));
-        for (unsigned bits = vm_bits(at.one); bits; bits &= bits - 1) {
-            const int i = __builtin_ctz(bits), to = h->found.count;
-            h->found_ends.t[0][to] = depth[i];
-            for (int a = 0; a < 3; a++) h->found_ends.r[0][a][to] = at.r[a][i];
-            kernel_hex_ray_add(&h->found, &left, n + i);
-        }
+        kept = kernel_polys_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
     }
+    h->rays.count = kept;
     kernel_hex_rays_close(&h->rays);
     kernel_hex_rays_close(&h->found);
 }

@@ -225,7 +225,7 @@ static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kern
     }
     if (!vm_any(any)) return;
     kernel_poly_setup(p->frame, p->tile, poly, layer, c, value);
-    if (layer->root == RENDER_ROBUST) known = kernel_poly_known(p, state, c, poly, any);
+    if (layer->root == RENDER_ROBUST && !state->is_contracted) known = kernel_poly_known(p, state, c, poly, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
