@@ -12,6 +12,7 @@
  * along the ray; t is rounded to half a unit, twice. */
 #include "kernel_bounds_polys.h"
 #include "kernel_contraction.h"
+#include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "reference_cell.h"
 #include "test_meshes.h"
@@ -207,7 +208,7 @@ static void contract(const batch *b, kernel_contracted *out, kernel_polys_bounds
     map_of(b, &map);
     at.t = out->t + vf_load(b->at[2][0]);
     memcpy(at.r, out->r, sizeof at.r);
-    kernel_polish_known(&b->rays, &map, out->one, &at);
+    kernel_polish_near(&b->rays, &map, out->one, KERNEL_CONTRACTION_END, &at);
     out->t = at.t;
     memcpy(out->r, at.r, sizeof at.r);
 }

@@ -30,13 +30,10 @@
 #include <math.h>
 
 #include "grid.h"
-#include "kernel_bounds.h"
-#include "kernel_bounds_polys.h"
 #include "kernel_cell.h"
 #include "kernel_local.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "simd.h"
 
@@ -186,31 +183,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];
 }
 
-/* The last step to crossings of contractions. Changes the map's tolerance. */
-SIMD_INLINE void kernel_polish_known(const kernel_rays *rays, kernel_map_lanes *map, vm wanted, kernel_point *at)
-{
-    const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
-    map->tolerance = 4 * KERNEL_CONTRACTION_END;
-    at->value = vf_set(0);
-    kernel_polish_last(rays, map, wanted, &low, &high, at);
-}
-
 /* ---- a cell alone ---- */
-
-/* The same numbers of one cell, and of L. */
-static __attribute__((noinline)) void kernel_poly_contraction(kernel_poly *poly, const kernel_cell *c,
-                                                              const kernel_beam *beam)
-{
-    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
-    float at[4][8][SIMD_WIDTH];
-    kernel_polys_bounds lanes;
-    for (int n = 0; n < 4; n++)
-        for (int i = 0; i < 8; i++)
-            for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
-    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, beam, &lanes);
-    kernel_polys_bounds_lane(&lanes, c->type, &poly->contraction);
-    poly->has_contraction = true;
-}
 
 /* The cell's numbers in all lanes, and its rays. */
 SIMD_INLINE void kernel_contraction_spread(const kernel_cell_contraction *c, int type, kernel_contraction *out)
@@ -226,15 +199,14 @@ SIMD_INLINE void kernel_contraction_spread(const kernel_cell_contraction *c, int
     out->rim = vf_set(c->rim);
 }
 
-SIMD_INLINE void kernel_contract_cell_of(const kernel_poly *poly, const kernel_rays *rays, vm wanted,
-                                         kernel_contracted *out, int type)
+SIMD_INLINE void kernel_contract_cell_of(const kernel_cell_contraction *c, const float vertex[3],
+                                         const kernel_rays *rays, vm wanted, kernel_contracted *out, int type)
 {
-    const kernel_cell_contraction *c = &poly->contraction;
     vf origin[3], normal[3][3], gradient[3];
     kernel_contraction contraction;
     kernel_sight ray;
     for (int a = 0; a < 3; a++) {
-        origin[a] = vf_set(poly->map.origin[a]);
+        origin[a] = vf_set(vertex[a]);
         gradient[a] = vf_set(c->gradient[a]);
         for (int i = 0; i < 3; i++) normal[i][a] = vf_set(c->normal[i][a]);
     }
@@ -244,11 +216,12 @@ SIMD_INLINE void kernel_contract_cell_of(const kernel_poly *poly, const kernel_r
     out->t += origin[2];
 }
 
-/* Decides rays of a packet in a cell; poly is set up. */
-static __attribute__((noinline)) void kernel_contract_cell(const kernel_poly *poly, int type, const kernel_rays *rays,
-                                                           vm wanted, kernel_contracted *out)
+/* Decides rays of a packet in a cell, whose vertex 0 is given. */
+static __attribute__((noinline)) void kernel_contract_cell(const kernel_cell_contraction *c, const float vertex[3],
+                                                           int type, const kernel_rays *rays, vm wanted,
+                                                           kernel_contracted *out)
 {
-    KERNEL_OF_TYPE(type, kernel_contract_cell_of, poly, rays, wanted, out);
+    KERNEL_OF_TYPE(type, kernel_contract_cell_of, c, vertex, rays, wanted, out);
 }
 
 #endif

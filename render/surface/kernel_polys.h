@@ -457,7 +457,7 @@ SIMD_INLINE unsigned kernel_polys_known_of(kernel_tile_trace *t, kernel_polys *h
         at.t = vf_load(h->found_ends.t[0] + n);
         for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
         kernel_poly_maps(h, type, p.lane, &map);
-        kernel_polish_known(&p.rays, &map, p.active, &at);
+        kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
         const vm hit = vm_and(p.active, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (!vm_any(hit)) continue;
         kernel_polys_normal(t, &map, at.r, places.normal);

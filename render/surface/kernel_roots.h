@@ -31,6 +31,8 @@
 #ifndef RENDER_KERNEL_ROOTS_H
 #define RENDER_KERNEL_ROOTS_H
 
+#include <math.h>
+
 #include "kernel_cell.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -456,6 +458,16 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_la
     /* At a double root the field's slope is rounding, and a step by it leads away. */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
     kernel_place_move(vm_andnot(wanted, away), &last, out);
+}
+
+/* The last step to roots from places that are off by no more than end. Changes the map's tolerance. */
+SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map_lanes *map, vm wanted, float end,
+                                    kernel_point *at)
+{
+    const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
+    map->tolerance = 4 * end;
+    at->value = vf_set(0);
+    kernel_polish_last(rays, map, wanted, &low, &high, at);
 }
 
 /* The roots between low and high by such steps, the last of them from residuals in double. Returns those of wanted on

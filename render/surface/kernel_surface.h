@@ -14,6 +14,7 @@
 #include "grid.h"
 #include "kernel_accept.h"
 #include "kernel_bounds.h"
+#include "kernel_bounds_polys.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
@@ -188,6 +189,21 @@ SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *stat
     } while (kernel_search_on(&s));
 }
 
+/* The cell's contraction, as lanes have it. */
+static __attribute__((noinline)) void kernel_poly_contraction(kernel_poly *poly, const kernel_cell *c,
+                                                              const kernel_beam *beam)
+{
+    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
+    float at[4][8][SIMD_WIDTH];
+    kernel_polys_bounds lanes;
+    for (int n = 0; n < 4; n++)
+        for (int i = 0; i < 8; i++)
+            for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
+    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, beam, &lanes);
+    kernel_polys_bounds_lane(&lanes, c->type, &poly->contraction);
+    poly->has_contraction = true;
+}
+
 /* Takes the crossings that a contraction knows (kernel_contraction.h); returns the rays that are decided by it. */
 static __attribute__((noinline)) vm kernel_poly_known(kernel_packet *p, kernel_surface_state *state,
                                                       const kernel_cell *c, kernel_poly *poly, vm rays)
@@ -196,13 +212,13 @@ static __attribute__((noinline)) vm kernel_poly_known(kernel_packet *p, kernel_s
     const kernel_rays own = kernel_packet_rays(p);
     kernel_contracted known;
     if (!poly->has_contraction) kernel_poly_contraction(poly, c, &beam);
-    kernel_contract_cell(poly, c->type, &own, rays, &known);
+    kernel_contract_cell(&poly->contraction, poly->map.origin, c->type, &own, rays, &known);
     if (vm_any(known.one)) {
         kernel_map_lanes map;
         kernel_point at = {.t = known.t};
         memcpy(at.r, known.r, sizeof at.r);
         kernel_map_spread(&poly->map, &map);
-        kernel_polish_known(&own, &map, known.one, &at);
+        kernel_polish_near(&own, &map, known.one, KERNEL_CONTRACTION_END, &at);
         kernel_poly_accept(p, state, c, poly, known.one, &at);
     }
     return vm_or(known.one, known.none);
