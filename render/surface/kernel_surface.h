@@ -190,16 +190,17 @@ SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *stat
 }
 
 /* The cell's contraction, as lanes have it. */
-static __attribute__((noinline)) void kernel_poly_contraction(kernel_poly *poly, const kernel_cell *c,
-                                                              const kernel_beam *beam)
+static __attribute__((noinline)) void kernel_poly_contraction(const kernel_packet *p, kernel_poly *poly,
+                                                              const kernel_cell *c)
 {
+    const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
     float at[4][8][SIMD_WIDTH];
     kernel_polys_bounds lanes;
     for (int n = 0; n < 4; n++)
         for (int i = 0; i < 8; i++)
             for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
-    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, beam, &lanes);
+    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, &beam, &lanes);
     kernel_polys_bounds_lane(&lanes, c->type, &poly->contraction);
     poly->has_contraction = true;
 }
@@ -208,10 +209,8 @@ static __attribute__((noinline)) void kernel_poly_contraction(kernel_poly *poly,
 static __attribute__((noinline)) vm kernel_poly_known(kernel_packet *p, kernel_surface_state *state,
                                                       const kernel_cell *c, kernel_poly *poly, vm rays)
 {
-    const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
     const kernel_rays own = kernel_packet_rays(p);
     kernel_contracted known;
-    if (!poly->has_contraction) kernel_poly_contraction(poly, c, &beam);
     kernel_contract_cell(&poly->contraction, poly->map.origin, c->type, &own, rays, &known);
     if (vm_any(known.one)) {
         kernel_map_lanes map;
@@ -241,7 +240,10 @@ static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kern
     }
     if (!vm_any(any)) return;
     kernel_poly_setup(p->frame, p->tile, poly, layer, c, value);
-    if (layer->root == RENDER_ROBUST && !state->is_contracted) known = kernel_poly_known(p, state, c, poly, any);
+    if (layer->root == RENDER_ROBUST && !state->is_contracted) {
+        if (!poly->has_contraction) kernel_poly_contraction(p, poly, c); /* from here: less stack */
+        known = kernel_poly_known(p, state, c, poly, any);
+    }
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
