@@ -99,7 +99,7 @@ set_tests_properties(integral PROPERTIES TIMEOUT 120)
 
 
 # The root finder's headers compiled into the test, on the compiler's own vectors.
-foreach(program test_roots test_roots_bent)
+foreach(program test_roots test_roots_bent test_contraction)
   add_executable(${program} ${program}.c)
   target_compile_definitions(${program} PRIVATE SIMD_PLAIN)
   target_compile_options(${program} PRIVATE -fno-math-errno -fno-trapping-math)
@@ -110,8 +110,12 @@ set_tests_properties(roots PROPERTIES TIMEOUT 120)
 add_test(NAME roots_bent COMMAND test_roots_bent 30000)
 set_tests_properties(roots_bent PROPERTIES TIMEOUT 120)
 
+add_test(NAME contraction COMMAND test_contraction)
+set_tests_properties(contraction PROPERTIES TIMEOUT 120)
+
 insitu_add_long_test(roots_long test_roots 10000000)
 insitu_add_long_test(roots_bent_long test_roots_bent 1000000)
+insitu_add_long_test(contraction_long test_contraction 10000000)
 
 insitu_render_program(test_hits)
 add_test(NAME hits COMMAND test_hits)

@@ -260,10 +260,11 @@ static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, 
 /* Set up once for a cell and isovalue and used by all packets of a tile. Each place of the cell cache has one beside
  * it. */
 typedef struct kernel_poly {
-    bool is_set_up;
+    bool is_set_up, has_contraction;
     int value;
     kernel_map map;
     kernel_bounds bounds; /* robust roots alone */
+    kernel_cell_contraction contraction;
 } kernel_poly;
 
 /* The tile's rays. */
@@ -279,6 +280,7 @@ SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *til
 {
     if (poly->is_set_up) return;
     poly->is_set_up = true;
+    poly->has_contraction = false;
     poly->value = value;
     kernel_map_setup(&poly->map, c);
     if (layer->colour_map) kernel_map_colour(&poly->map, c);

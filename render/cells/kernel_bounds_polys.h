@@ -9,10 +9,20 @@
 #include <string.h>
 
 #include "kernel_cell.h"
+#include "kernel_local.h"
 #include "kernel_map.h"
 #include "kernel_shapes.h"
 #include "kernel_wide.h"
 #include "simd.h"
+
+/* What a ray's one crossing is found by (surface/kernel_contraction.h): Y = inverse (X - vertex 0) + offset is r +
+ * N(r), with r from the domain's middle, of a pyramid from the apex, and N's terms bent; the field is L + middle and
+ * terms field of the same products. */
+typedef struct kernel_contractions {
+    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
+    float grow[SIMD_WIDTH]; /* K / (1 - K) of the contraction's constant K; infinite where there is none */
+    float blur[SIMD_WIDTH], rim[SIMD_WIDTH];
+} kernel_contractions;
 
 /* Lane by lane what kernel_bounds has of a cell. */
 typedef struct kernel_polys_bounds {
@@ -21,6 +31,7 @@ typedef struct kernel_polys_bounds {
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
     /* The cell lies between pairs of planes: low <= normal . (X - vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
+    kernel_contractions contractions;
 } kernel_polys_bounds;
 
 /* Half of the lanes. */
@@ -43,10 +54,7 @@ static const kernel_slope_table kernel_slope_tables[3] = {
      {4, 4, 4},
      {{0, 2, 4, 6}, {0, 4, 1, 5}, {0, 1, 2, 3}},
      {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}}},
-    {6,
-     {2, 2, 3},
-     {{0, 3}, {0, 3}, {0, 1, 2}},
-     {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
+    {6, {2, 2, 3}, {{0, 3}, {0, 3}, {0, 1, 2}}, {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
     {8,
      {2, 2, 2},
      {{0, 1}, {0, 2}, {0, 4}},
@@ -280,6 +288,94 @@ SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int 
     kernel_half_store(out->high[i], half, high + pad);
 }
 
+/* The terms of a number with these coefficients that are bent, about the middle of the domain: the products of two of
+ * its coordinates there, and of a hex of all three. */
+SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_half out[4])
+{
+    const int first = type == GRID_WEDGE ? 1 : 0;
+    for (int j = 0; j < 4; j++) out[j] = (kernel_half){0};
+    for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = bent[first + j];
+    if (type != GRID_HEX) return;
+    for (int j = 0; j < 3; j++) out[j] += 0.5 * bent[3];
+}
+
+/* What kernel_half_bounds() knows when it comes to contractions. */
+typedef struct kernel_half_rates {
+    kernel_half across, gradient[3], e[8];         /* places' rounding across the beam; of L and E */
+    kernel_half gap, slope, theta, slant, rise, w; /* w: the most of |w| */
+    kernel_half_mask is_regular;
+} kernel_half_rates;
+
+/* The contraction's constant K, and the bounds of rounding, in the cell's own coordinates r. With u = 6e-8, e the
+ * vertices' extents from vertex 0 and wide the most of a ray's |x| and |y| and of the vertices':
+ * - y and w have some 4 u of |inverse| times wide across and times e, of inverse's own rounding among them: an eighth
+ * of the 2e-6 that kernel_bounds.h takes for a face's places, and 3e-7 e.
+ * - L and E have 4 u of 1, which values are below, of the gradient times wide across and e along the ray, and as much
+ * for the gradient's own rounding: 5e-7. Over the field's slope, times |w|, that moves r.
+ * - An iteration adds some units of r, and near a pyramid's apex k is no less than 1e-6: 1e-6.
+ * Faces have their crossings within gap of the ray, and values within KERNEL_FACE_BAND of what the field is there
+ * (kernel_bounds_jump()). Either moves the root by itself over 1 - K. rim is twice the sum. */
+SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const kernel_half_rates *r, int half,
+                                  kernel_contractions *out)
+{
+    const kernel_half zero = {0}, one = zero + 1, speed = r->w / r->rise, wide = r->across * 5e5;
+    const kernel_half rate = r->theta + r->slant * speed * 1.0001, rest = one - rate;
+    kernel_half extent[3], own = zero,
+                           value = one + (kernel_half_abs(r->gradient[0]) + kernel_half_abs(r->gradient[1])) * wide;
+    for (int a = 0; a < 3; a++) {
+        extent[a] = kernel_half_abs(b->apart[a][1]);
+        for (int n = 2; n < grid_type_vertices(type); n++)
+            extent[a] = kernel_half_more(kernel_half_abs(b->apart[a][n]), extent[a]);
+    }
+    for (int i = 0; i < 3; i++) {
+        kernel_half term = 0.125 * r->across * (kernel_half_abs(b->inverse[i][0]) + kernel_half_abs(b->inverse[i][1]));
+        for (int a = 0; a < 3; a++) term += 3e-7 * kernel_half_abs(b->inverse[i][a]) * extent[a];
+        own += term * term;
+    }
+    value += kernel_half_abs(r->gradient[2]) * extent[2];
+    const kernel_half face = r->gap + speed * (r->slope * r->gap + 1e-6);
+    const kernel_half blur = kernel_half_sqrt(own) + speed * value * 5e-7 + 1e-6;
+    const kernel_half rim = 2 * ((face + blur) / rest) + 4e-6;
+    const kernel_half_mask contracts = r->is_regular & (kernel_half_mask)(r->rise > 0) &
+                                       (kernel_half_mask)(rate < 0.9) & (kernel_half_mask)(rim < 0.015625);
+    kernel_half_store(out->grow, half,
+                      kernel_half_select(contracts, 1.0001 * rate / rest, kernel_half_all((double)INFINITY)));
+    kernel_half_store(out->blur, half, blur);
+    kernel_half_store(out->rim, half, rim);
+}
+
+SIMD_INLINE void kernel_half_contraction_of(const kernel_bounds_lanes *b, const kernel_half_rates *r, int half,
+                                            kernel_contractions *out, int type)
+{
+    const double *centre = kernel_domain_of(type)->centre;
+    kernel_half middle[4], terms[4];
+    for (int n = 0; n < 4; n++) {
+        const kernel_half *c = n < 3 ? b->exact[n] : r->e;
+        middle[n] = c[0];
+        if (type == GRID_PYRAMID) continue;
+        middle[n] += (centre[0] * c[1] + centre[1] * c[2]) + centre[2] * c[3];
+        if (type == GRID_HEX) middle[n] += 0.25 * ((c[4] + c[5]) + c[6]) + 0.125 * c[7];
+        if (type == GRID_WEDGE) middle[n] += (1.0 / 6) * (c[5] + c[6]);
+    }
+    for (int i = 0; i < 3; i++) {
+        const kernel_half offset =
+            -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
+        kernel_half_store(out->offset[i], half, offset);
+        kernel_half_terms(type, b->bent[i], terms);
+        for (int j = 0; j < kernel_bent_terms(type); j++) kernel_half_store(out->bent[j][i], half, terms[j]);
+    }
+    kernel_half_store(out->middle, half, middle[3]);
+    kernel_half_terms(type, r->e + 4, terms);
+    for (int j = 0; j < kernel_bent_terms(type); j++) kernel_half_store(out->field[j], half, terms[j]);
+    kernel_half_rate(b, type, r, half, out);
+}
+
+static __attribute__((noinline)) void kernel_half_contraction(const kernel_bounds_lanes *b, const kernel_half_rates *r,
+                                                              int half, kernel_contractions *out, int type)
+{
+    KERNEL_OF_TYPE(type, kernel_half_contraction_of, b, r, half, out);
+}
+
 /* kernel_bounds_linear(), with kernel_bounds_jump() and kernel_bounds_rise() of rays about (0, 0, 1). */
 SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
                                     kernel_polys_bounds *out, int type)
@@ -329,6 +425,17 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     kernel_half_store(out->level, half, level);
     for (int a = 0; a < 3; a++) kernel_half_store(out->gradient[a], half, g[a]);
     kernel_half_store(out->thickness, half, kernel_half_select(is_regular, thickness, endless));
+    kernel_half_rates rates = {.across = across,
+                               .gap = kernel_half_sqrt(gap),
+                               .slope = slope,
+                               .theta = theta,
+                               .slant = slant,
+                               .rise = rise,
+                               .w = length + off,
+                               .is_regular = is_regular};
+    memcpy(rates.gradient, g, sizeof g);
+    memcpy(rates.e, e, sizeof e);
+    kernel_half_contraction(&b, &rates, half, &out->contractions, type);
 }
 
 /* Lane by lane, of places in tile space and values. */
@@ -336,6 +443,24 @@ static __attribute__((noinline)) void kernel_polys_bound(int type, const float a
                                                          const kernel_beam *beam, kernel_polys_bounds *out)
 {
     for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
+}
+
+/* The contraction of the first lane's cell. */
+SIMD_INLINE void kernel_polys_bounds_lane(const kernel_polys_bounds *b, int type, kernel_cell_contraction *out)
+{
+    const kernel_contractions *c = &b->contractions;
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++) out->normal[i][a] = b->normal[i][a][0];
+        for (int k = 0; k < kernel_bent_terms(type); k++) out->bent[k][i] = c->bent[k][i][0];
+        out->gradient[i] = b->gradient[i][0];
+        out->offset[i] = c->offset[i][0];
+    }
+    for (int k = 0; k < kernel_bent_terms(type); k++) out->field[k] = c->field[k][0];
+    out->level = b->level[0];
+    out->middle = c->middle[0];
+    out->grow = c->grow[0];
+    out->blur = c->blur[0];
+    out->rim = c->rim[0];
 }
 
 #endif

@@ -433,6 +433,11 @@ typedef struct kernel_bounds {
     float jump;                /* a face's value and the field on the ray beside it are never farther apart */
 } kernel_bounds;
 
+/* What one cell's rays are contracted by (surface/kernel_contraction.h, kernel_bounds_polys.h). */
+typedef struct kernel_cell_contraction {
+    float normal[3][3], gradient[3], level, offset[3], middle, bent[4][3], field[4], grow, blur, rim;
+} kernel_cell_contraction;
+
 /* The domain's corners, widened by KERNEL_DOMAIN_RIM on all sides for what rounding takes out of it, a wedge's last two
  * again; of a pyramid a / k, b / k and k. And the centre. */
 #define KERNEL_LOW -KERNEL_DOMAIN_RIM

@@ -180,6 +180,7 @@ typedef struct kernel_surface_state {
     int layer;
     kernel_hits *hits;
     bool is_opaque;
+    bool is_contracted; /* lanes have asked contractions (kernel_contraction.h) of these rays, which did not decide */
 } kernel_surface_state;
 
 /* Takes gradients from tile space to camera axes by undoing the shear. */

@@ -3,7 +3,8 @@
  * has no crossing to look for. So rays of several cells are put side by side, and what goes on of them is put side by
  * side again:
  *
- *     pixels of boxes       which faces does the ray cross?         signs of edge functions
+ *     pixels of boxes       is the one crossing known, or none?     kernel_contraction.h
+ *     undecided rays        which faces does the ray cross?         signs of edge functions
  *     rays in two faces     where, and what is the field there?     patches
  *     rays with a root      where is it, and its normal?            Newton's method
  *     other rays            what roots are there?                   kernel_roots.h
@@ -26,6 +27,7 @@
 #include "kernel_bounds_polys.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
+#include "kernel_contraction.h"
 #include "kernel_hex_rays.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -113,8 +115,11 @@ static __attribute__((noinline)) unsigned kernel_polys_alone(kernel_tile_trace *
             }
         }
         kernel_packet *p = &t->packets[at[i] / SIMD_WIDTH];
-        kernel_surface_state state = {
-            .surface = t->surface, .layer = t->layer, .hits = &t->hits[at[i] / SIMD_WIDTH], .is_opaque = true};
+        kernel_surface_state state = {.surface = t->surface,
+                                      .layer = t->layer,
+                                      .hits = &t->hits[at[i] / SIMD_WIDTH],
+                                      .is_opaque = true,
+                                      .is_contracted = true};
         p->is_nearer = false;
         kernel_poly_ready(h, n);
         kernel_cell_surface(p, &state, &h->cells[n], &h->polys[n], h->own->value[n],
@@ -146,29 +151,97 @@ SIMD_INLINE vm kernel_polys_far(const kernel_polys *h, const kernel_hex_packet *
                   vf_lt(thick, side * kernel_polys_linear_at(h, p, to)));
 }
 
-/* Rays that are so between the planes that their cells lie between: a face's value has L's sign on these, and there is
- * no root. Depths are from vertex 0's on. */
-SIMD_INLINE vm kernel_polys_beside(const kernel_polys *h, const kernel_hex_packet *p)
+/* The rays as their cells have them. */
+SIMD_INLINE void kernel_polys_sight(const kernel_polys *h, const kernel_hex_packet *p, kernel_sight *out)
 {
-    const kernel_rays *rays = &p->rays;
-    const vf z = kernel_hex_take(h->placed.at[2][0], p->lane);
-    const vf x = (rays->origin_x + rays->slope_x * z) - kernel_hex_take(h->placed.at[0][0], p->lane);
-    const vf y = (rays->origin_y + rays->slope_y * z) - kernel_hex_take(h->placed.at[1][0], p->lane);
-    const vf thick = kernel_hex_take(h->bounds.thickness, p->lane);
-    vf from = vf_set(-INFINITY), to = vf_set(INFINITY), g[3];
+    vf origin[3], normal[3][3], gradient[3];
+    for (int a = 0; a < 3; a++) {
+        origin[a] = kernel_hex_take(h->placed.at[a][0], p->lane);
+        gradient[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
+        for (int i = 0; i < 3; i++) normal[i][a] = kernel_hex_take(h->bounds.normal[i][a], p->lane);
+    }
+    kernel_sight_of(&p->rays, origin, (const vf(*)[3])normal, gradient, kernel_hex_take(h->bounds.level, p->lane), out);
+}
+
+/* Rays that are far from the slab between the planes that their cells lie between: a face's value has L's sign on
+ * these, and there is no root. Depths are from vertex 0's on. */
+SIMD_INLINE vm kernel_polys_beside(const kernel_polys *h, vi lane, const kernel_sight *ray)
+{
+    const vf thick = kernel_hex_take(h->bounds.thickness, lane);
+    vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) g[a] = kernel_hex_take(h->bounds.normal[i][a], p->lane);
-        const vf at = g[0] * x + g[1] * y, inverse = 1.0f / ((g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2]);
-        const vf low = (kernel_hex_take(h->bounds.low[i], p->lane) - at) * inverse;
-        const vf high = (kernel_hex_take(h->bounds.high[i], p->lane) - at) * inverse;
+        const vf inverse = 1.0f / ray->w[i];
+        const vf low = (kernel_hex_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
+        const vf high = (kernel_hex_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
         from = vf_max(vf_min(low, high), from);
         to = vf_min(vf_max(low, high), to);
     }
-    for (int a = 0; a < 3; a++) g[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
-    const vf level = kernel_hex_take(h->bounds.level, p->lane) + (g[0] * x + g[1] * y);
-    const vf rise = (g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2];
-    const vf begin = level + rise * from, end = level + rise * to;
+    const vf begin = ray->level + ray->rise * from, end = ray->level + ray->rise * to;
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
+}
+
+SIMD_INLINE void kernel_polys_contraction(const kernel_polys *h, vi lane, int type, kernel_contraction *out)
+{
+    const kernel_contractions *c = &h->bounds.contractions;
+    for (int i = 0; i < 3; i++) out->offset[i] = kernel_hex_take(c->offset[i], lane);
+    for (int k = 0; k < kernel_bent_terms(type); k++) {
+        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_hex_take(c->bent[k][i], lane);
+        out->field[k] = kernel_hex_take(c->field[k], lane);
+    }
+    out->middle = kernel_hex_take(c->middle, lane);
+    out->grow = kernel_hex_take(c->grow, lane);
+    out->blur = kernel_hex_take(c->blur, lane);
+    out->rim = kernel_hex_take(c->rim, lane);
+}
+
+/* Crossings that are known, at these depths, are found, as places in found_ends[0]; of the others only those that are
+ * undecided stay, moved to kept and on. Returns how many are kept then. */
+SIMD_INLINE int kernel_polys_part(kernel_polys *h, int n, const kernel_contracted *at, vf depth, unsigned undecided,
+                                  int kept)
+{
+    for (unsigned bits = vm_bits(at->one); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits), to = h->found.count;
+        h->found_ends.t[0][to] = depth[i];
+        for (int a = 0; a < 3; a++) h->found_ends.r[0][a][to] = at->r[a][i];
+        kernel_hex_ray_add(&h->found, &h->rays, n + i);
+    }
+    for (; undecided; undecided &= undecided - 1) {
+        const int i = n + __builtin_ctz(undecided);
+        h->rays.pixel[kept] = h->rays.pixel[i];
+        h->rays.lane[kept] = h->rays.lane[i];
+        kept++;
+    }
+    return kept;
+}
+
+/* What is known of rays without faces. */
+SIMD_INLINE void kernel_polys_contract_of(const kernel_tile_trace *t, kernel_polys *h, int type)
+{
+    int kept = 0;
+    h->found.count = 0;
+    for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
+        kernel_hex_packet p;
+        kernel_sight ray;
+        kernel_contraction c;
+        kernel_contracted at;
+        kernel_hex_packet_begin(&p, t, &h->rays, n);
+        p.active = vm_and(p.active, vf_le(kernel_hex_take(h->own->near, p.lane), p.far));
+        kernel_polys_sight(h, &p, &ray);
+        p.active = vm_andnot(p.active, kernel_polys_beside(h, p.lane, &ray));
+        if (!vm_any(p.active)) continue;
+        kernel_polys_contraction(h, p.lane, type, &c);
+        kernel_contract(&c, &ray, p.active, &at, type);
+        const vf depth = at.t + kernel_hex_take(h->placed.at[2][0], p.lane);
+        kept = kernel_polys_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
+    }
+    h->rays.count = kept;
+    kernel_hex_rays_close(&h->rays);
+    kernel_hex_rays_close(&h->found);
+}
+
+static __attribute__((noinline)) void kernel_polys_contract(const kernel_tile_trace *t, kernel_polys *h)
+{
+    KERNEL_OF_TYPE(h->own->type, kernel_polys_contract_of, t, h);
 }
 
 /* The rays that cross two faces of their cells go on. Returns the blocks in which something is nearer. */
@@ -182,7 +255,6 @@ SIMD_INLINE unsigned kernel_polys_meet_of(kernel_tile_trace *t, kernel_polys *h,
         uint8_t faces[SIMD_WIDTH];
         kernel_hex_packet_begin(&p, t, &h->rays, n);
         p.active = vm_and(p.active, vf_le(kernel_hex_take(h->own->near, p.lane), p.far));
-        p.active = vm_andnot(p.active, kernel_polys_beside(h, &p));
         if (!vm_any(p.active)) continue;
         kernel_poly_faces(&h->placed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
@@ -372,6 +444,35 @@ static __attribute__((noinline)) unsigned kernel_polys_hit(kernel_tile_trace *t,
     return KERNEL_OF_TYPE(h->own->type, kernel_polys_hit_of, t, h);
 }
 
+/* The crossings that kernel_polys_contract() has found. */
+SIMD_INLINE unsigned kernel_polys_known_of(kernel_tile_trace *t, kernel_polys *h, int type)
+{
+    unsigned nearer = 0;
+    for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
+        kernel_hex_packet p;
+        kernel_map_lanes map;
+        kernel_point at;
+        kernel_polys_places places;
+        kernel_hex_packet_begin(&p, t, &h->found, n);
+        at.t = vf_load(h->found_ends.t[0] + n);
+        for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
+        kernel_poly_maps(h, type, p.lane, &map);
+        kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
+        const vm hit = vm_and(p.active, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
+        if (!vm_any(hit)) continue;
+        kernel_polys_normal(t, &map, at.r, places.normal);
+        places.t = at.t;
+        memcpy(places.r, at.r, sizeof places.r);
+        nearer |= kernel_polys_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
+    }
+    return nearer;
+}
+
+static __attribute__((noinline)) unsigned kernel_polys_known(kernel_tile_trace *t, kernel_polys *h)
+{
+    return KERNEL_OF_TYPE(h->own->type, kernel_polys_known_of, t, h);
+}
+
 /* kernel_limits_spread(), each lane with its own cell's. */
 SIMD_INLINE void kernel_polys_limits(const kernel_polys *h, vi lane, kernel_limits *out)
 {
@@ -449,7 +550,9 @@ static __attribute__((noinline)) unsigned kernel_polys_search(kernel_tile_trace 
 static __attribute__((noinline)) void kernel_polys_trace(kernel_tile_trace *t, kernel_polys *h)
 {
     kernel_hex_rays_close(&h->rays);
-    unsigned nearer = kernel_polys_meet(t, h);
+    kernel_polys_contract(t, h);
+    unsigned nearer = kernel_polys_known(t, h);
+    nearer |= kernel_polys_meet(t, h);
     kernel_polys_cross(t, h);
     kernel_hex_rays_close(&h->found);
     kernel_hex_rays_close(&h->others);

@@ -31,6 +31,8 @@
 #ifndef RENDER_KERNEL_ROOTS_H
 #define RENDER_KERNEL_ROOTS_H
 
+#include <math.h>
+
 #include "kernel_cell.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -445,6 +447,29 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lane
     return vm_and(wanted, vm_not(vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat)));
 }
 
+/* The last step, from residuals in double. */
+SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
+                                    const kernel_point *low, const kernel_point *high, kernel_point *out)
+{
+    kernel_point last = *out;
+    kernel_residual residual;
+    residual.m = kernel_product_at(map->is_pyramid, out->r);
+    kernel_residuals(rays, map, out, residual.off, &residual.value);
+    /* At a double root the field's slope is rounding, and a step by it leads away. */
+    const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
+    kernel_place_move(vm_andnot(wanted, away), &last, out);
+}
+
+/* The last step to roots from places that are off by no more than end. Changes the map's tolerance. */
+SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map_lanes *map, vm wanted, float end,
+                                    kernel_point *at)
+{
+    const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
+    map->tolerance = 4 * end;
+    at->value = vf_set(0);
+    kernel_polish_last(rays, map, wanted, &low, &high, at);
+}
+
 /* The roots between low and high by such steps, the last of them from residuals in double. Returns those of wanted on
  * which they do not converge. */
 SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
@@ -468,14 +493,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
         open = kernel_polish_step(rays, map, low, high, open, &residual, out);
     }
     const vm close = vm_andnot(wanted, open);
-    if (vm_any(close)) {
-        kernel_point last = *out;
-        residual.m = kernel_product_at(map->is_pyramid, out->r);
-        kernel_residuals(rays, map, out, residual.off, &residual.value);
-        /* At a double root the field's slope is rounding, and a step by it leads away. */
-        const vm away = kernel_polish_step(rays, map, low, high, close, &residual, &last);
-        kernel_place_move(vm_andnot(close, away), &last, out);
-    }
+    if (vm_any(close)) kernel_polish_last(rays, map, close, low, high, out);
     return open;
 }
 

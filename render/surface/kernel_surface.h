@@ -15,10 +15,12 @@
 #include "grid.h"
 #include "kernel_accept.h"
 #include "kernel_bounds.h"
+#include "kernel_bounds_polys.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
 #include "kernel_colour.h"
+#include "kernel_contraction.h"
 #include "kernel_crossings.h"
 #include "kernel_differences.h"
 #include "kernel_edges.h"
@@ -188,21 +190,65 @@ SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *stat
     } while (kernel_search_on(&s));
 }
 
+/* The cell's contraction, as lanes have it. */
+static __attribute__((noinline)) void kernel_poly_contraction(const kernel_packet *p, kernel_poly *poly,
+                                                              const kernel_cell *c)
+{
+    const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
+    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
+    float at[4][8][SIMD_WIDTH];
+    kernel_polys_bounds lanes;
+    for (int n = 0; n < 4; n++)
+        for (int i = 0; i < 8; i++)
+            for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
+    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, &beam, &lanes);
+    kernel_polys_bounds_lane(&lanes, c->type, &poly->contraction);
+    poly->has_contraction = true;
+}
+
+/* Takes the crossings that a contraction knows (kernel_contraction.h); returns the rays that are decided by it. */
+static __attribute__((noinline)) vm kernel_poly_known(kernel_packet *p, kernel_surface_state *state,
+                                                      const kernel_cell *c, kernel_poly *poly, vm rays)
+{
+    const kernel_rays own = kernel_packet_rays(p);
+    kernel_contracted known;
+    kernel_contract_cell(&poly->contraction, poly->map.origin, c->type, &own, rays, &known);
+    if (vm_any(known.one)) {
+        kernel_map_lanes map;
+        kernel_point at = {.t = known.t};
+        memcpy(at.r, known.r, sizeof at.r);
+        kernel_map_spread(&poly->map, &map);
+        kernel_polish_near(&own, &map, known.one, KERNEL_CONTRACTION_END, &at);
+        kernel_poly_accept(p, state, c, poly, known.one, &at);
+    }
+    return vm_or(known.one, known.none);
+}
+
 static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state,
                                                           const kernel_cell *c, kernel_poly *poly, int value, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_poly_intervals(p, c, rays, false, list);
+    vm asked[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
-        const vm near = kernel_is_near(p, i);
         /* Where a ray crosses both halves of a quad but not its patch, both ends are one place beside the ray. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        const vm wanted = vm_and(near, layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
+        asked[n] = vm_and(kernel_is_near(p, i), layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
+        any = vm_or(any, asked[n]);
+    }
+    if (!vm_any(any)) return;
+    kernel_poly_setup(p->frame, p->tile, poly, layer, c, value);
+    if (layer->root == RENDER_ROBUST && !state->is_contracted) {
+        if (!poly->has_contraction) kernel_poly_contraction(p, poly, c); /* from here: less stack */
+        known = kernel_poly_known(p, state, c, poly, any);
+    }
+    for (int n = 0; n < count; n++) {
+        kernel_interval *i = &list[n];
+        const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
         if (!vm_any(wanted)) continue;
-        kernel_poly_setup(p->frame, p->tile, poly, layer, c, value);
         if (layer->root == RENDER_ROBUST) {
             kernel_poly_robust(p, state, c, poly, i, wanted);
             continue;
