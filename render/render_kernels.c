@@ -13,6 +13,7 @@
 #include "kernel_differences.h"
 #include "kernel_finder.h"
 #include "kernel_hits.h"
+#include "kernel_tile_queue.h"
 #include "kernel_occlusion.h"
 #include "kernel_occlusion_rays.h"
 #include "kernel_packet.h"
@@ -34,38 +35,6 @@
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
-static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, const kernel_tile_candidate *candidate,
-                             int part, int value, unsigned blocks)
-{
-    const render_surface_layer *layer = t->surface->layer;
-    const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = t->cell;
-    if (arrays->has_lanes && kernel_arrays_type(arrays, candidate->cell) == GRID_TET) {
-        kernel_arrays_fetch(c, arrays, candidate->cell, 4);
-        kernel_tet_place(c, t->frame, &t->tile);
-    } else {
-        kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
-            return;
-        }
-        kernel_cell_move(c, t->frame, &t->tile, g);
-    }
-    kernel_cell_relative(c, layer->values[value]);
-    kernel_tile_ready(t, part);
-    t->poly->is_set_up = false;
-    kernel_blocks_meet(t, blocks, part, c->index, c, value);
-}
-
-/* Sets the tile's layer by the source. Returns the isovalue's number in that layer. */
-SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
-{
-    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
-    *part = (int)(source / RENDER_MAX_ISOVALUES);
-    kernel_tile_set_layer(t, isovalue->surface);
-    return isovalue->value;
-}
-
 /* Prefetches what is read first of a cell: its vertices' indices, or its active record. */
 SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_tile_candidate *candidate)
 {
@@ -86,49 +55,11 @@ typedef struct kernel_pending {
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_pending;
 
-SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
-{
-    return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
-}
-
-/* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
- * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
-SIMD_INLINE bool kernel_is_for_polys(const kernel_tile_trace *t, const kernel_batch *b,
-                                     const kernel_tile_candidate *candidate, int type)
-{
-    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_polys_fit(t, &b->arrays)) return false;
-    return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
-           kernel_box_pixels(candidate->box) <= KERNEL_POLY_PIXELS;
-}
-
-/* Is it put into any batch? */
-SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
-                                     const kernel_tile_candidate *candidate)
-{
-    const int type = kernel_arrays_type(&b->arrays, candidate->cell);
-    return type == GRID_TET ? b->takes_batches : kernel_is_for_polys(t, b, candidate, type);
-}
-
-/* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
-static void kernel_tile_meet_others(kernel_tile_trace *t, kernel_batch *b, kernel_polys *h, kernel_pending *others)
-{
-    if (!others->count) return;
-    kernel_batch_end(t, b);
-    kernel_polys_end(t, h);
-    for (int n = 0; n < others->count; n++) {
-        int part;
-        const int value = kernel_tile_source(t, others->items[n]->source, &part);
-        const unsigned blocks = kernel_candidate_blocks(t, others->items[n]);
-        kernel_batch_turn(t, b, part);
-        if (blocks) kernel_tile_meet(t, &b->arrays, others->items[n], part, value, blocks);
-    }
-    others->count = 0;
-}
-
 /* Prefetches the vertices of all pending cells, then traces them. */
-static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_batch *b, kernel_polys *h,
-                                                               kernel_pending *w, kernel_pending *others)
+static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
+                                                               kernel_pending *w)
 {
+    kernel_batch *b = &m->batch;
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
@@ -142,19 +73,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
     for (int n = 0; n < w->count; n++) {
         int part;
         const int value = kernel_tile_source(t, w->items[n]->source, &part);
-        const unsigned blocks = kernel_candidate_blocks(t, w->items[n]);
-        if (!blocks) continue;
-        kernel_batch_turn(t, b, part);
-        const int type = kernel_arrays_type(&b->arrays, w->items[n]->cell);
-        if (type == GRID_TET && b->takes_batches) {
-            kernel_batch_add(t, b, w->items[n], value);
-        } else if (kernel_is_for_polys(t, b, w->items[n], type)) {
-            kernel_polys_turn(t, h, &b->arrays, part);
-            kernel_polys_wait(t, h, type, w->items[n], value);
-        } else {
-            if (others->count == SIMD_WIDTH) kernel_tile_meet_others(t, b, h, others);
-            others->items[others->count++] = w->items[n];
-        }
+        if (kernel_candidate_blocks(t, w->items[n])) kernel_tile_queue_add(t, m, w->items[n], part, value);
     }
     w->count = 0;
 }
@@ -163,11 +82,9 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {
-    kernel_batch batch;
-    kernel_polys polys;
-    kernel_pending pending = {0}, others = {0};
-    kernel_batch_begin(&batch);
-    kernel_polys_begin(&polys);
+    kernel_tile_queue meeting;
+    kernel_pending pending = {0};
+    kernel_tile_queue_begin(&meeting);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
             const kernel_tile_candidate *candidate = &q->items[i];
@@ -177,12 +94,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &batch, &polys, &pending, &others);
+            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &meeting, &pending);
         }
-    kernel_tile_meet_pending(t, &batch, &polys, &pending, &others);
-    kernel_tile_meet_others(t, &batch, &polys, &others);
-    kernel_batch_end(t, &batch);
-    kernel_polys_end(t, &polys);
+    kernel_tile_meet_pending(t, &meeting, &pending);
+    kernel_tile_queue_end(t, &meeting);
 }
 
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
@@ -210,6 +125,7 @@ typedef struct kernel_memory {
     kernel_tile_segments segments;
     kernel_tile_cells cells;
     kernel_finder finder;
+    kernel_tile_finder search;
 } kernel_memory;
 
 static int volume_turns(const kernel_frame *f)
@@ -333,14 +249,27 @@ static void trace_tile_samples(kernel_tile_trace *t)
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
+/* May the tile see any tree's box? */
+static bool is_covered(const kernel_frame *f, int x0, int y0)
+{
+    return x0 <= f->cover[0][1] && x0 + KERNEL_TILE > f->cover[0][0] && y0 <= f->cover[1][1] &&
+           y0 + KERNEL_TILE > f->cover[1][0];
+}
+
 /* May the tile have samples or segments of volumes? */
 static bool has_volume(const kernel_frame *f, int x0, int y0)
 {
     kernel_tile_candidate *items;
-    if (!f->volume_count || x0 > f->cover[0][1] || x0 + KERNEL_TILE <= f->cover[0][0] || y0 > f->cover[1][1] ||
-        y0 + KERNEL_TILE <= f->cover[1][0])
-        return false;
+    if (!f->volume_count || !is_covered(f, x0, y0)) return false;
     return !f->volume_candidates || kernel_bin(f, f->volume_candidates, f->volume_starts, x0, y0, &items);
+}
+
+/* May it have hits? */
+static bool has_surface(const kernel_frame *f, int x0, int y0)
+{
+    kernel_tile_candidate *items;
+    if (!f->surface_count) return false;
+    return f->candidates ? kernel_candidates_in_tile(f, x0, y0, &items) : is_covered(f, x0, y0);
 }
 
 static bool begins_run(const kernel_frame *f, int x0, int y0)
@@ -358,9 +287,8 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     }
     if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
-    kernel_tile_candidate *items;
     const bool fogs = has_volume(f, x0, y0);
-    if (!fogs && (!f->surface_count || (f->candidates && !kernel_candidates_in_tile(f, x0, y0, &items)))) return;
+    if (!fogs && !has_surface(f, x0, y0)) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
@@ -410,6 +338,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.poly = &m->tile_poly;
+    m->tile.search = &m->search;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;
 }
