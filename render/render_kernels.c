@@ -1,6 +1,8 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
  * its surfaces first, so that volumes know where opaque ones end them. It is traced by the cells that are binned there,
  * in one traversal, or packet by packet. */
+#include <stddef.h>
+
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_batch.h"
@@ -13,7 +15,6 @@
 #include "kernel_differences.h"
 #include "kernel_finder.h"
 #include "kernel_hits.h"
-#include "kernel_tile_queue.h"
 #include "kernel_occlusion.h"
 #include "kernel_occlusion_rays.h"
 #include "kernel_packet.h"
@@ -32,6 +33,131 @@
 #include "pixel_set.h"
 #include "render.h"
 #include "simd.h"
+
+/* ---- a tile's cells on their way from where they are found to its rays ---- */
+
+/* Makes a placed cell with its values ready for blocks to meet it. */
+SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
+{
+    t->cell->part = part;
+    kernel_cell_order(t->cell);
+    kernel_cell_lines(t->cell, t->frame, &t->tile);
+    if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);
+}
+
+static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, const kernel_tile_candidate *candidate,
+                             int part, int value, unsigned blocks)
+{
+    const render_surface_layer *layer = t->surface->layer;
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_cell *c = t->cell;
+    if (arrays->has_lanes && kernel_arrays_type(arrays, candidate->cell) == GRID_TET) {
+        kernel_arrays_fetch(c, arrays, candidate->cell, 4);
+        kernel_tet_place(c, t->frame, &t->tile);
+    } else {
+        kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
+            return;
+        }
+        kernel_cell_move(c, t->frame, &t->tile, g);
+    }
+    kernel_cell_relative(c, layer->values[value]);
+    kernel_tile_ready(t, part);
+    t->poly->is_set_up = false;
+    kernel_blocks_meet(t, blocks, part, c->index, c, value);
+}
+
+/* Sets the tile's layer by the source. Returns the isovalue's number in that layer. */
+SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
+{
+    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
+    *part = (int)(source / RENDER_MAX_ISOVALUES);
+    kernel_tile_set_layer(t, isovalue->surface);
+    return isovalue->value;
+}
+
+SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
+{
+    return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
+}
+
+/* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
+ * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
+SIMD_INLINE bool kernel_is_for_polys(const kernel_tile_trace *t, const kernel_batch *b,
+                                     const kernel_tile_candidate *candidate, int type)
+{
+    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_polys_fit(t, &b->arrays)) return false;
+    return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
+           kernel_box_pixels(candidate->box) <= KERNEL_POLY_PIXELS;
+}
+
+/* What a tile's cells go through from where they are found: batches of several, or, those that are for no batch, one by
+ * one. */
+enum { KERNEL_ALONE = SIMD_WIDTH };
+
+typedef struct kernel_tile_queue {
+    kernel_batch batch;
+    kernel_polys polys;
+    int alone_count;
+    kernel_tile_candidate alone[KERNEL_ALONE];
+} kernel_tile_queue;
+
+static void kernel_tile_queue_begin(kernel_tile_queue *m)
+{
+    kernel_batch_begin(&m->batch);
+    kernel_polys_begin(&m->polys);
+    m->alone_count = 0;
+}
+
+/* Is it put into any batch? */
+SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
+                                     const kernel_tile_candidate *candidate)
+{
+    const int type = kernel_arrays_type(&b->arrays, candidate->cell);
+    return type == GRID_TET ? b->takes_batches : kernel_is_for_polys(t, b, candidate, type);
+}
+
+/* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
+static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
+{
+    if (!m->alone_count) return;
+    kernel_batch_end(t, &m->batch);
+    kernel_polys_end(t, &m->polys);
+    for (int n = 0; n < m->alone_count; n++) {
+        int part;
+        const int value = kernel_tile_source(t, m->alone[n].source, &part);
+        const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
+        kernel_batch_turn(t, &m->batch, part);
+        if (blocks) kernel_tile_meet(t, &m->batch.arrays, &m->alone[n], part, value, blocks);
+    }
+    m->alone_count = 0;
+}
+
+/* Takes a cell of the layer under way and the part. */
+SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
+                                       const kernel_tile_candidate *candidate, int part, int value)
+{
+    kernel_batch_turn(t, &m->batch, part);
+    const int type = kernel_arrays_type(&m->batch.arrays, candidate->cell);
+    if (type == GRID_TET && m->batch.takes_batches) {
+        kernel_batch_add(t, &m->batch, candidate, value);
+    } else if (kernel_is_for_polys(t, &m->batch, candidate, type)) {
+        kernel_polys_turn(t, &m->polys, &m->batch.arrays, part);
+        kernel_polys_wait(t, &m->polys, type, candidate, value);
+    } else {
+        if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
+        m->alone[m->alone_count++] = *candidate;
+    }
+}
+
+/* Traces all that waits. */
+static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
+{
+    kernel_tile_queue_alone(t, m);
+    kernel_batch_end(t, &m->batch);
+    kernel_polys_end(t, &m->polys);
+}
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
@@ -112,6 +238,92 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
     if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, &by_depth, true);
 }
 
+/* ---- isosurfaces in the cells that a tile finds itself ---- */
+
+/* What a thread finds cells with, and what they then go through. */
+typedef struct kernel_tile_search {
+    kernel_tile_finder nodes; /* the first member, as a tile has the address of it alone */
+    kernel_candidate_list list;
+    kernel_tile_trace *tile;
+    kernel_tile_queue queue;
+    kernel_candidate items[2 * SIMD_WIDTH];
+} kernel_tile_search;
+
+/* The blocks of a box of pixels. */
+SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
+{
+    const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
+    const unsigned y0 = (box >> 8 & 15) / KERNEL_BLOCK, y1 = (box >> 12) / KERNEL_BLOCK;
+    static const uint16_t spread[1 << KERNEL_BLOCKS_ACROSS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
+                                                               0x0110, 0x0111, 0x1000, 0x1001, 0x1010, 0x1011,
+                                                               0x1100, 0x1101, 0x1110, 0x1111};
+    return ((2u << x1) - (1u << x0)) * spread[(2u << y1) - (1u << y0)];
+}
+
+/* Puts the cells found so far on their way to the rays. */
+static bool kernel_tile_find_take(kernel_candidate_list *list)
+{
+    kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
+    kernel_tile_trace *t = s->tile;
+    for (int n = 0; n < list->count; n++) {
+        const kernel_candidate *found = &list->items[n];
+        int part;
+        const int value = kernel_tile_source(t, found->source, &part);
+        const unsigned box = (unsigned)(found->x0 - t->tile.x0) | (unsigned)(found->x1 - t->tile.x0) << 4 |
+                             (unsigned)(found->y0 - t->tile.y0) << 8 | (unsigned)(found->y1 - t->tile.y0) << 12;
+        const kernel_tile_candidate candidate = {.near = found->near,
+                                                 .far = found->far,
+                                                 .cell = found->cell,
+                                                 .source = found->source,
+                                                 .blocks = (uint16_t)kernel_box_blocks(box),
+                                                 .box = (uint16_t)box};
+        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, box, found->near))
+            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
+    }
+    list->count = 0;
+    return true;
+}
+
+/* Cells that are found from now on are of this part. */
+static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, int part)
+{
+    kernel_finder *finder = t->thread->finder;
+    if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
+    if (finder->frame) kernel_find_rest(finder);
+    kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
+    finder->list = &s->list;
+    finder->grow = kernel_tile_find_take;
+    finder->first[0] = t->tile.x0;
+    finder->first[1] = t->tile.y0;
+    const render_camera *c = &t->frame->job->camera;
+    finder->last[0] = t->tile.x0 + KERNEL_TILE < c->width ? t->tile.x0 + KERNEL_TILE - 1 : c->width - 1;
+    finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
+}
+
+static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
+{
+    kernel_tile_find_turn(t, (kernel_tile_search *)t->search, part);
+    kernel_find_leaf(t->thread->finder, cells, count);
+}
+
+static void kernel_tile_surfaces(kernel_tile_trace *t)
+{
+    kernel_tile_search *s = (kernel_tile_search *)t->search;
+    s->nodes.look = kernel_tile_find_leaf;
+    s->tile = t;
+    s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
+    t->thread->finder->frame = NULL;
+    kernel_tile_find_begin(t);
+    kernel_tile_queue_begin(&s->queue);
+    for (int layer = 0; layer < t->frame->surface_count; layer++) {
+        kernel_tile_set_layer(t, layer);
+        kernel_tile_surface(t);
+        if (t->thread->finder->frame) kernel_find_rest(t->thread->finder);
+        kernel_tile_find_take(&s->list);
+        kernel_tile_queue_end(t, &s->queue);
+    }
+}
+
 /* ---- tiles ---- */
 
 /* The memory that a thread keeps from tile to tile. */
@@ -125,7 +337,7 @@ typedef struct kernel_memory {
     kernel_tile_segments segments;
     kernel_tile_cells cells;
     kernel_finder finder;
-    kernel_tile_finder search;
+    kernel_tile_search search;
 } kernel_memory;
 
 static int volume_turns(const kernel_frame *f)
@@ -338,7 +550,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.poly = &m->tile_poly;
-    m->tile.search = &m->search;
+    m->tile.search = &m->search.nodes;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;
 }

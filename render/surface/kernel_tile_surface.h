@@ -4,7 +4,7 @@
  *     nodes, one a lane:  ranges, depths, box of pixels ---> stack, the nearest on top
  *     from the stack:     is any pixel of the box open that far?
  *     leaves' cells:      in lanes, as the picture's are (kernel_candidates.h), but within the tile's pixels
- *     cells with pixels:  batches (kernel_tile_queue.h), whose hits close pixels
+ *     cells with pixels:  batches (render_kernels.c), whose hits close pixels
  *
  * A node between the pixels' centres is left out too. Boxes of pixels are those of the node's box between two planes
  * through the tile's borders, divided by its farthest depth: what is beyond a border is so nearer to it than any of the
@@ -15,9 +15,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernel_candidates.h"
-#include "kernel_finder.h"
-#include "kernel_tile_queue.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -41,69 +38,12 @@ typedef struct kernel_find_plane {
 } kernel_find_plane;
 
 typedef struct kernel_tile_finder {
-    kernel_candidate_list list; /* the cells found; the first member, as kernel_tile_find_take() is given it alone */
-    kernel_tile_trace *tile;
-    kernel_finder *finder;
+    /* Looks at a leaf's cells, of the layer under way. */
+    void (*look)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
     float column_scale, row_scale; /* pixels a slope, or a scaled unit where the camera is orthographic */
     float pad[2];                  /* of columns and rows, in pixels */
     kernel_find_plane planes[KERNEL_FIND_PLANES];
-    kernel_tile_queue queue;
-    kernel_candidate items[2 * SIMD_WIDTH];
 } kernel_tile_finder;
-
-/* ---- cells ---- */
-
-/* The blocks of a box of pixels. */
-SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
-{
-    const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
-    const unsigned y0 = (box >> 8 & 15) / KERNEL_BLOCK, y1 = (box >> 12) / KERNEL_BLOCK;
-    static const uint16_t spread[1 << KERNEL_BLOCKS_ACROSS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
-                                                               0x0110, 0x0111, 0x1000, 0x1001, 0x1010, 0x1011,
-                                                               0x1100, 0x1101, 0x1110, 0x1111};
-    return ((2u << x1) - (1u << x0)) * spread[(2u << y1) - (1u << y0)];
-}
-
-/* Puts the cells found so far on their way to the rays. */
-static bool kernel_tile_find_take(kernel_candidate_list *list)
-{
-    kernel_tile_finder *s = (kernel_tile_finder *)list;
-    kernel_tile_trace *t = s->tile;
-    for (int n = 0; n < list->count; n++) {
-        const kernel_candidate *found = &list->items[n];
-        int part;
-        const int value = kernel_tile_source(t, found->source, &part);
-        const unsigned box = (unsigned)(found->x0 - t->tile.x0) | (unsigned)(found->x1 - t->tile.x0) << 4 |
-                             (unsigned)(found->y0 - t->tile.y0) << 8 | (unsigned)(found->y1 - t->tile.y0) << 12;
-        const kernel_tile_candidate candidate = {.near = found->near,
-                                                 .far = found->far,
-                                                 .cell = found->cell,
-                                                 .source = found->source,
-                                                 .blocks = (uint16_t)kernel_box_blocks(box),
-                                                 .box = (uint16_t)box};
-        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, box, found->near))
-            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
-    }
-    list->count = 0;
-    return true;
-}
-
-/* Cells that are found from now on are of this part. */
-SIMD_INLINE void kernel_tile_find_turn(kernel_tile_trace *t, int part)
-{
-    kernel_tile_finder *s = t->search;
-    kernel_finder *finder = s->finder;
-    if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
-    if (finder->frame) kernel_find_rest(finder);
-    kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
-    finder->list = &s->list;
-    finder->grow = kernel_tile_find_take;
-    finder->first[0] = t->tile.x0;
-    finder->first[1] = t->tile.y0;
-    const render_camera *c = &t->frame->job->camera;
-    finder->last[0] = t->tile.x0 + KERNEL_TILE < c->width ? t->tile.x0 + KERNEL_TILE - 1 : c->width - 1;
-    finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
-}
 
 /* ---- nodes ---- */
 
@@ -288,8 +228,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             const kernel_tile_node e = stack[--top];
             if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
             if (e.count) {
-                kernel_tile_find_turn(t, part);
-                kernel_find_leaf(t->search->finder, tree->cells + e.ref, e.count);
+                t->search->look(t, part, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
@@ -337,35 +276,19 @@ SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_pla
     }
 }
 
+/* Begins a tile. `look` stands already. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
     kernel_tile_finder *s = t->search;
     const kernel_frame *f = t->frame;
     const bool flat = f->job->camera.is_orthographic;
-    s->tile = t;
-    s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
-    s->finder = t->thread->finder;
-    s->finder->frame = NULL;
     const double unit = flat ? f->job->space.scale : 1;
     const float blur = flat ? 4e-6f * (2 + fabsf((float)f->depth_shift)) : 4e-6f;
     s->column_scale = (float)(1 / (fabs(f->slope_dx) * unit));
     s->row_scale = (float)(1 / (fabs(f->slope_dy) * unit));
     s->pad[0] = 0.01f + blur * s->column_scale + 3e-5f * (float)f->job->camera.width;
     s->pad[1] = 0.01f + blur * s->row_scale + 3e-5f * (float)f->job->camera.height;
-    kernel_tile_queue_begin(&s->queue);
     kernel_tile_find_planes(&t->tree_planes, s->planes);
-}
-
-SIMD_INLINE void kernel_tile_surfaces(kernel_tile_trace *t)
-{
-    kernel_tile_find_begin(t);
-    for (int layer = 0; layer < t->frame->surface_count; layer++) {
-        kernel_tile_set_layer(t, layer);
-        kernel_tile_surface(t);
-        if (t->search->finder->frame) kernel_find_rest(t->search->finder);
-        kernel_tile_find_take(&t->search->list);
-        kernel_tile_queue_end(t, &t->search->queue);
-    }
 }
 
 #endif
