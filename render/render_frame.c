@@ -166,10 +166,11 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     if (!states) return false;
     bool has_memory = begin_threads(frame, end, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
-    if (has_memory && frame->is_binned) {
+    if (has_memory && frame->is_binned && !render_surfaces_are_small(frame)) {
         const double start = now();
         render_active_cells_begin(frame, states, threads);
         render_candidates_find(frame, states, threads);
+        if (!frame->candidates) render_active_cells_end(frame); /* tiles ask for the mesh's own cells */
         statistics->surface_ms = 1e3 * (now() - start);
     }
     if (has_memory && frame->bins_volume) {
@@ -177,8 +178,8 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
         render_candidates_find_volume(frame, states, threads);
         statistics->volume_ms = 1e3 * (now() - start);
     }
-    if (job->volume_count) render_volumes_cover(frame);
     frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
+    if (frame->needs_planes) render_trees_cover(frame);
     if (has_memory) {
         const kernel_table *kernels = render_kernels();
 #pragma omp parallel num_threads(threads)

@@ -1,6 +1,8 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
  * its surfaces first, so that volumes know where opaque ones end them. It is traced by the cells that are binned there,
  * in one traversal, or packet by packet. */
+#include <stddef.h>
+
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_batch.h"
@@ -32,7 +34,16 @@
 #include "render.h"
 #include "simd.h"
 
-/* ---- isosurfaces in the cells that are binned in a tile ---- */
+/* ---- a tile's cells on their way from where they are found to its rays ---- */
+
+/* Makes a placed cell with its values ready for blocks to meet it. */
+SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
+{
+    t->cell->part = part;
+    kernel_cell_order(t->cell);
+    kernel_cell_lines(t->cell, t->frame, &t->tile);
+    if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);
+}
 
 static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, const kernel_tile_candidate *candidate,
                              int part, int value, unsigned blocks)
@@ -66,6 +77,90 @@ SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *p
     return isovalue->value;
 }
 
+SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
+{
+    return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
+}
+
+/* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
+ * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
+SIMD_INLINE bool kernel_is_for_polys(const kernel_tile_trace *t, const kernel_batch *b,
+                                     const kernel_tile_candidate *candidate, int type)
+{
+    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_polys_fit(t, &b->arrays)) return false;
+    return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
+           kernel_box_pixels(candidate->box) <= KERNEL_POLY_PIXELS;
+}
+
+/* What a tile's cells go through from where they are found: batches of several, or, those that are for no batch, one by
+ * one. */
+enum { KERNEL_ALONE = SIMD_WIDTH };
+
+typedef struct kernel_tile_queue {
+    kernel_batch batch;
+    kernel_polys polys;
+    int alone_count;
+    kernel_tile_candidate alone[KERNEL_ALONE];
+} kernel_tile_queue;
+
+static void kernel_tile_queue_begin(kernel_tile_queue *m)
+{
+    kernel_batch_begin(&m->batch);
+    kernel_polys_begin(&m->polys);
+    m->alone_count = 0;
+}
+
+/* Is it put into any batch? */
+SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
+                                     const kernel_tile_candidate *candidate)
+{
+    const int type = kernel_arrays_type(&b->arrays, candidate->cell);
+    return type == GRID_TET ? b->takes_batches : kernel_is_for_polys(t, b, candidate, type);
+}
+
+/* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
+static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
+{
+    if (!m->alone_count) return;
+    kernel_batch_end(t, &m->batch);
+    kernel_polys_end(t, &m->polys);
+    for (int n = 0; n < m->alone_count; n++) {
+        int part;
+        const int value = kernel_tile_source(t, m->alone[n].source, &part);
+        const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
+        kernel_batch_turn(t, &m->batch, part);
+        if (blocks) kernel_tile_meet(t, &m->batch.arrays, &m->alone[n], part, value, blocks);
+    }
+    m->alone_count = 0;
+}
+
+/* Takes a cell of the layer under way and the part. */
+SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
+                                       const kernel_tile_candidate *candidate, int part, int value)
+{
+    kernel_batch_turn(t, &m->batch, part);
+    const int type = kernel_arrays_type(&m->batch.arrays, candidate->cell);
+    if (type == GRID_TET && m->batch.takes_batches) {
+        kernel_batch_add(t, &m->batch, candidate, value);
+    } else if (kernel_is_for_polys(t, &m->batch, candidate, type)) {
+        kernel_polys_turn(t, &m->polys, &m->batch.arrays, part);
+        kernel_polys_wait(t, &m->polys, type, candidate, value);
+    } else {
+        if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
+        m->alone[m->alone_count++] = *candidate;
+    }
+}
+
+/* Traces all that waits. */
+static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
+{
+    kernel_tile_queue_alone(t, m);
+    kernel_batch_end(t, &m->batch);
+    kernel_polys_end(t, &m->polys);
+}
+
+/* ---- isosurfaces in the cells that are binned in a tile ---- */
+
 /* Prefetches what is read first of a cell: its vertices' indices, or its active record. */
 SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_tile_candidate *candidate)
 {
@@ -86,49 +181,11 @@ typedef struct kernel_pending {
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_pending;
 
-SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
-{
-    return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
-}
-
-/* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
- * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
-SIMD_INLINE bool kernel_is_for_polys(const kernel_tile_trace *t, const kernel_batch *b,
-                                     const kernel_tile_candidate *candidate, int type)
-{
-    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_polys_fit(t, &b->arrays)) return false;
-    return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
-           kernel_box_pixels(candidate->box) <= KERNEL_POLY_PIXELS;
-}
-
-/* Is it put into any batch? */
-SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
-                                     const kernel_tile_candidate *candidate)
-{
-    const int type = kernel_arrays_type(&b->arrays, candidate->cell);
-    return type == GRID_TET ? b->takes_batches : kernel_is_for_polys(t, b, candidate, type);
-}
-
-/* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
-static void kernel_tile_meet_others(kernel_tile_trace *t, kernel_batch *b, kernel_polys *h, kernel_pending *others)
-{
-    if (!others->count) return;
-    kernel_batch_end(t, b);
-    kernel_polys_end(t, h);
-    for (int n = 0; n < others->count; n++) {
-        int part;
-        const int value = kernel_tile_source(t, others->items[n]->source, &part);
-        const unsigned blocks = kernel_candidate_blocks(t, others->items[n]);
-        kernel_batch_turn(t, b, part);
-        if (blocks) kernel_tile_meet(t, &b->arrays, others->items[n], part, value, blocks);
-    }
-    others->count = 0;
-}
-
 /* Prefetches the vertices of all pending cells, then traces them. */
-static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_batch *b, kernel_polys *h,
-                                                               kernel_pending *w, kernel_pending *others)
+static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
+                                                               kernel_pending *w)
 {
+    kernel_batch *b = &m->batch;
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
@@ -142,19 +199,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
     for (int n = 0; n < w->count; n++) {
         int part;
         const int value = kernel_tile_source(t, w->items[n]->source, &part);
-        const unsigned blocks = kernel_candidate_blocks(t, w->items[n]);
-        if (!blocks) continue;
-        kernel_batch_turn(t, b, part);
-        const int type = kernel_arrays_type(&b->arrays, w->items[n]->cell);
-        if (type == GRID_TET && b->takes_batches) {
-            kernel_batch_add(t, b, w->items[n], value);
-        } else if (kernel_is_for_polys(t, b, w->items[n], type)) {
-            kernel_polys_turn(t, h, &b->arrays, part);
-            kernel_polys_wait(t, h, type, w->items[n], value);
-        } else {
-            if (others->count == SIMD_WIDTH) kernel_tile_meet_others(t, b, h, others);
-            others->items[others->count++] = w->items[n];
-        }
+        if (kernel_candidate_blocks(t, w->items[n])) kernel_tile_queue_add(t, m, w->items[n], part, value);
     }
     w->count = 0;
 }
@@ -163,11 +208,9 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {
-    kernel_batch batch;
-    kernel_polys polys;
-    kernel_pending pending = {0}, others = {0};
-    kernel_batch_begin(&batch);
-    kernel_polys_begin(&polys);
+    kernel_tile_queue meeting;
+    kernel_pending pending = {0};
+    kernel_tile_queue_begin(&meeting);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
             const kernel_tile_candidate *candidate = &q->items[i];
@@ -177,12 +220,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &batch, &polys, &pending, &others);
+            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &meeting, &pending);
         }
-    kernel_tile_meet_pending(t, &batch, &polys, &pending, &others);
-    kernel_tile_meet_others(t, &batch, &polys, &others);
-    kernel_batch_end(t, &batch);
-    kernel_polys_end(t, &polys);
+    kernel_tile_meet_pending(t, &meeting, &pending);
+    kernel_tile_queue_end(t, &meeting);
 }
 
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
@@ -195,6 +236,92 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
     kernel_sort_by_depth(&by_depth, items, count);
     if (f->opaque_count) kernel_tile_trace_candidates(t, &by_depth, false);
     if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, &by_depth, true);
+}
+
+/* ---- isosurfaces in the cells that a tile finds itself ---- */
+
+/* What a thread finds cells with, and what they then go through. */
+typedef struct kernel_tile_search {
+    kernel_tile_finder nodes; /* the first member, as a tile has the address of it alone */
+    kernel_candidate_list list;
+    kernel_tile_trace *tile;
+    kernel_tile_queue queue;
+    kernel_candidate items[2 * SIMD_WIDTH];
+} kernel_tile_search;
+
+/* The blocks of a box of pixels. */
+SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
+{
+    const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
+    const unsigned y0 = (box >> 8 & 15) / KERNEL_BLOCK, y1 = (box >> 12) / KERNEL_BLOCK;
+    static const uint16_t spread[1 << KERNEL_BLOCKS_ACROSS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
+                                                               0x0110, 0x0111, 0x1000, 0x1001, 0x1010, 0x1011,
+                                                               0x1100, 0x1101, 0x1110, 0x1111};
+    return ((2u << x1) - (1u << x0)) * spread[(2u << y1) - (1u << y0)];
+}
+
+/* Puts the cells found so far on their way to the rays. */
+static bool kernel_tile_find_take(kernel_candidate_list *list)
+{
+    kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
+    kernel_tile_trace *t = s->tile;
+    for (int n = 0; n < list->count; n++) {
+        const kernel_candidate *found = &list->items[n];
+        int part;
+        const int value = kernel_tile_source(t, found->source, &part);
+        const unsigned box = (unsigned)(found->x0 - t->tile.x0) | (unsigned)(found->x1 - t->tile.x0) << 4 |
+                             (unsigned)(found->y0 - t->tile.y0) << 8 | (unsigned)(found->y1 - t->tile.y0) << 12;
+        const kernel_tile_candidate candidate = {.near = found->near,
+                                                 .far = found->far,
+                                                 .cell = found->cell,
+                                                 .source = found->source,
+                                                 .blocks = (uint16_t)kernel_box_blocks(box),
+                                                 .box = (uint16_t)box};
+        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, box, found->near))
+            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
+    }
+    list->count = 0;
+    return true;
+}
+
+/* Cells that are found from now on are of this part. */
+static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, int part)
+{
+    kernel_finder *finder = t->thread->finder;
+    if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
+    if (finder->frame) kernel_find_rest(finder);
+    kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
+    finder->list = &s->list;
+    finder->grow = kernel_tile_find_take;
+    finder->first[0] = t->tile.x0;
+    finder->first[1] = t->tile.y0;
+    const render_camera *c = &t->frame->job->camera;
+    finder->last[0] = t->tile.x0 + KERNEL_TILE < c->width ? t->tile.x0 + KERNEL_TILE - 1 : c->width - 1;
+    finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
+}
+
+static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
+{
+    kernel_tile_find_turn(t, (kernel_tile_search *)t->search, part);
+    kernel_find_leaf(t->thread->finder, cells, count);
+}
+
+static void kernel_tile_surfaces(kernel_tile_trace *t)
+{
+    kernel_tile_search *s = (kernel_tile_search *)t->search;
+    s->nodes.look = kernel_tile_find_leaf;
+    s->tile = t;
+    s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
+    t->thread->finder->frame = NULL;
+    kernel_tile_find_begin(t);
+    kernel_tile_queue_begin(&s->queue);
+    for (int layer = 0; layer < t->frame->surface_count; layer++) {
+        kernel_tile_set_layer(t, layer);
+        kernel_tile_surface(t);
+        if (t->thread->finder->frame) kernel_find_rest(t->thread->finder);
+        kernel_tile_find_take(&s->list);
+        kernel_tile_queue_end(t, &s->queue);
+    }
 }
 
 /* ---- tiles ---- */
@@ -210,6 +337,7 @@ typedef struct kernel_memory {
     kernel_tile_segments segments;
     kernel_tile_cells cells;
     kernel_finder finder;
+    kernel_tile_search search;
 } kernel_memory;
 
 static int volume_turns(const kernel_frame *f)
@@ -333,14 +461,27 @@ static void trace_tile_samples(kernel_tile_trace *t)
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
+/* May the tile see any tree's box? */
+static bool is_covered(const kernel_frame *f, int x0, int y0)
+{
+    return x0 <= f->cover[0][1] && x0 + KERNEL_TILE > f->cover[0][0] && y0 <= f->cover[1][1] &&
+           y0 + KERNEL_TILE > f->cover[1][0];
+}
+
 /* May the tile have samples or segments of volumes? */
 static bool has_volume(const kernel_frame *f, int x0, int y0)
 {
     kernel_tile_candidate *items;
-    if (!f->volume_count || x0 > f->cover[0][1] || x0 + KERNEL_TILE <= f->cover[0][0] || y0 > f->cover[1][1] ||
-        y0 + KERNEL_TILE <= f->cover[1][0])
-        return false;
+    if (!f->volume_count || !is_covered(f, x0, y0)) return false;
     return !f->volume_candidates || kernel_bin(f, f->volume_candidates, f->volume_starts, x0, y0, &items);
+}
+
+/* May it have hits? */
+static bool has_surface(const kernel_frame *f, int x0, int y0)
+{
+    kernel_tile_candidate *items;
+    if (!f->surface_count) return false;
+    return f->candidates ? kernel_candidates_in_tile(f, x0, y0, &items) : is_covered(f, x0, y0);
 }
 
 static bool begins_run(const kernel_frame *f, int x0, int y0)
@@ -358,9 +499,8 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     }
     if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
-    kernel_tile_candidate *items;
     const bool fogs = has_volume(f, x0, y0);
-    if (!fogs && (!f->surface_count || (f->candidates && !kernel_candidates_in_tile(f, x0, y0, &items)))) return;
+    if (!fogs && !has_surface(f, x0, y0)) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
@@ -410,6 +550,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.poly = &m->tile_poly;
+    m->tile.search = &m->search.nodes;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;
 }

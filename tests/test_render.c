@@ -497,6 +497,44 @@ static void one_pixel_images_are_the_reference(void **state)
     }
 }
 
+/* Exchanges the tree for one whose nodes are of the reference layout. */
+static void build_reference_layout(render_fixture *f)
+{
+    base_error error = {0};
+    mmbvh_free(&f->trees[0]);
+    assert_int_equal(mmbvh_build(&f->views[0].cells, &f->fields[0], f->offset, f->job.space.scale,
+                                 &(mmbvh_options){.threads = 1, .layout = MMBVH_REFERENCE}, &f->trees[0], &error),
+                     INSITU_OK);
+    f->ranges[0] = mmbvh_own_ranges(&f->trees[0]);
+}
+
+/* Where cells are smaller than pixels, tiles go down the trees themselves and leave out what is hidden. Packets fetch
+ * all that rays meet. */
+static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            render_fixture f;
+            drawn_frame drawn[3];
+            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_look(&f, camera, 9, 5);
+            fixture_add_surface(&f, four_values, 2, 1);
+            fixture_add_surface(&f, one_value, 1, 1);
+            if (camera % 2) build_reference_layout(&f);
+            if (camera < CAMERA_ALONG_X)
+                fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "small cells"));
+            for (render_traversal t = RENDER_BINNED; t <= RENDER_PACKETS; t++) {
+                f.job.traversal = t;
+                fixture_draw(&f, &drawn[t]);
+                drawn_assert_same(&drawn[0], &drawn[t]);
+                assert_int_equal(drawn[0].list.count, drawn[t].list.count);
+            }
+            for (int t = 0; t < 3; t++) drawn_free(&drawn[t]);
+            fixture_free(&f);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -516,6 +554,7 @@ int main(void)
         cmocka_unit_test(surface_coloured_by_the_field_is_the_reference),
         cmocka_unit_test(root_steps_lessen_the_error),
         cmocka_unit_test(one_pixel_images_are_the_reference),
+        cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_are_the_reference),
     };
     /* Tests that draw by themselves, by each instruction set. */
     const struct CMUnitTest of_a_set[] = {

@@ -73,6 +73,7 @@ typedef struct kernel_finder {
     kernel_tile picture; /* all of it as one tile, about the axis of view */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
+    int first[2], last[2]; /* columns and rows that are looked for */
     kernel_level eye[3];
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
@@ -89,6 +90,10 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
 {
     kernel_borders borders;
     s->frame = f;
+    for (int a = 0; a < 2; a++) {
+        s->first[a] = 0;
+        s->last[a] = (a ? f->job->camera.height : f->job->camera.width) - 1;
+    }
     s->part = subtree->part;
     s->source = (uint32_t)subtree->part;
     s->surface = NULL;
@@ -151,12 +156,12 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 /* Finds the pixels between the ends, of so many. Returns false where there are none. The pad, a part in 1e5 of the cell
  * and its place and a hundredth of a pixel, is more than rays are off by that hit by a rounding. blur is the error of
  * the places. */
-SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
+SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {
     const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
-    const float low = simd_max(ceilf(e.low + zero - pad), 0);
-    const float high = simd_min(floorf(e.high + zero + pad), (float)(pixels - 1));
+    const float low = simd_max(ceilf(e.low + zero - pad), (float)from);
+    const float high = simd_min(floorf(e.high + zero + pad), (float)to);
     if (!(low <= high)) return false;
     *first = (uint16_t)low;
     *last = (uint16_t)high;
@@ -176,15 +181,16 @@ SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent 
     if (!(out->near > -INFINITY)) out->near = -INFINITY; /* not a number */
     if (!(out->far < INFINITY)) out->far = INFINITY;
     if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
-        out->x0 = out->y0 = 0;
-        out->x1 = (uint16_t)(camera->width - 1);
-        out->y1 = (uint16_t)(camera->height - 1);
+        out->x0 = (uint16_t)s->first[0];
+        out->y0 = (uint16_t)s->first[1];
+        out->x1 = (uint16_t)s->last[0];
+        out->y1 = (uint16_t)s->last[1];
         return true;
     }
     const float blur = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
-    return kernel_extent_range(columns, s->column_0, blur * fabsf(s->column_scale), camera->width, &out->x0,
+    return kernel_extent_range(columns, s->column_0, blur * fabsf(s->column_scale), s->first[0], s->last[0], &out->x0,
                                &out->x1) &&
-           kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), camera->height, &out->y0, &out->y1);
+           kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), s->first[1], s->last[1], &out->y0, &out->y1);
 }
 
 SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline *o, kernel_candidate *out)
@@ -221,7 +227,7 @@ SIMD_INLINE void kernel_add_candidate(kernel_finder *s, const kernel_candidate *
     kernel_candidate_list *list = s->list;
     if (list->count == list->capacity && !s->grow(list)) return;
     list->items[list->count++] = *candidate;
-    kernel_count_tiles(list, candidate->x0, candidate->x1, candidate->y0, candidate->y1);
+    if (list->counts) kernel_count_tiles(list, candidate->x0, candidate->x1, candidate->y0, candidate->y1);
 }
 
 static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
@@ -344,11 +350,11 @@ SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
 }
 
 /* kernel_extent_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
-SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int pixels, vf *first, vf *last)
+SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const int ends[2], vf *first, vf *last)
 {
     const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
-    *first = vf_max(-vf_floor(pad - (low + zero)), vf_set(0));
-    *last = vf_min(vf_floor((high + zero) + pad), vf_set((float)(pixels - 1)));
+    *first = vf_max(-vf_floor(pad - (low + zero)), vf_set((float)ends[0]));
+    *last = vf_min(vf_floor((high + zero) + pad), vf_set((float)ends[1]));
     return vf_le(*first, *last);
 }
 
@@ -365,17 +371,17 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
     /* The largest blur of any lane stands for all. */
     const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
-    vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), camera->width,
-                                       &first[0], &last[0]);
-    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale),
-                                                       camera->height, &first[1], &last[1]));
+    const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
+    vm candidates =
+        kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), columns, &first[0], &last[0]);
+    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale), rows,
+                                                       &first[1], &last[1]));
     const vm anywhere = flat ? vm_none() : vm_not(vf_lt(0.01f * size, e->near));
     const vm behind = vf_lt((e->far + s->t_near) + pad, vf_set(s->t_near));
     lanes &= vm_bits(vm_andnot(vm_or(candidates, anywhere), behind));
-    const int most[2] = {camera->width - 1, camera->height - 1};
     for (int a = 0; a < 2; a++) {
-        const vi from = vi_from_vf(vf_select(anywhere, vf_set(0), first[a]));
-        const vi to = vi_from_vf(vf_select(anywhere, vf_set((float)most[a]), last[a]));
+        const vi from = vi_from_vf(vf_select(anywhere, vf_set((float)s->first[a]), first[a]));
+        const vi to = vi_from_vf(vf_select(anywhere, vf_set((float)s->last[a]), last[a]));
         memcpy(ends[2 * a], &from, sizeof from);
         memcpy(ends[2 * a + 1], &to, sizeof to);
     }
@@ -392,7 +398,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
                                                         .x1 = (uint16_t)ends[1][n],
                                                         .y0 = (uint16_t)ends[2][n],
                                                         .y1 = (uint16_t)ends[3][n]};
-        kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
+        if (list->counts) kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
     }
 }
 

@@ -10,14 +10,16 @@
 
 #include <math.h>
 #include <omp.h>
+#include <string.h>
 
 #include "memory.h"
 #include "mmbvh.h"
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
 
-/* So many cells a pixel that their tree covers are small (docs/decisions/find.md). */
-enum { SMALL_CELLS = 8 };
+/* So many cells a pixel that their tree covers are small; of surfaces, cells in leaves that isovalues may cross
+ * (docs/decisions/find.md). */
+enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
@@ -198,9 +200,70 @@ static bool is_of_small_cells(const kernel_frame *f)
     return cells > SMALL_CELLS * pixels;
 }
 
+/* Counts of cells in leaves: all that were looked at, and those that isovalues may cross, each isovalue counted. */
+typedef struct leaf_sample {
+    double cells, crossed;
+} leaf_sample;
+
+/* Adds some of the part's nodes, about as many leaves among them as inner nodes. */
+static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, leaf_sample *out)
+{
+    const mmbvh *tree = f->job->parts[part].tree;
+    const mmbvh_ranges *ranges = &s->layer->field.ranges[part];
+    if (!ranges->low || !tree->node_count) return;
+    for (int64_t n = 0; n < samples; n++) {
+        const int64_t node = (int64_t)(((double)n + 0.5) / (double)samples * (double)tree->node_count);
+        const int count = mmbvh_node_count(tree, node);
+        float low, high;
+        memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
+        memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
+        out->cells += count;
+        for (int i = 0; i < s->interest.count; i++)
+            if (low <= s->interest.high[i] && high >= s->interest.low[i]) out->crossed += count;
+    }
+}
+
+/* The pixels that the parts cover, about, and the number of their cells; false where one is not all before the eye. */
+static bool measure_parts(const kernel_frame *f, double *pixels, double *cells)
+{
+    span all[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    *pixels = *cells = 0;
+    for (int part = 0; part < f->job->part_count; part++) {
+        const mmbvh *tree = f->job->parts[part].tree;
+        span own[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+        if (!tree->node_count) continue;
+        if (!(widen_by_tree(f, tree, own) > 0)) return false;
+        widen_by_tree(f, tree, all);
+        *cells += (double)tree->cell_count;
+        *pixels += (own[0].high - own[0].low) * (own[1].high - own[1].low);
+    }
+    *pixels = fmin(*pixels, (all[0].high - all[0].low) * (all[1].high - all[1].low));
+    return true;
+}
+
+/* Where opaque surfaces have several cells a pixel most are hidden, or between pixels: tiles that go down the trees
+ * themselves fetch fewer. */
+bool render_surfaces_are_small(const kernel_frame *f)
+{
+    double pixels, cells, crossed = 0;
+    int values = 0;
+    if (f->has_transparent || !measure_parts(f, &pixels, &cells)) return false;
+    for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
+    if (!(values * cells > SMALL_CROSSED * pixels)) return false;
+    for (int s = 0; s < f->surface_count; s++) {
+        leaf_sample leaves = {0, 0};
+        for (int part = 0; part < f->job->part_count; part++) {
+            const double share = (double)f->job->parts[part].tree->cell_count / cells;
+            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * share), &leaves);
+        }
+        if (leaves.cells > 0) crossed += leaves.crossed / leaves.cells * cells;
+    }
+    return crossed > SMALL_CROSSED * pixels;
+}
+
 /* Rays and bounds of trees are off by what kernel_tree_planes() allows them, and pixels reach half a pixel beyond their
  * middles. */
-void render_volumes_cover(kernel_frame *f)
+void render_trees_cover(kernel_frame *f)
 {
     const render_job *job = f->job;
     const int most[2] = {job->camera.width - 1, job->camera.height - 1};

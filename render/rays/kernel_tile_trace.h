@@ -24,12 +24,14 @@ typedef struct kernel_tile_trace {
     unsigned begun;  /* blocks whose packets are set up */
     int turn;        /* of volumes (kernel_clip.h) */
     float t_near;
-    vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* each block's farthest t_far */
+    vf far[KERNEL_BLOCKS / SIMD_WIDTH];         /* each block's farthest t_far, */
+    float pixel_far[KERNEL_TILE * KERNEL_TILE]; /* and each pixel's, where the tile goes down the trees for surfaces */
     /* of the surface under way */
     const kernel_surface *surface;
     int layer;
     struct kernel_cell *cell;
     struct kernel_poly *poly;
+    struct kernel_tile_finder *search;          /* of cells down the trees */
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
@@ -71,6 +73,38 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
     return vf_reduce_max(far);
 }
 
+/* Notes that rays of the block know of something nearer. */
+SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
+{
+    t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
+    if (t->frame->candidates) return;
+    float *to =
+        t->pixel_far + (block / KERNEL_BLOCKS_ACROSS * KERNEL_TILE + block % KERNEL_BLOCKS_ACROSS) * KERNEL_BLOCK;
+    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+        const kernel_packet *p = &t->packets[block * KERNEL_BLOCK_PACKETS + n];
+        const int across = KERNEL_BLOCK / KERNEL_PACKET_COLUMNS;
+        float far[SIMD_WIDTH];
+        vf_store(far, vf_select(p->active, p->t_far, vf_set(-INFINITY)));
+        for (int y = 0; y < KERNEL_PACKET_ROWS; y++)
+            memcpy(to + (n / across * KERNEL_PACKET_ROWS + y) * KERNEL_TILE + n % across * KERNEL_PACKET_COLUMNS,
+                   far + y * KERNEL_PACKET_COLUMNS, KERNEL_PACKET_COLUMNS * sizeof *far);
+    }
+}
+
+/* May a ray in the box of pixels (kernel_types.h) meet something at the depth before what it knows of? */
+SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, float near)
+{
+    const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
+    for (unsigned y = box >> 8 & 15; y <= box >> 12; y++) {
+        unsigned beyond = 0;
+        for (int v = 0; v < KERNEL_TILE / SIMD_WIDTH; v++)
+            beyond |= vm_bits(vf_le(vf_set(near), vf_load(t->pixel_far + y * KERNEL_TILE + v * SIMD_WIDTH)))
+                      << v * SIMD_WIDTH;
+        if (beyond & columns) return true;
+    }
+    return false;
+}
+
 /* Returns those of the blocks in which a body of this outline may show. */
 SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
 {
@@ -102,6 +136,10 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);
     if (!f->needs_planes) return;
+    for (int i = 0; i < KERNEL_TILE * KERNEL_TILE; i++) {
+        const int column = i % KERNEL_TILE / KERNEL_BLOCK, row = i / KERNEL_TILE / KERNEL_BLOCK;
+        t->pixel_far[i] = wanted >> (row * KERNEL_BLOCKS_ACROSS + column) & 1 ? INFINITY : -INFINITY;
+    }
     kernel_borders borders;
     kernel_tile_borders(&borders, f, &t->tile);
     kernel_tree_planes(&t->tree_planes, f, &borders);

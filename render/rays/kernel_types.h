@@ -243,7 +243,7 @@ typedef struct kernel_frame {
     uint32_t *candidate_starts;
     kernel_tile_candidate *volume_candidates; /* the same of the volume's cells */
     uint32_t *volume_starts;
-    int cover[2][2]; /* the first and the last column, and row, in which volumes may be seen */
+    int cover[2][2]; /* the first and the last column, and row, in which trees may be seen; set where needs_planes */
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
     double depth_shift;        /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */

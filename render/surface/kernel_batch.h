@@ -175,10 +175,7 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         const vm hit = kernel_batch_hit(b, &t->tile, t->t_near, &r, far, &depth);
         if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, at, b->lane + first, vm_bits(hit), depth);
     }
-    for (; nearer; nearer &= nearer - 1) {
-        const int block = __builtin_ctz(nearer);
-        t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
-    }
+    for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
     b->ray_count = 0;
 }
 

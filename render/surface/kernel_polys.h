@@ -558,10 +558,7 @@ static __attribute__((noinline)) void kernel_polys_trace(kernel_tile_trace *t, k
     kernel_hex_rays_close(&h->others);
     nearer |= kernel_polys_hit(t, h);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_polys_search(t, h, n);
-    for (; nearer; nearer &= nearer - 1) {
-        const int block = __builtin_ctz(nearer);
-        t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
-    }
+    for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
     h->rays.count = 0;
 }
 

@@ -670,7 +670,7 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
             kernel_polyhedron_surfaces(p, &state, part, index, p->active);
         is_nearer = is_nearer || p->is_nearer;
     }
-    if (is_nearer) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
+    if (is_nearer) kernel_block_learn(t, block);
 }
 
 SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,

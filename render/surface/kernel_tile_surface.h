@@ -1,89 +1,248 @@
-/* Isosurfaces of a whole tile in one traversal: the tree is gone down once for all its blocks, with a mask of those
- * that a node may meet before what they already know to be nearer. A leaf's cells are fetched and placed once a tile,
- * narrowed down to the blocks that their surface may show in (kernel_outline.h), and given to these blocks' packets,
- * which are set up when the first cell comes to them. A tile without a surface costs its nodes alone. */
+/* Isosurfaces of a tile that goes down the trees itself, about from the nearest nodes on, and fetches nothing behind
+ * what its pixels already know to be nearer:
+ *
+ *     nodes, one a lane:  ranges, depths, box of pixels ---> stack, the nearest on top
+ *     from the stack:     is any pixel of the box open that far?
+ *     leaves' cells:      in lanes, as the picture's are (kernel_candidates.h), but within the tile's pixels
+ *     cells with pixels:  batches (render_kernels.c), whose hits close pixels
+ *
+ * A node between the pixels' centres is left out too. Boxes of pixels are those of the node's box between two planes
+ * through the tile's borders, divided by its farthest depth: what is beyond a border is so nearer to it than any of the
+ * box in front of the eye. Pads are more than all rounding. */
 #ifndef RENDER_KERNEL_TILE_SURFACE_H
 #define RENDER_KERNEL_TILE_SURFACE_H
 
-#include "grid.h"
-#include "kernel_cell.h"
-#include "kernel_cell_values.h"
-#include "kernel_outline.h"
-#include "kernel_prefetch.h"
-#include "kernel_surface.h"
+#include <math.h>
+#include <string.h>
+
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "mmbvh.h"
 #include "render.h"
 #include "simd.h"
 
-/* Makes a placed cell with its values ready for blocks to meet it. */
-SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
-{
-    t->cell->part = part;
-    kernel_cell_order(t->cell);
-    kernel_cell_lines(t->cell, t->frame, &t->tile);
-    if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);
-}
+/* Planes of the tile's (kernel_tile.h), one a number. */
+enum {
+    KERNEL_FIND_LEFT,
+    KERNEL_FIND_RIGHT,
+    KERNEL_FIND_TOP,
+    KERNEL_FIND_BOTTOM,
+    KERNEL_FIND_DEPTH,
+    KERNEL_FIND_ALONG,
+    KERNEL_FIND_PLANES
+};
 
-/* Returns the blocks in which the cell's surface may show. */
-SIMD_INLINE unsigned kernel_tile_narrow(const kernel_tile_trace *t, const kernel_cell *c, unsigned blocks)
-{
-    kernel_outline outline;
-    if (c->type != GRID_TET)
-        kernel_vertex_outline(c, &outline);
-    else if (!kernel_tet_outline(c, &outline))
-        return 0;
-    blocks = kernel_tile_keep(t, &outline, blocks);
-    if (!blocks || c->type == GRID_TET) return blocks;
-    return kernel_slab_outline(c, &outline) ? kernel_tile_keep(t, &outline, blocks) : 0;
-}
+typedef struct kernel_find_plane {
+    float normal[3], size[3], offset, error;
+} kernel_find_plane;
 
-/* Most cells are not ordered, for they turn out to lie beside the tile. */
-SIMD_INLINE void kernel_tile_cell(kernel_tile_trace *t, int part, unsigned blocks)
+typedef struct kernel_tile_finder {
+    /* Looks at a leaf's cells, of the layer under way. */
+    void (*look)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
+    float column_scale, row_scale; /* pixels a slope, or a scaled unit where the camera is orthographic */
+    float pad[2];                  /* of columns and rows, in pixels */
+    kernel_find_plane planes[KERNEL_FIND_PLANES];
+} kernel_tile_finder;
+
+/* ---- nodes ---- */
+
+/* Nodes are looked at one a lane, children beside their siblings; each has what it needs on its way from memory while
+ * others are looked at. */
+enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
+
+/* A node that may show: its first cell or its left child. */
+typedef struct kernel_tile_node {
+    int64_t ref;
+    float near;
+    uint16_t box, count; /* of cells, in a leaf; 0: an inner node */
+} kernel_tile_node;
+
+/* Boxes and ranges of nodes in lanes. */
+typedef struct kernel_node_lanes {
+    vf low[3], high[3], range_low, range_high;
+} kernel_node_lanes;
+
+/* Nodes of any layout, one by one. */
+static __attribute__((noinline)) void kernel_nodes_slowly(const mmbvh *tree, const mmbvh_ranges *ranges,
+                                                          const int64_t node[SIMD_WIDTH], kernel_node_lanes *out)
 {
-    const render_surface_layer *layer = t->surface->layer;
-    kernel_cell *c = t->cell;
-    bool is_ordered = false;
-    for (int value = 0; value < layer->value_count; value++) {
-        if (!kernel_cell_straddles(c, layer->values[value])) continue;
-        if (!c->is_placed) kernel_cell_move(c, t->frame, &t->tile, t->frame->job->parts[part].cells);
-        kernel_cell_relative(c, layer->values[value]);
-        t->poly->is_set_up = false;
-        const unsigned left = kernel_tile_narrow(t, c, blocks);
-        if (left && !is_ordered) {
-            is_ordered = true;
-            kernel_tile_ready(t, part);
+    float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH], range[2][SIMD_WIDTH];
+    for (int n = 0; n < SIMD_WIDTH; n++) {
+        float lower[4], upper[4];
+        mmbvh_node_box(tree, node[n], lower, upper);
+        for (int a = 0; a < 3; a++) {
+            low[a][n] = lower[a];
+            high[a][n] = upper[a];
         }
-        kernel_blocks_meet(t, left, part, c->index, c, value);
+        memcpy(&range[0][n], ranges->low + node[n] * ranges->stride, sizeof range[0][n]);
+        memcpy(&range[1][n], ranges->high + node[n] * ranges->stride, sizeof range[1][n]);
+    }
+    for (int a = 0; a < 3; a++) {
+        out->low[a] = vf_load(low[a]);
+        out->high[a] = vf_load(high[a]);
+    }
+    out->range_low = vf_load(range[0]);
+    out->range_high = vf_load(range[1]);
+}
+
+/* Nodes that a gather reaches are fetched together: compact_decode() in lanes. */
+SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *ranges, const int64_t node[SIMD_WIDTH],
+                                    kernel_node_lanes *out)
+{
+    if (!tree->compact || tree->node_count > INT32_MAX / 10) {
+        kernel_nodes_slowly(tree, ranges, node, out);
+        return;
+    }
+    int32_t index[SIMD_WIDTH];
+    vi at;
+    for (int n = 0; n < SIMD_WIDTH; n++) index[n] = (int32_t)node[n];
+    memcpy(&at, index, sizeof at);
+    const float *nodes = (const float *)(const void *)tree->compact;
+    const vi place = at * (int)(sizeof *tree->compact / sizeof(float));
+    for (int a = 0; a < 3; a++) {
+        const vi word = vi_from_bits(vf_gather(nodes + a, place));
+        const vi bits = (word >> (COMPACT_LOWER_BITS + COMPACT_MANTISSA_BITS - 23)) &
+                        (COMPACT_EXTENT_MAX << (23 - COMPACT_MANTISSA_BITS));
+        const vf extent = vf_from_bits(bits + COMPACT_ONE) - 16.0f;
+        out->low[a] = vf_from_vi(word & COMPACT_LOWER_MAX) * tree->grid.step[a] + tree->grid.origin[a];
+        out->high[a] = extent * tree->grid.step[a] + out->low[a];
+    }
+    const vi pair = at * (int)(ranges->stride / (int64_t)sizeof(float));
+    out->range_low = vf_gather((const float *)(const void *)ranges->low, pair);
+    out->range_high = vf_gather((const float *)(const void *)ranges->high, pair);
+}
+
+/* The nodes' places: depths, their order along the tile, and the pixels that they may show in. */
+typedef struct kernel_node_places {
+    float near[SIMD_WIDTH];
+    int32_t box[SIMD_WIDTH];
+    vf along;
+    unsigned shown;
+} kernel_node_places;
+
+/* Adds the first and the last column, or row, to the boxes: low is from the tile's first border on, high from its last.
+ * Returns the lanes that have any. What is not a number may be anywhere. */
+SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box, int shift)
+{
+    const vf end = vf_set(KERNEL_TILE), zero = vf_set(0);
+    const vf first = vf_min(vf_max(low * scale + (0.5f - pad), zero), end);
+    const vf last = vf_max(vf_min(high * scale + (KERNEL_TILE + 0.5f + pad), end), zero);
+    const vi from = vi_from_vf(first), to = vi_from_vf(last) - 1;
+    *box |= from << shift | to << (shift + 4);
+    return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
+}
+
+/* Finds where the nodes are, and those that may show. */
+SIMD_INLINE void kernel_tile_find_places(const kernel_tile_trace *t, const kernel_node_lanes *nodes,
+                                         kernel_node_places *out)
+{
+    const kernel_tile_finder *s = t->search;
+    vf at[KERNEL_FIND_PLANES], reach[KERNEL_FIND_PLANES], middle[3], half[3];
+    for (int a = 0; a < 3; a++) {
+        middle[a] = 0.5f * (nodes->low[a] + nodes->high[a]);
+        half[a] = 0.5f * (nodes->high[a] - nodes->low[a]);
+    }
+    for (int n = 0; n < KERNEL_FIND_PLANES; n++) {
+        const kernel_find_plane *p = &s->planes[n];
+        at[n] = (p->normal[0] * middle[0] + p->normal[1] * middle[1]) + (p->normal[2] * middle[2] + p->offset);
+        reach[n] = (p->size[0] * half[0] + p->size[1] * half[1]) + (p->size[2] * half[2] + p->error);
+    }
+    const vf far = at[KERNEL_FIND_DEPTH] + reach[KERNEL_FIND_DEPTH];
+    vf inverse = vf_set(1);
+    vi box = vi_set(0);
+    if (!t->frame->job->camera.is_orthographic)
+        inverse = 1.0f / vf_max(far + (float)t->frame->depth_shift, vf_set(1e-20f));
+    vm shown = vm_not(vf_lt(far, vf_set(t->t_near)));
+    for (int a = 0; a < 2; a++) {
+        const int first = a ? KERNEL_FIND_TOP : KERNEL_FIND_LEFT, last = first + 1;
+        const vf scale = inverse * (a ? s->row_scale : s->column_scale);
+        shown = vm_and(
+            shown, kernel_node_pixels(at[first] - reach[first], at[last] + reach[last], scale, s->pad[a], &box, 8 * a));
+    }
+    shown = vm_and(shown, kernel_interest_meets_lanes(&t->surface->interest, nodes->range_low, nodes->range_high));
+    vf_store(out->near, at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH]);
+    memcpy(out->box, &box, sizeof box);
+    out->along = at[KERNEL_FIND_ALONG];
+    out->shown = vm_bits(shown);
+}
+
+/* Adds a node to the stack, and prefetches what is looked at next. */
+SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
+                                      const kernel_node_places *places, int lane, kernel_tile_node *to)
+{
+    if (!(places->shown >> lane & 1)) return 0;
+    const int64_t ref = mmbvh_node_ref(tree, node);
+    const int count = mmbvh_node_count(tree, node);
+    if (count) {
+        __builtin_prefetch(tree->cells + ref);
+        __builtin_prefetch(tree->cells + ref + count - 1);
+    } else {
+        mmbvh_prefetch_node(tree, ref);
+        mmbvh_prefetch_node(tree, ref + 1);
+        __builtin_prefetch(ranges->low + ref * ranges->stride);
+    }
+    *to = (kernel_tile_node){ref, places->near[lane], (uint16_t)places->box[lane], (uint16_t)count};
+    return 1;
+}
+
+/* Adds the children of so many inner nodes, the first of which is the nearest, to the stack; the nearest are on top.
+ * Returns how many are added. */
+SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                          const int64_t *left, int count, kernel_tile_node *stack)
+{
+    int64_t node[SIMD_WIDTH];
+    kernel_node_lanes lanes;
+    kernel_node_places places;
+    float along[SIMD_WIDTH];
+    int top = 0;
+    for (int n = 0; n < KERNEL_NODES_AT_ONCE; n++) {
+        node[2 * n] = left[n < count ? n : 0];
+        node[2 * n + 1] = node[2 * n] + 1;
+    }
+    kernel_nodes_fetch(tree, ranges, node, &lanes);
+    kernel_tile_find_places(t, &lanes, &places);
+    vf_store(along, places.along);
+    for (int n = 2 * (count - 1); n >= 0; n -= 2) {
+        const int far = along[n] < along[n + 1];
+        top += kernel_tile_find_push(tree, ranges, node[n + far], &places, n + far, stack + top);
+        top += kernel_tile_find_push(tree, ranges, node[n + !far], &places, n + !far, stack + top);
+    }
+    return top;
+}
+
+/* Finds the part's cells. One node at once needs no more room than the tree is deep. */
+SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
+{
+    const mmbvh *tree = t->frame->job->parts[part].tree;
+    const mmbvh_ranges *ranges = &t->surface->layer->field.ranges[part];
+    kernel_tile_node stack[KERNEL_NODES_ROOM];
+    int top = 0;
+    if (!ranges->low || !tree->node_count) return;
+    stack[top++] = (kernel_tile_node){mmbvh_node_ref(tree, 0), -INFINITY, 0xf0f0, (uint16_t)mmbvh_node_count(tree, 0)};
+    while (top) {
+        int64_t inner[KERNEL_NODES_AT_ONCE];
+        const int most = top < KERNEL_NODES_ROOM - KERNEL_NODES_AT_ONCE - MMBVH_MAX_DEPTH ? KERNEL_NODES_AT_ONCE : 1;
+        int inner_count = 0;
+        for (int n = 0; n < most && top; n++) {
+            const kernel_tile_node e = stack[--top];
+            if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
+            if (e.count) {
+                t->search->look(t, part, tree->cells + e.ref, e.count);
+            } else {
+                inner[inner_count++] = e.ref;
+            }
+        }
+        if (inner_count) top += kernel_tile_find_children(t, tree, ranges, inner, inner_count, stack + top);
     }
 }
 
-static void kernel_tile_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
-{
-    const render_surface_layer *layer = t->surface->layer;
-    const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = t->cell;
-    kernel_prefetch(g, &layer->field.fields[part], cells, count);
-    for (int n = 0; n < count; n++) {
-        kernel_cell_fetch(c, g, &layer->field.fields[part], cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_blocks_meet(t, blocks, part, cells[n], NULL, 0);
-            continue;
-        }
-        if (c->is_finite) kernel_tile_cell(t, part, blocks);
-    }
-}
+/* ---- surfaces ---- */
 
 static void kernel_tile_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
 {
-    const render_field *field = &t->surface->layer->field;
-    (void)unused;
-    for (int n = 0; n < count; n++) {
-        const int part = (int)parts[n];
-        if (field->ranges[part].low)
-            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part], &t->surface->interest,
-                                 blocks, part, kernel_tile_leaf);
-    }
+    (void)unused, (void)blocks;
+    for (int n = 0; n < count; n++) kernel_tile_find_cells(t, (int)parts[n]);
 }
 
 /* Traces the surface of all parts. Opaque hits stand in the packets afterwards. */
@@ -97,12 +256,39 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
     for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_tile_parts(t, 0, &part, 1, t->wanted);
 }
 
-SIMD_INLINE void kernel_tile_surfaces(kernel_tile_trace *t)
+/* Takes the planes out of the tile's. */
+SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_plane out[KERNEL_FIND_PLANES])
 {
-    for (t->layer = 0; t->layer < t->frame->surface_count; t->layer++) {
-        t->surface = &t->frame->surfaces[t->layer];
-        kernel_tile_surface(t);
+    static const int lanes[KERNEL_FIND_PLANES] = {0,
+                                                  KERNEL_BLOCKS_ACROSS,
+                                                  KERNEL_ROWS_LANE,
+                                                  KERNEL_ROWS_LANE + KERNEL_BLOCKS_ACROSS,
+                                                  KERNEL_DEPTH_LANE,
+                                                  KERNEL_ALONG_LANE};
+    for (int n = 0; n < KERNEL_FIND_PLANES; n++) {
+        const int v = lanes[n] / SIMD_WIDTH, i = lanes[n] % SIMD_WIDTH;
+        for (int a = 0; a < 3; a++) {
+            out[n].normal[a] = q->normal[a][v][i];
+            out[n].size[a] = q->size[a][v][i];
+        }
+        out[n].offset = q->offset[v][i];
+        out[n].error = q->error[v][i];
     }
+}
+
+/* Begins a tile. `look` stands already. */
+SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
+{
+    kernel_tile_finder *s = t->search;
+    const kernel_frame *f = t->frame;
+    const bool flat = f->job->camera.is_orthographic;
+    const double unit = flat ? f->job->space.scale : 1;
+    const float blur = flat ? 4e-6f * (2 + fabsf((float)f->depth_shift)) : 4e-6f;
+    s->column_scale = (float)(1 / (fabs(f->slope_dx) * unit));
+    s->row_scale = (float)(1 / (fabs(f->slope_dy) * unit));
+    s->pad[0] = 0.01f + blur * s->column_scale + 3e-5f * (float)f->job->camera.width;
+    s->pad[1] = 0.01f + blur * s->row_scale + 3e-5f * (float)f->job->camera.height;
+    kernel_tile_find_planes(&t->tree_planes, s->planes);
 }
 
 #endif
