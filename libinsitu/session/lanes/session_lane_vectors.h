@@ -3,6 +3,7 @@
 #ifndef SESSION_LANE_VECTORS_H
 #define SESSION_LANE_VECTORS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 #if defined(__SSE2__)
