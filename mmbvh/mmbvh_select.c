@@ -73,14 +73,21 @@ static inline int sign_bits(ivec4 a)
 #endif
 }
 
+/* Constants of a pass. */
+typedef struct reading {
+    fetch_shape shape;
+    bool wide_index, wide_number, is_packed;
+} reading;
+
 /* Where the value at one vertex of a cell is. at: the vertex in the cell. */
-MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const fetch_shape shape,
-                                   const bool wide_index, const int64_t stride)
+MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const reading how, const int64_t stride)
 {
     const grid_array *connectivity = &s->g->connectivity;
     const uintptr_t data = (uintptr_t)s->values.data - (uintptr_t)(connectivity->base * stride);
-    const char *entry = connectivity->data + (cell * fetch_vertex_count(s->g, cell, shape) + at) * connectivity->stride;
-    const int64_t index = wide_index ? *(const int64_t *)(const void *)entry : *(const int32_t *)(const void *)entry;
+    const char *entry =
+        connectivity->data + (cell * fetch_vertex_count(s->g, cell, how.shape) + at) * connectivity->stride;
+    const int64_t index =
+        how.wide_index ? *(const int64_t *)(const void *)entry : *(const int32_t *)(const void *)entry;
     return data + (uintptr_t)(index * stride);
 }
 
@@ -89,14 +96,13 @@ typedef struct four_ranges {
     vec4 low, high, poison;
 } four_ranges;
 
-MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const fetch_shape shape,
-                                          const bool wide_index, const bool is_packed)
+MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const reading how)
 {
-    const int64_t stride = is_packed ? (int64_t)sizeof(float) : s->values.stride;
+    const int64_t stride = how.is_packed ? (int64_t)sizeof(float) : s->values.stride;
     four_ranges r = {vec4_set1(INFINITY), vec4_set1(-INFINITY), {0}};
-    for (int at = 0; at < fetch_vertex_count(s->g, cell, shape); at++) {
+    for (int at = 0; at < fetch_vertex_count(s->g, cell, how.shape); at++) {
         float v[4];
-        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_place(s, cell + i, at, shape, wide_index, stride);
+        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_place(s, cell + i, at, how, stride);
         const vec4 values = {v[0], v[1], v[2], v[3]};
         r.low = vec4_min(values, r.low);
         r.high = vec4_max(values, r.high);
@@ -106,18 +112,17 @@ MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const
 }
 
 /* Rounds the ranges to floats. */
-MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, const fetch_shape shape,
-                                           const bool wide_index, const bool is_packed)
+MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, const reading how)
 {
-    const int64_t stride = is_packed ? (int64_t)sizeof(double) : s->values.stride;
+    const int64_t stride = how.is_packed ? (int64_t)sizeof(double) : s->values.stride;
     vec2 low[2], high[2], poison[2] = {{0}};
     for (int pair = 0; pair < 2; pair++) {
         low[pair] = vec2_set1((double)INFINITY);
         high[pair] = -low[pair];
-        for (int at = 0; at < fetch_vertex_count(s->g, cell, shape); at++) {
+        for (int at = 0; at < fetch_vertex_count(s->g, cell, how.shape); at++) {
             const int64_t first = cell + 2 * pair;
-            const vec2 values = {*(const double *)value_place(s, first, at, shape, wide_index, stride),
-                                 *(const double *)value_place(s, first + 1, at, shape, wide_index, stride)};
+            const vec2 values = {*(const double *)value_place(s, first, at, how, stride),
+                                 *(const double *)value_place(s, first + 1, at, how, stride)};
             low[pair] = vec2_min(values, low[pair]);
             high[pair] = vec2_max(values, high[pair]);
             poison[pair] += values - values;
@@ -170,8 +175,7 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
 }
 
 /* As above, for cells of one type. */
-MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, finder find, const fetch_shape shape,
-                                const bool wide_index, const bool wide_number, const bool is_packed)
+MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, finder find, const reading how)
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -180,15 +184,15 @@ MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, f
         uint64_t poisoned = 0, meeting = 0, p, m;
         int64_t i = 0;
         for (; i + 4 <= count && drawn; i += 4) {
-            for (int ahead = 0; ahead < 4; ahead += 2) fetch_ahead(s->g, first + i + ahead, shape);
-            const four_ranges r = wide_number ? read_four_doubles(s, first + i, shape, wide_index, is_packed)
-                                              : read_four_floats(s, first + i, shape, wide_index, is_packed);
+            for (int ahead = 0; ahead < 4; ahead += 2) fetch_ahead(s->g, first + i + ahead, how.shape);
+            const four_ranges r =
+                how.wide_number ? read_four_doubles(s, first + i, how) : read_four_floats(s, first + i, how);
             find_four(s, &r, &p, &m);
             poisoned |= p << i;
             meeting |= m << i;
         }
         for (; i < count && drawn; i++) {
-            const finding cell = find(s, first + i, is_packed);
+            const finding cell = find(s, first + i, how.is_packed);
             poisoned |= (uint64_t)!cell.is_finite << i;
             meeting |= (uint64_t)(cell.is_finite & cell.meets) << i;
         }
@@ -209,8 +213,8 @@ MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, f
     {                                                                                                                  \
         if (shape != FETCH_BY_CELL)                                                                                    \
             return fetch_is_packed(&s->values)                                                                         \
-                       ? mark_fours(s, begin, end, name##_find, shape, wide_index, wide_number, true)                  \
-                       : mark_fours(s, begin, end, name##_find, shape, wide_index, wide_number, false);                \
+                       ? mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, true})       \
+                       : mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, false});     \
         return fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find, true)                                    \
                                            : mark(s, begin, end, name##_find, false);                                  \
     }
