@@ -63,6 +63,97 @@ MMBVH_INLINE finding find_doubles(const selector *s, int64_t cell, const fetch_s
     return find_range(s, fetch_doubles_range(&v, is_finite));
 }
 
+/* The lanes' sign bits, the first lane's lowest. */
+static inline int sign_bits(ivec4 a)
+{
+#if defined(__SSE2__)
+    return _mm_movemask_ps((__m128)a);
+#else
+    return (a[0] < 0) | (a[1] < 0) << 1 | (a[2] < 0) << 2 | (a[3] < 0) << 3;
+#endif
+}
+
+/* Constants of a pass. */
+typedef struct reading {
+    fetch_shape shape;
+    bool wide_index, wide_number, is_packed;
+} reading;
+
+/* Where the value at one vertex of a cell is. at: the vertex in the cell. */
+MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const reading how, const int64_t stride)
+{
+    const grid_array *connectivity = &s->g->connectivity;
+    const uintptr_t data = (uintptr_t)s->values.data - (uintptr_t)(connectivity->base * stride);
+    const char *entry =
+        connectivity->data + (cell * fetch_vertex_count(s->g, cell, how.shape) + at) * connectivity->stride;
+    const int64_t index =
+        how.wide_index ? *(const int64_t *)(const void *)entry : *(const int32_t *)(const void *)entry;
+    return data + (uintptr_t)(index * stride);
+}
+
+/* The least and greatest value of each of four cells, a cell a lane, and zero where all are finite. */
+typedef struct four_ranges {
+    vec4 low, high, poison;
+} four_ranges;
+
+MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const reading how)
+{
+    const int64_t stride = how.is_packed ? (int64_t)sizeof(float) : s->values.stride;
+    four_ranges r = {vec4_set1(INFINITY), vec4_set1(-INFINITY), {0}};
+    for (int at = 0; at < fetch_vertex_count(s->g, cell, how.shape); at++) {
+        float v[4];
+        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_place(s, cell + i, at, how, stride);
+        const vec4 values = {v[0], v[1], v[2], v[3]};
+        r.low = vec4_min(values, r.low);
+        r.high = vec4_max(values, r.high);
+        r.poison += values - values; /* 0 while all are finite, else not a number */
+    }
+    return r;
+}
+
+/* Rounds the ranges to floats. */
+MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, const reading how)
+{
+    const int64_t stride = how.is_packed ? (int64_t)sizeof(double) : s->values.stride;
+    vec2 low[2], high[2], poison[2] = {{0}};
+    for (int pair = 0; pair < 2; pair++) {
+        low[pair] = vec2_set1((double)INFINITY);
+        high[pair] = -low[pair];
+        for (int at = 0; at < fetch_vertex_count(s->g, cell, how.shape); at++) {
+            const int64_t first = cell + 2 * pair;
+            const vec2 values = {*(const double *)value_place(s, first, at, how, stride),
+                                 *(const double *)value_place(s, first + 1, at, how, stride)};
+            low[pair] = vec2_min(values, low[pair]);
+            high[pair] = vec2_max(values, high[pair]);
+            poison[pair] += values - values;
+        }
+    }
+    return (four_ranges){{(float)low[0][0], (float)low[0][1], (float)low[1][0], (float)low[1][1]},
+                         {(float)high[0][0], (float)high[0][1], (float)high[1][0], (float)high[1][1]},
+                         {(float)poison[0][0], (float)poison[0][1], (float)poison[1][0], (float)poison[1][1]}};
+}
+
+/* Four cells of one type: a bit for each whose values are not finite, and for each other that meets an interval. */
+MMBVH_INLINE void find_four(const selector *s, const four_ranges *r, uint64_t *unusable, uint64_t *meeting)
+{
+    ivec4 meets = {0};
+    for (int i = 0; i < s->wish->interval_count; i++)
+        meets |= (ivec4)(r->low <= vec4_set1(s->wish->intervals[i].high)) &
+                 (ivec4)(r->high >= vec4_set1(s->wish->intervals[i].low));
+    const int poisoned = sign_bits((ivec4)(r->poison != vec4_set1(0)));
+    *unusable = (uint64_t)poisoned;
+    *meeting = (uint64_t)(sign_bits(meets) & ~poisoned);
+}
+
+/* Bits of those of so many cells that are drawn. */
+static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
+{
+    uint64_t bits = 0;
+    if (!g->ghosts && !g->flat) return count < WORD_CELLS ? (UINT64_C(1) << count) - 1 : ~UINT64_C(0);
+    for (int64_t i = 0; i < count; i++) bits |= (uint64_t)grid_is_drawn(g, first + i) << i;
+    return bits;
+}
+
 typedef finding (*const finder)(const selector *s, int64_t cell, const bool is_packed);
 
 /* Cells that are not drawn are passed over. */
@@ -83,6 +174,34 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
     return unusable;
 }
 
+/* As above, for cells of one type. */
+MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, finder find, const reading how)
+{
+    int64_t unusable = 0;
+    for (int64_t first = begin; first < end; first += WORD_CELLS) {
+        const int64_t count = end - first < WORD_CELLS ? end - first : WORD_CELLS;
+        const uint64_t drawn = drawn_bits(s->g, first, count);
+        uint64_t poisoned = 0, meeting = 0, p, m;
+        int64_t i = 0;
+        for (; i + 4 <= count && drawn; i += 4) {
+            for (int ahead = 0; ahead < 4; ahead += 2) fetch_ahead(s->g, first + i + ahead, how.shape);
+            const four_ranges r =
+                how.wide_number ? read_four_doubles(s, first + i, how) : read_four_floats(s, first + i, how);
+            find_four(s, &r, &p, &m);
+            poisoned |= p << i;
+            meeting |= m << i;
+        }
+        for (; i < count && drawn; i++) {
+            const finding cell = find(s, first + i, how.is_packed);
+            poisoned |= (uint64_t)!cell.is_finite << i;
+            meeting |= (uint64_t)(cell.is_finite & cell.meets) << i;
+        }
+        unusable += __builtin_popcountll(poisoned & drawn);
+        s->bits[first / WORD_CELLS] |= meeting & drawn;
+    }
+    return unusable;
+}
+
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
     MMBVH_INLINE finding name##_find(const selector *s, int64_t cell, const bool is_packed)                            \
     {                                                                                                                  \
@@ -92,6 +211,10 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
     }                                                                                                                  \
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
+        if (shape != FETCH_BY_CELL)                                                                                    \
+            return fetch_is_packed(&s->values)                                                                         \
+                       ? mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, true})       \
+                       : mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, false});     \
         return fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find, true)                                    \
                                            : mark(s, begin, end, name##_find, false);                                  \
     }

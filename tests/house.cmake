@@ -9,7 +9,7 @@ add_test(NAME house_library_shows_insitu_only
   COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_library.sh $<TARGET_FILE:insitu>)
 add_test(NAME house_kernels_show_their_table_only
   COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_kernels.sh ${INSITU_KERNEL_OBJECTS}
-  ${INSITU_SHEET_OBJECTS} COMMAND_EXPAND_LISTS)
+  ${INSITU_SHEET_OBJECTS} ${INSITU_LANE_OBJECTS} COMMAND_EXPAND_LISTS)
 set_tests_properties(house_kernels_show_their_table_only PROPERTIES SKIP_RETURN_CODE 77)
 add_test(NAME house_tests_can_fail
   COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_seeded.sh ${PROJECT_SOURCE_DIR} ${CMAKE_C_COMPILER})

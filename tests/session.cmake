@@ -36,6 +36,10 @@ add_executable(test_homes test_homes.c)
 target_link_libraries(test_homes PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME homes COMMAND test_homes)
 
+add_executable(test_session_lanes test_session_lanes.c)
+target_link_libraries(test_session_lanes PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
+add_test(NAME session_lanes COMMAND test_session_lanes)
+
 # Ranks are not bound, so that all may run on all cores.
 add_executable(test_session_cores test_session_cores.c)
 target_link_libraries(test_session_cores PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA OpenMP::OpenMP_C)

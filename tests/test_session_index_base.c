@@ -141,10 +141,48 @@ static void errors_count_from_one_too(void **state)
     input_free(&in);
 }
 
+/* Each wrong in one place of the last rank's connectivity. */
+static void wrong_indices_are_told(insitu_session *session, const session_input *in, int32_t *place, int64_t cell)
+{
+    const int32_t wrong[] = {0, (int32_t)in->part.vertex_count + 1, -1, INT32_MIN, INT32_MAX}, good = *place;
+    char word[64];
+    snprintf(word, sizeof word, "cell %lld ", (long long)cell);
+    MPI_Bcast(word, sizeof word, MPI_CHAR, rank_count - 1, MPI_COMM_WORLD);
+    for (int i = 0; i < (int)(sizeof wrong / sizeof *wrong); i++) {
+        if (own_rank == rank_count - 1) *place = wrong[i];
+        hand_over(session, in);
+        told_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
+                        " is outside 1..");
+    }
+    *place = good;
+    hand_over(session, in);
+    everywhere(insitu_step(session, 9, 0) == INSITU_OK);
+}
+
+/* Many cells of packed arrays are looked at together. One amid them is wrong, or the last. */
+static void errors_of_many_cells_are_told(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++) {
+        session_input in = {0};
+        input_create(&in, kind, 2 * SIDE, TEST_RANDOM, own_rank, rank_count);
+        count_from_one(&in);
+        narrow_arrays narrow = make_narrow(&in);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+        const int64_t count = kind == TEST_TETS ? 4 : 8, cells[] = {in.part.cell_count / 2, in.part.cell_count - 1};
+        for (int i = 0; i < 2; i++)
+            wrong_indices_are_told(session, &in, &narrow.connectivity[count * cells[i] + i], cells[i]);
+        insitu_destroy(&session);
+        free_narrow(&narrow);
+        input_free(&in);
+    }
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_those_from_zero),
-                                       cmocka_unit_test(errors_count_from_one_too)};
+                                       cmocka_unit_test(errors_count_from_one_too),
+                                       cmocka_unit_test(errors_of_many_cells_are_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

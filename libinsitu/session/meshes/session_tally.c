@@ -3,6 +3,8 @@
 #include <string.h>
 
 #include "mmbvh_fetch.h"
+#include "session_corners.h"
+#include "session_lanes.h"
 #include "session_polyhedron.h"
 
 mesh_tally tally_empty(void)
@@ -25,27 +27,6 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part)
 }
 
 /* ---- volumes and sizes --------------------------------------------------------------------------------------- */
-
-/* A type's corners, each with its three neighbours in right-handed order: the cell's volume is what their tets'
- * volumes, six times, sum to, over shares. Exact for cells with parallel edges, else a mean. */
-typedef struct cell_corners {
-    const signed char (*corners)[4];
-    int count;
-    double shares; /* what a cell of volume 1 sums to */
-} cell_corners;
-
-MMBVH_INLINE cell_corners corners_of(int type)
-{
-    static const signed char tet[][4] = {{0, 1, 2, 3}};
-    static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
-                                         {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}};
-    static const signed char wedge[][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
-                                           {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}};
-    static const signed char pyramid[][4] = {{0, 1, 3, 4}, {1, 2, 0, 4}, {2, 3, 1, 4}, {3, 0, 2, 4}};
-    if (type == GRID_TET) return (cell_corners){tet, 1, 6};
-    if (type == GRID_HEX) return (cell_corners){hex, 8, 8};
-    return type == GRID_WEDGE ? (cell_corners){wedge, 6, 12} : (cell_corners){pyramid, 4, 12};
-}
 
 MMBVH_INLINE double determinant(const double u[3], const double v[3], const double w[3])
 {
@@ -109,43 +90,12 @@ static bool is_flat_everywhere(int type, double points[][3])
     return is_flat(sum / of.shares, box_volume(points, grid_type_vertices(type)));
 }
 
-MMBVH_INLINE bool has_usual_root(double x)
-{
-    return x > 1e-280 && x < 1e280;
-}
-
-/* Approximates the cube root to 0.033 by a third of the bits, since a double's bits are its logarithm to within 0.09.
- */
-MMBVH_INLINE double cube_root_begin(double x)
-{
-    uint64_t bits;
-    double y;
-    memcpy(&bits, &x, sizeof bits);
-    bits = bits / 3 + 0x2a9f7893782da1ceu; /* two thirds of 1.0's bits, less the part that the mantissa leaves */
-    memcpy(&y, &bits, sizeof y);
-    return y;
-}
-
-/* A step of Halley's method cubes the error: two from the begin on leave 2.1e-5, then rounding. */
-MMBVH_INLINE double cube_root_step(double x, double y)
-{
-    const double cube = y * y * y;
-    return y * ((cube + 2 * x) / (2 * cube + x));
-}
-
-/* The cube root, without a call where volumes are of any usual size. */
-MMBVH_INLINE double cube_root(double x)
-{
-    if (!has_usual_root(x)) return cbrt(x);
-    return cube_root_step(x, cube_root_step(x, cube_root_begin(x)));
-}
-
 /* 0 of a flat cell, whatever sign and size rounding left it. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn++;
     tally->inverted += volume < 0;
-    tally->sizes += cube_root(fabs(volume));
+    tally->sizes += cbrt(fabs(volume));
 }
 
 MMBVH_INLINE void tally_shell(mesh_tally *tally)
@@ -293,140 +243,36 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
     return true;
 }
 
-/* ---- cells of one type, LANES at once ----
- *
- * The same operations on each cell, in an order that the compiler makes vectors of. Where anything is unusual about one
- * of them (a bad index, a ghost, a volume that is not finite or has no usual root) they are taken one by one instead. A
- * volume is finite only where all coordinates are: each is in a product of it, and what is not finite stays so. */
-
-enum { LANES = 8 };
-
-typedef double lanes[LANES];
-
-typedef struct lane_bounds {
-    lanes lower[3], upper[3];
-    lanes least; /* volume without its sign */
-} lane_bounds;
-
-MMBVH_INLINE lane_bounds lane_bounds_empty(void)
+/* Cells from this one on, of its type, whose vertices follow each other: lanes take them. */
+MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
-    lane_bounds b;
-    for (int lane = 0; lane < LANES; lane++) b.least[lane] = (double)INFINITY;
-    for (int axis = 0; axis < 3; axis++)
-        for (int lane = 0; lane < LANES; lane++) {
-            b.lower[axis][lane] = (double)INFINITY;
-            b.upper[axis][lane] = -(double)INFINITY;
-        }
-    return b;
-}
-
-MMBVH_INLINE void tally_bounds(mesh_tally *t, const lane_bounds *b)
-{
-    for (int axis = 0; axis < 3; axis++)
-        for (int lane = 0; lane < LANES; lane++) {
-            const double lower = b->lower[axis][lane], upper = b->upper[axis][lane];
-            t->lower[axis] = lower < t->lower[axis] ? lower : t->lower[axis];
-            t->upper[axis] = upper > t->upper[axis] ? upper : t->upper[axis];
-        }
-}
-
-/* Tells whether that many entries from the first on are indices of vertices, by the signs of index and last - index. */
-MMBVH_INLINE bool are_vertices(const grid *g, int64_t first, const int count, const bool wide_index)
-{
-    const int64_t last = g->vertex_count - 1;
-    if (!wide_index && g->connectivity.stride == sizeof(int32_t)) {
-        const uint32_t *indices = (const uint32_t *)(const void *)g->connectivity.data + first;
-        const uint32_t narrow_last = last < INT32_MAX ? (uint32_t)last : INT32_MAX;
-        uint32_t signs = 0;
-        for (int i = 0; i < count; i++) signs |= indices[i] | (narrow_last - indices[i]);
-        return last >= 0 && !(signs >> 31);
-    }
-    int64_t signs = 0;
-    for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
-        signs |= vertex | (last - (vertex & INT64_MAX));
-    }
-    return signs >= 0;
-}
-
-MMBVH_INLINE void take_lanes(const grid *g, int64_t first, const int count, lanes at[][3], const bool wide_index,
-                             const bool wide_number)
-{
-    const int64_t y = g->coordinates[1].data - g->coordinates[0].data;
-    const int64_t z = g->coordinates[2].data - g->coordinates[0].data;
-    for (int lane = 0; lane < LANES; lane++)
-        for (int i = 0; i < count; i++) {
-            const char *const vertex = fetch_vertex(g, first + lane * count + i, wide_index);
-            const char *const place[3] = {vertex, vertex + y, vertex + z};
-            for (int axis = 0; axis < 3; axis++)
-                at[i][axis][lane] = wide_number ? *(const double *)(const void *)place[axis]
-                                                : (double)*(const float *)(const void *)place[axis];
-        }
-}
-
-MMBVH_INLINE void lane_volumes(const int type, lanes (*const at)[3], lanes volume)
-{
-    const cell_corners of = corners_of(type);
-    for (int lane = 0; lane < LANES; lane++) volume[lane] = 0;
-    for (int i = 0; i < of.count; i++) {
-        const signed char *corner = of.corners[i];
-        lanes *const o = at[corner[0]], *const a = at[corner[1]], *const b = at[corner[2]], *const c = at[corner[3]];
-        for (int lane = 0; lane < LANES; lane++) {
-            const double u[3] = {a[0][lane] - o[0][lane], a[1][lane] - o[1][lane], a[2][lane] - o[2][lane]};
-            const double v[3] = {b[0][lane] - o[0][lane], b[1][lane] - o[1][lane], b[2][lane] - o[2][lane]};
-            const double w[3] = {c[0][lane] - o[0][lane], c[1][lane] - o[1][lane], c[2][lane] - o[2][lane]};
-            volume[lane] += determinant(u, v, w);
-        }
-    }
-    for (int lane = 0; lane < LANES; lane++) volume[lane] /= of.shares;
-}
-
-MMBVH_INLINE void grow_lanes(lane_bounds *b, lanes (*const at)[3], const int count)
-{
-    for (int i = 0; i < count; i++)
-        for (int axis = 0; axis < 3; axis++)
-            for (int lane = 0; lane < LANES; lane++) {
-                const double x = at[i][axis][lane];
-                b->lower[axis][lane] = x < b->lower[axis][lane] ? x : b->lower[axis][lane];
-                b->upper[axis][lane] = x > b->upper[axis][lane] ? x : b->upper[axis][lane];
-            }
-}
-
-/* Takes volumes with usual roots only. */
-MMBVH_INLINE void tally_volumes(mesh_tally *t, lanes least, const lanes volume)
-{
-    lanes size, root;
-    for (int lane = 0; lane < LANES; lane++) size[lane] = fabs(volume[lane]);
-    for (int lane = 0; lane < LANES; lane++) least[lane] = size[lane] < least[lane] ? size[lane] : least[lane];
-    for (int lane = 0; lane < LANES; lane++) root[lane] = cube_root_begin(size[lane]);
-    for (int step = 0; step < 2; step++)
-        for (int lane = 0; lane < LANES; lane++) root[lane] = cube_root_step(size[lane], root[lane]);
-    for (int lane = 0; lane < LANES; lane++) {
-        t->inverted += volume[lane] < 0;
-        t->sizes += root[lane];
-    }
-    t->drawn += LANES;
-}
-
-/* Returns false, with nothing done, where cells are to be taken one by one. */
-MMBVH_INLINE bool run_lanes(const grid *g, int64_t cell, mesh_tally *t, lane_bounds *bounds, const fetch_shape shape,
-                            const bool wide_index, const bool wide_number)
-{
-    const int type = shape == FETCH_TETS ? GRID_TET : shape == FETCH_HEXES ? GRID_HEX : g->cell_type;
+    const grid *g = &mesh->cells;
+    const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
     const int count = grid_type_vertices(type);
-    lanes at[GRID_MAX_CELL_VERTICES][3], volume;
-    for (int lane = 0; lane < LANES; lane++) fetch_ahead(g, cell + lane, shape);
-    bool is_usual = are_vertices(g, cell * count, LANES * count, wide_index);
-    if (g->ghosts)
-        for (int lane = 0; lane < LANES; lane++) is_usual &= !grid_is_ghost(g, cell + lane);
-    if (!is_usual) return false;
-    take_lanes(g, cell * count, count, at, wide_index, wide_number);
-    lane_volumes(type, at, volume);
-    for (int lane = 0; lane < LANES; lane++) is_usual &= has_usual_root(fabs(volume[lane]));
-    if (!is_usual) return false;
-    grow_lanes(bounds, at, count);
-    tally_volumes(t, bounds->least, volume);
-    return true;
+    lane_cells alike = {.g = g, .type = type, .first = cell, .count = end - cell, .entry = cell * count};
+    if (shape != FETCH_BY_CELL) return alike;
+    int64_t next = cell;
+    while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
+    if (next > cell) alike.entry = fetch_first(g, cell, count, shape);
+    alike.count = next > cell ? next - cell : 1; /* one with wrong offsets stands alone */
+    return alike;
+}
+
+/* Takes the first so many of the cells, and returns how many; *alone tells how many after them are to be taken one by
+ * one. */
+static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
+{
+    lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
+    *alone = alike->count;
+    if (alike->count < LANES || !run) return 0;
+    lane_sums sums;
+    const int64_t taken = run(alike, &sums, alone);
+    mesh_tally part = {.drawn = taken, .inverted = sums.inverted, .sizes = sums.sizes};
+    memcpy(part.lower, sums.lower, sizeof part.lower);
+    memcpy(part.upper, sums.upper, sizeof part.upper);
+    tally_merge(t, &part);
+    *least = sums.least < *least ? sums.least : *least;
+    return taken;
 }
 
 /* Cells of a run are tallied again, each with its own box, only if the least volume may be flat beside the box of all
@@ -438,10 +284,9 @@ static mesh_tally tally_again(const grid *g, int64_t begin, int64_t end)
     return again;
 }
 
-MMBVH_INLINE bool may_be_flat(const mesh_tally *t, const lane_bounds *b, double least)
+MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 {
     double box = 1;
-    for (int lane = 0; lane < LANES; lane++) least = b->least[lane] < least ? b->least[lane] : least;
     for (int axis = 0; axis < 3; axis++) box *= t->upper[axis] - t->lower[axis];
     return is_flat(least, box);
 }
@@ -450,21 +295,22 @@ MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, m
                          const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
     mesh_tally t = tally_empty();
-    lane_bounds bounds = lane_bounds_empty();
+    lane_cells alike = {.count = 0};
     double least = (double)INFINITY;
     bool is_good = true;
     int64_t cell = begin;
     while (cell < end && is_good) {
-        const int64_t next = cell + LANES < end ? cell + LANES : end;
-        if (shape != FETCH_BY_CELL && next - cell == LANES &&
-            run_lanes(&mesh->cells, cell, &t, &bounds, shape, wide_index, wide_number)) {
-            cell = next;
-            continue;
-        }
-        while (cell < next && (is_good = run_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
+        int64_t alone;
+        if (!alike.count) alike = alike_from(mesh, cell, end, shape);
+        const int64_t taken = run_lanes(&alike, &t, &least, &alone), first = cell + taken;
+        cell = first;
+        while (cell < first + alone && is_good)
+            if ((is_good = run_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
+        alike.first += taken + alone;
+        alike.entry += (taken + alone) * grid_type_vertices(alike.type);
+        alike.count -= taken + alone;
     }
-    tally_bounds(&t, &bounds);
-    if (may_be_flat(&t, &bounds, least)) t = tally_again(&mesh->cells, begin, cell);
+    if (may_be_flat(&t, least)) t = tally_again(&mesh->cells, begin, cell);
     tally_merge(tally, &t);
     return cell;
 }

@@ -1,0 +1,28 @@
+/* The volume of a cell by its corners. */
+#ifndef SESSION_CORNERS_H
+#define SESSION_CORNERS_H
+
+#include "grid.h"
+
+/* A type's corners, each with its three neighbours in right-handed order: the cell's volume is what their tets'
+ * volumes, six times, sum to, over shares. Exact for cells with parallel edges, else a mean. */
+typedef struct cell_corners {
+    const signed char (*corners)[4];
+    int count;
+    double shares; /* what a cell of volume 1 sums to */
+} cell_corners;
+
+static inline __attribute__((always_inline)) cell_corners corners_of(int type)
+{
+    static const signed char tet[][4] = {{0, 1, 2, 3}};
+    static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
+                                         {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}};
+    static const signed char wedge[][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
+                                           {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}};
+    static const signed char pyramid[][4] = {{0, 1, 3, 4}, {1, 2, 0, 4}, {2, 3, 1, 4}, {3, 0, 2, 4}};
+    if (type == GRID_TET) return (cell_corners){tet, 1, 6};
+    if (type == GRID_HEX) return (cell_corners){hex, 8, 8};
+    return type == GRID_WEDGE ? (cell_corners){wedge, 6, 12} : (cell_corners){pyramid, 4, 12};
+}
+
+#endif
