@@ -19,7 +19,7 @@
 #include "kernel_occlusion_rays.h"
 #include "kernel_packet.h"
 #include "kernel_packet_surface.h"
-#include "kernel_polys.h"
+#include "kernel_curved_batch.h"
 #include "kernel_prefetch.h"
 #include "kernel_surface.h"
 #include "kernel_tile.h"
@@ -64,7 +64,7 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, 
     }
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
-    t->poly->is_set_up = false;
+    t->curved->is_set_up = false;
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
@@ -84,12 +84,12 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
 
 /* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
  * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
-SIMD_INLINE bool kernel_is_for_polys(const kernel_tile_trace *t, const kernel_batch *b,
-                                     const kernel_tile_candidate *candidate, int type)
+SIMD_INLINE bool kernel_is_for_curved_batch(const kernel_tile_trace *t, const kernel_batch *b,
+                                            const kernel_tile_candidate *candidate, int type)
 {
-    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_polys_fit(t, &b->arrays)) return false;
+    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_curved_batch_fit(t, &b->arrays)) return false;
     return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
-           kernel_box_pixels(candidate->box) <= KERNEL_POLY_PIXELS;
+           kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
 }
 
 /* What a tile's cells go through from where they are found: batches of several, or, those that are for no batch, one by
@@ -98,7 +98,7 @@ enum { KERNEL_ALONE = SIMD_WIDTH };
 
 typedef struct kernel_tile_queue {
     kernel_batch batch;
-    kernel_polys polys;
+    kernel_curved_batch curved_batch;
     int alone_count;
     kernel_tile_candidate alone[KERNEL_ALONE];
 } kernel_tile_queue;
@@ -106,7 +106,7 @@ typedef struct kernel_tile_queue {
 static void kernel_tile_queue_begin(kernel_tile_queue *m)
 {
     kernel_batch_begin(&m->batch);
-    kernel_polys_begin(&m->polys);
+    kernel_curved_batch_begin(&m->curved_batch);
     m->alone_count = 0;
 }
 
@@ -115,7 +115,7 @@ SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_ba
                                      const kernel_tile_candidate *candidate)
 {
     const int type = kernel_arrays_type(&b->arrays, candidate->cell);
-    return type == GRID_TET ? b->takes_batches : kernel_is_for_polys(t, b, candidate, type);
+    return type == GRID_TET ? b->takes_batches : kernel_is_for_curved_batch(t, b, candidate, type);
 }
 
 /* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
@@ -123,7 +123,7 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
     kernel_batch_end(t, &m->batch);
-    kernel_polys_end(t, &m->polys);
+    kernel_curved_batch_end(t, &m->curved_batch);
     for (int n = 0; n < m->alone_count; n++) {
         int part;
         const int value = kernel_tile_source(t, m->alone[n].source, &part);
@@ -142,9 +142,9 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
     const int type = kernel_arrays_type(&m->batch.arrays, candidate->cell);
     if (type == GRID_TET && m->batch.takes_batches) {
         kernel_batch_add(t, &m->batch, candidate, value);
-    } else if (kernel_is_for_polys(t, &m->batch, candidate, type)) {
-        kernel_polys_turn(t, &m->polys, &m->batch.arrays, part);
-        kernel_polys_wait(t, &m->polys, type, candidate, value);
+    } else if (kernel_is_for_curved_batch(t, &m->batch, candidate, type)) {
+        kernel_curved_batch_turn(t, &m->curved_batch, &m->batch.arrays, part);
+        kernel_curved_batch_wait(t, &m->curved_batch, type, candidate, value);
     } else {
         if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
         m->alone[m->alone_count++] = *candidate;
@@ -156,7 +156,7 @@ static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     kernel_tile_queue_alone(t, m);
     kernel_batch_end(t, &m->batch);
-    kernel_polys_end(t, &m->polys);
+    kernel_curved_batch_end(t, &m->curved_batch);
 }
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
@@ -329,9 +329,9 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
 /* The memory that a thread keeps from tile to tile. */
 typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
-    kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
+    kernel_curved curved_cells[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
     kernel_cell tile_cell;
-    kernel_poly tile_poly;
+    kernel_curved tile_curved;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
@@ -542,14 +542,14 @@ static void begin(kernel_thread *thread)
 {
     kernel_memory *m = thread->memory;
     thread->cells = &m->packet_cells;
-    thread->polys = m->polys;
+    thread->curved_cells = m->curved_cells;
     thread->tile = &m->tile;
     thread->tile_cells = &m->cells;
     thread->tile_volume = &m->volume;
     thread->tile_segments = &m->segments;
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
-    m->tile.poly = &m->tile_poly;
+    m->tile.curved = &m->tile_curved;
     m->tile.search = &m->search.nodes;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;

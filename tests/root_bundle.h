@@ -72,7 +72,7 @@ static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CE
     const kernel_beam beam = bundle_beam(&b->packet);
     kernel_map_setup(map, &b->cell);
     kernel_bounds_setup(bounds, map, b->cell.type, &beam);
-    return kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
+    return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, false, list);
 }
 
 /* First hits on all rays, and how many hits there are. */

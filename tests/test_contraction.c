@@ -10,7 +10,7 @@
  * coordinates. f's second derivative is no more than some 4 K (its first one is K at the domain's corners, and 0 in the
  * middle), so with K <= 0.95 the step leaves 2 K / (1 - K) (4e-5)^2 = 6e-8 of r, which is as much of the cell's extent
  * along the ray; t is rounded to half a unit, twice. */
-#include "kernel_bounds_polys.h"
+#include "kernel_bounds_curved.h"
 #include "kernel_contraction.h"
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
@@ -145,7 +145,7 @@ static void make_batch(batch *b, int type, shape s)
 
 /* ---- contraction ---- */
 
-static void sight_of(const batch *b, const kernel_polys_bounds *bounds, kernel_sight *out)
+static void sight_of(const batch *b, const kernel_curved_batch_bounds *bounds, kernel_sight *out)
 {
     vf origin[3], normal[3][3], gradient[3];
     for (int a = 0; a < 3; a++) {
@@ -195,13 +195,13 @@ static void map_of(const batch *b, kernel_map_lanes *out)
     }
 }
 
-static void contract(const batch *b, kernel_contracted *out, kernel_polys_bounds *bounds)
+static void contract(const batch *b, kernel_contracted *out, kernel_curved_batch_bounds *bounds)
 {
     kernel_contraction c;
     kernel_sight ray;
     kernel_map_lanes map;
     kernel_point at;
-    kernel_polys_bound(b->type, b->at, &b->beam, bounds);
+    kernel_curved_batch_bound(b->type, b->at, &b->beam, bounds);
     sight_of(b, bounds, &ray);
     contraction_of(&bounds->contractions, &c);
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
@@ -326,7 +326,7 @@ static void decided_crossings_are_right(void **state)
             count n = {.rays = 0};
             while (n.rays < rays_wanted / (3 * SHAPE_COUNT)) {
                 batch b;
-                kernel_polys_bounds bounds;
+                kernel_curved_batch_bounds bounds;
                 kernel_contracted at;
                 make_batch(&b, types[k], s);
                 contract(&b, &at, &bounds);

@@ -1,7 +1,7 @@
 /* Tets of plain meshes, hexes, wedges and pyramids, which tiles trace as many at once as there are lanes
- * (kernel_batch.h, kernel_polys.h), against the same cells in traversals that take them one by one: the same bits.
- * Cells are of some pixels, of many and of one; the last ones lie beside each other in one vector, and may hit one
- * pixel. */
+ * (kernel_batch.h, kernel_curved_batch.h), against the same cells in traversals that take them one by one: the same
+ * bits. Cells are of some pixels, of many and of one; the last ones lie beside each other in one vector, and may hit
+ * one pixel. */
 #include "test_render_fixture.h"
 
 #include <math.h>

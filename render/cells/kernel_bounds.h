@@ -259,13 +259,13 @@ static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, 
 
 /* Set up once for a cell and isovalue and used by all packets of a tile. Each place of the cell cache has one beside
  * it. */
-typedef struct kernel_poly {
+typedef struct kernel_curved {
     bool is_set_up, has_contraction;
     int value;
     kernel_map map;
     kernel_bounds bounds; /* robust roots alone */
     kernel_cell_contraction contraction;
-} kernel_poly;
+} kernel_curved;
 
 /* The tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
@@ -275,17 +275,17 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
     return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
 }
 
-SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *tile, kernel_poly *poly,
-                                   const render_surface_layer *layer, const kernel_cell *c, int value)
+SIMD_INLINE void kernel_curved_setup(const kernel_frame *f, const kernel_tile *tile, kernel_curved *curved,
+                                     const render_surface_layer *layer, const kernel_cell *c, int value)
 {
-    if (poly->is_set_up) return;
-    poly->is_set_up = true;
-    poly->has_contraction = false;
-    poly->value = value;
-    kernel_map_setup(&poly->map, c);
-    if (layer->colour_map) kernel_map_colour(&poly->map, c);
+    if (curved->is_set_up) return;
+    curved->is_set_up = true;
+    curved->has_contraction = false;
+    curved->value = value;
+    kernel_map_setup(&curved->map, c);
+    if (layer->colour_map) kernel_map_colour(&curved->map, c);
     const kernel_beam beam = kernel_tile_beam(f, tile);
-    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type, &beam);
+    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&curved->bounds, &curved->map, c->type, &beam);
 }
 
 #endif

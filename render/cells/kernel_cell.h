@@ -499,7 +499,7 @@ SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const k
     memcpy(c->least, &least, sizeof least);
 }
 
-SIMD_INLINE void kernel_poly_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
     const kernel_shape *shape = kernel_cell_shape(c->type);
     signed char ends[KERNEL_MAX_LINES][2];
@@ -532,7 +532,7 @@ static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kern
     if (c->type == GRID_TET)
         kernel_tet_lines(c, f, tile);
     else
-        kernel_poly_lines(c, f, tile);
+        kernel_curved_lines(c, f, tile);
 }
 
 #endif

@@ -314,7 +314,8 @@ typedef struct kernel_edges {
 } kernel_edges;
 
 /* Number n of the cell's lines. */
-SIMD_INLINE void kernel_poly_edge(const kernel_packet *p, const kernel_cell *c, int n, int i, int j, kernel_edges *out)
+SIMD_INLINE void kernel_curved_edge(const kernel_packet *p, const kernel_cell *c, int n, int i, int j,
+                                    kernel_edges *out)
 {
     const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
     out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, a), kernel_cell_spot(c, b));
@@ -497,8 +498,8 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
 }
 
 /* All crossings of a cell with quads; returns how many triangles are crossed by some ray. */
-SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
-                                      kernel_crossing out[KERNEL_MAX_CROSSINGS])
+SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+                                        kernel_crossing out[KERNEL_MAX_CROSSINGS])
 {
     const kernel_shape *shape = kernel_cell_shape(c->type);
     kernel_projected q;
@@ -509,7 +510,7 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
         q.y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
     }
     for (int n = 0; n < shape->edge_count; n++)
-        kernel_poly_edge(p, c, n, shape->edges[n][0], shape->edges[n][1], &edges);
+        kernel_curved_edge(p, c, n, shape->edges[n][0], shape->edges[n][1], &edges);
     int n = 0;
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
@@ -520,7 +521,7 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
         }
         int corner[4];
         kernel_quad_corners(c, loop, corner);
-        kernel_poly_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
+        kernel_curved_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
         n += kernel_quad_crossings(&s, corner, &out[n]);
     }
     return n;
@@ -546,11 +547,11 @@ SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_cr
     return vm_any(out->mask);
 }
 
-SIMD_INLINE int kernel_poly_intervals(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
-                                      kernel_interval out[KERNEL_MAX_CELL_INTERVALS])
+SIMD_INLINE int kernel_curved_intervals(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+                                        kernel_interval out[KERNEL_MAX_CELL_INTERVALS])
 {
     kernel_crossing list[KERNEL_MAX_CROSSINGS], in, next;
-    const int crossings = kernel_poly_crossings(p, c, rays, has_colour, list);
+    const int crossings = kernel_curved_crossings(p, c, rays, has_colour, list);
     int n = 0;
     while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
            kernel_take_nearest(list, crossings, &next)) {

@@ -40,7 +40,7 @@ typedef struct kernel_local_cells {
     float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
     float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH]; /* y of no point inside is beyond */
-    float bend[SIMD_WIDTH]; /* the derivative of n is no more than its root by Frobenius' norm */
+    float bend[SIMD_WIDTH];                        /* the derivative of n is no more than its root by Frobenius' norm */
     float blur[SIMD_WIDTH]; /* a point nearer than that to the border may be on either side of it */
 } kernel_local_cells;
 
@@ -55,7 +55,7 @@ SIMD_INLINE int kernel_bent_terms(int type)
 }
 
 /* A number at the vertices as the terms' factors: in the middle, along r, bent. */
-SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
+SIMD_INLINE void kernel_curved_terms(const vf v[8], vf out[8])
 {
     const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
     const vf m0 = v[1] - v[0], m1 = v[2] - v[3], m2 = v[5] - v[4], m3 = v[6] - v[7];
@@ -101,7 +101,7 @@ SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
 SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 {
     if (type == GRID_HEX)
-        kernel_hex_terms(v, out);
+        kernel_curved_terms(v, out);
     else if (type == GRID_WEDGE)
         kernel_wedge_terms(v, out);
     else if (type == GRID_PYRAMID)
@@ -185,7 +185,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
     }
 }
 
-SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_curved_turn(vf (*at)[8], int lists)
 {
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
     vm is_least[8];
@@ -240,7 +240,7 @@ SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
 SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
 {
     if (type == GRID_HEX)
-        kernel_hex_turn(at, lists);
+        kernel_curved_turn(at, lists);
     else if (type == GRID_WEDGE)
         kernel_wedge_turn(at, lists);
     else
@@ -264,21 +264,20 @@ SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 /* The largest derivative's norm, squared, over the corners. */
 SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
 {
-    static const float corners[2][8][3] = {
-        {{-0.5f, -0.5f, -0.5f},
-         {0.5f, -0.5f, -0.5f},
-         {0.5f, 0.5f, -0.5f},
-         {-0.5f, 0.5f, -0.5f},
-         {-0.5f, -0.5f, 0.5f},
-         {0.5f, -0.5f, 0.5f},
-         {0.5f, 0.5f, 0.5f},
-         {-0.5f, 0.5f, 0.5f}},
-        {{-1.0f / 3, -1.0f / 3, -0.5f},
-         {2.0f / 3, -1.0f / 3, -0.5f},
-         {-1.0f / 3, 2.0f / 3, -0.5f},
-         {-1.0f / 3, -1.0f / 3, 0.5f},
-         {2.0f / 3, -1.0f / 3, 0.5f},
-         {-1.0f / 3, 2.0f / 3, 0.5f}}};
+    static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
+                                            {0.5f, -0.5f, -0.5f},
+                                            {0.5f, 0.5f, -0.5f},
+                                            {-0.5f, 0.5f, -0.5f},
+                                            {-0.5f, -0.5f, 0.5f},
+                                            {0.5f, -0.5f, 0.5f},
+                                            {0.5f, 0.5f, 0.5f},
+                                            {-0.5f, 0.5f, 0.5f}},
+                                           {{-1.0f / 3, -1.0f / 3, -0.5f},
+                                            {2.0f / 3, -1.0f / 3, -0.5f},
+                                            {-1.0f / 3, 2.0f / 3, -0.5f},
+                                            {-1.0f / 3, -1.0f / 3, 0.5f},
+                                            {2.0f / 3, -1.0f / 3, 0.5f},
+                                            {-1.0f / 3, 2.0f / 3, 0.5f}}};
     const vf *b0 = bent[0];
     vf most = vf_set(0);
     /* Along k, α and β: 1/4, 1/2 and 1/2 at most. */

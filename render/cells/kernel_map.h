@@ -40,7 +40,7 @@ typedef struct kernel_map {
 } kernel_map;
 
 /* A hex's coefficients of its vertices' numbers: doubles, or vectors of them. */
-#define KERNEL_HEX_FIT(c, v)                                                                                           \
+#define KERNEL_CURVED_FIT(c, v)                                                                                        \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
         (c)[1] = (v)[1] - (v)[0];                                                                                      \
@@ -76,7 +76,7 @@ typedef struct kernel_map {
     do {                                                                                                               \
         if ((type) != GRID_HEX) memset(c, 0, 8 * sizeof *(c));                                                         \
         if ((type) == GRID_HEX)                                                                                        \
-            KERNEL_HEX_FIT(c, v);                                                                                      \
+            KERNEL_CURVED_FIT(c, v);                                                                                   \
         else if ((type) == GRID_WEDGE)                                                                                 \
             KERNEL_WEDGE_FIT(c, v);                                                                                    \
         else                                                                                                           \
@@ -433,7 +433,7 @@ typedef struct kernel_bounds {
     float jump;                /* a face's value and the field on the ray beside it are never farther apart */
 } kernel_bounds;
 
-/* What one cell's rays are contracted by (surface/kernel_contraction.h, kernel_bounds_polys.h). */
+/* What one cell's rays are contracted by (surface/kernel_contraction.h, kernel_bounds_curved.h). */
 typedef struct kernel_cell_contraction {
     float normal[3][3], gradient[3], level, offset[3], middle, bent[4][3], field[4], grow, blur, rim;
 } kernel_cell_contraction;

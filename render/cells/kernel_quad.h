@@ -429,8 +429,8 @@ SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
 
 /* Returns the rays that may still meet a quad's patch twice once the discriminant is known: all of them but where it is
  * below zero by more than float32's roundings, which are less than a millionth of its terms. */
-static __attribute__((noinline)) vm kernel_hex_bends_yet(const vf x[8], const vf y[8], const signed char *loop, vm rays,
-                                                         vf across, vf other)
+static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const vf y[8], const signed char *loop,
+                                                            vm rays, vf across, vf other)
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
     const vf b0 = vf_diff_of_products(x[a], y[b], x[b], y[a]), b2 = vf_diff_of_products(x[d], y[c], x[c], y[d]);
@@ -441,14 +441,14 @@ static __attribute__((noinline)) vm kernel_hex_bends_yet(const vf x[8], const vf
 /* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more, among rays on the
  * same sides of its opposite sides. loop has the corners 0 to 3 around; side01 and side30 are the signs of its sides
  * from 0 to 1 and from 3 to 0. */
-SIMD_INLINE vm kernel_hex_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, vm side01, vm side30)
+SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, vm side01, vm side30)
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
     const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
     const vm bent = vf_le(vf_select(side01, -sum, sum), slack);
     const vm bends = vm_and(rays, vm_and(bent, vf_le(vf_select(side30, difference, -difference), slack)));
-    return __builtin_expect(vm_any(bends), 0) ? kernel_hex_bends_yet(x, y, loop, bends, across, other) : bends;
+    return __builtin_expect(vm_any(bends), 0) ? kernel_curved_bends_yet(x, y, loop, bends, across, other) : bends;
 }
 
 /* Finds the places where rays meet the patch; the rays of twice meet it in two places or none. Returns how many entries

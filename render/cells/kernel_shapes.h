@@ -71,13 +71,13 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 }
 
 /* A cell's lines on the rays: the sides of each, and the least of all. */
-typedef struct kernel_poly_sides {
+typedef struct kernel_curved_sides {
     vm negative[KERNEL_MAX_LINES];
     vf least;
-} kernel_poly_sides;
+} kernel_curved_sides;
 
 /* Tells on which rays the sides of a face's edges, taken around it, are negative. */
-SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_poly_sides *s, vm around[4])
+SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_curved_sides *s, vm around[4])
 {
     for (int i = 0; i < shape->faces[face].count; i++) {
         const signed char *edge = shape->faces[face].sides[i];
@@ -86,7 +86,7 @@ SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const ke
 }
 
 /* Returns the own coordinate on an axis, 0 or 1, of each ray's corner. */
-SIMD_INLINE vf kernel_hex_own(const kernel_shape *shape, int count, int axis, vi corner)
+SIMD_INLINE vf kernel_curved_own(const kernel_shape *shape, int count, int axis, vi corner)
 {
     int bits = 0;
     for (int i = 0; i < count; i++) bits |= (shape->corners[i][axis] > 0) << i;
@@ -95,7 +95,7 @@ SIMD_INLINE vf kernel_hex_own(const kernel_shape *shape, int count, int axis, vi
 
 /* Rays whose face of this number, the first or the last of two, is a quad. Faces are in the shape's order, so that of a
  * wedge, whose triangles come first, the last is a quad but where both are triangles; of a pyramid none is. */
-SIMD_INLINE vm kernel_hex_on_quad(int type, int n, vi face)
+SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
 {
     if (type == GRID_HEX) return vm_all_lanes();
     const vf number = vf_from_vi(face);

@@ -27,20 +27,20 @@
 #include "render.h"
 #include "simd.h"
 
-typedef struct kernel_poly_lanes {
+typedef struct kernel_curved_lanes {
     int count;         /* of a cell's vertices */
     vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */
     vm usual;          /* numbers are of usual sizes: others are for the cell alone */
-} kernel_poly_lanes;
+} kernel_curved_lanes;
 
 /* L of kernel_outline.h at the vertices; the slab is |L| <= thickness, which is infinite where there is none. */
-typedef struct kernel_poly_slab {
+typedef struct kernel_curved_slab {
     vf at[8], thickness;
-} kernel_poly_slab;
+} kernel_curved_slab;
 
 /* Does what kernel_is_unfolded() does, in lanes. */
-SIMD_INLINE vm kernel_poly_lanes_unfolded(const kernel_poly_lanes *l, const kernel_differential *d, int count,
-                                          vf inverse[3][3])
+SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const kernel_differential *d, int count,
+                                            vf inverse[3][3])
 {
     vf y[8][3], off[12];
     vm unfolded = vm_all_lanes();
@@ -68,7 +68,7 @@ SIMD_INLINE vm kernel_poly_lanes_unfolded(const kernel_poly_lanes *l, const kern
 }
 
 /* Does what kernel_linearize() does, in lanes. Lanes whose volume is near float32's least are not usual. */
-SIMD_INLINE void kernel_poly_lanes_slab_of(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
+SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);
     const int count = grid_type_vertices(type);
@@ -103,7 +103,7 @@ SIMD_INLINE void kernel_poly_lanes_slab_of(kernel_poly_lanes *l, int type, kerne
         }
         error = vf_max(vf_abs(out->at[i] - l->f[i]), error);
     }
-    error *= vf_select(kernel_poly_lanes_unfolded(l, differential, count, n), vf_set(1), vf_set(3.4f));
+    error *= vf_select(kernel_curved_lanes_unfolded(l, differential, count, n), vf_set(1), vf_set(3.4f));
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
         for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
@@ -113,18 +113,19 @@ SIMD_INLINE void kernel_poly_lanes_slab_of(kernel_poly_lanes *l, int type, kerne
     out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 
-static __attribute__((noinline)) void kernel_poly_lanes_slab(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
+static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
+                                                               kernel_curved_slab *out)
 {
     if (type == GRID_HEX)
-        kernel_poly_lanes_slab_of(l, GRID_HEX, out); /* loops of known length */
+        kernel_curved_lanes_slab_of(l, GRID_HEX, out); /* loops of known length */
     else
-        kernel_poly_lanes_slab_of(l, type, out);
+        kernel_curved_lanes_slab_of(l, type, out);
 }
 
 /* Finds the points of kernel_slab_outline(): vertices in the slab, and crossings of lines between two with its
  * sides. */
-static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l,
-                                                             const kernel_poly_slab *slab, kernel_ends_lanes *e)
+static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l,
+                                                               const kernel_curved_slab *slab, kernel_ends_lanes *e)
 {
     *e = kernel_no_ends();
     for (int i = 0; i < l->count; i++) {
@@ -144,7 +145,7 @@ static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder
 }
 
 /* Finds where the isovalue crosses the edges of tets. negative has the vertices whose values are below it, exactly. */
-SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l, const vm negative[4],
+SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l, const vm negative[4],
                                        kernel_ends_lanes *e)
 {
     *e = kernel_no_ends();
@@ -159,7 +160,8 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_poly
 }
 
 /* Fetches the vertices along the camera's axes. */
-SIMD_INLINE void kernel_poly_lanes_place(const kernel_finder *s, const kernel_cells *c, int count, kernel_poly_lanes *l)
+SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_cells *c, int count,
+                                           kernel_curved_lanes *l)
 {
     l->count = count;
     l->usual = vm_all_lanes();
@@ -172,8 +174,8 @@ SIMD_INLINE void kernel_poly_lanes_place(const kernel_finder *s, const kernel_ce
 }
 
 /* Sets the values less the level, and clears usual in lanes whose values are not. */
-SIMD_INLINE vf kernel_poly_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
-                                        const kernel_level *level, kernel_poly_lanes *l)
+SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
+                                          const kernel_level *level, kernel_curved_lanes *l)
 {
     vf size = vf_set(0);
     for (int i = 0; i < count; i++) {
@@ -217,17 +219,17 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
 static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const kernel_cells *c)
 {
     const unsigned all = (1u << c->count) - 1;
-    kernel_poly_lanes l;
+    kernel_curved_lanes l;
     kernel_taken v[4];
     for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
-    kernel_poly_lanes_place(s, c, 4, &l);
+    kernel_curved_lanes_place(s, c, 4, &l);
     const vm usual = l.usual;
     for (int value = 0; value < s->surface->layer->value_count; value++) {
         const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
         vm negative[4], any = vm_none(), every = vm_all_lanes();
         kernel_ends_lanes e;
         l.usual = usual;
-        kernel_poly_lanes_values(s, v, 4, &level, &l);
+        kernel_curved_lanes_values(s, v, 4, &level, &l);
         for (int i = 0; i < 4; i++) {
             negative[i] = kernel_taken_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, negative[i]);
@@ -247,18 +249,18 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
     const kernel_cells *c = &h->cells;
-    kernel_poly_lanes l;
-    kernel_poly_slab slab;
+    kernel_curved_lanes l;
+    kernel_curved_slab slab;
     kernel_ends_lanes e;
     kernel_taken v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
-    kernel_poly_lanes_place(s, c, vertices, &l);
-    const vf size = kernel_poly_lanes_values(s, v, vertices, &level, &l);
+    kernel_curved_lanes_place(s, c, vertices, &l);
+    const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
     /* The power of two that brings the largest near 1: its exponent, mirrored. */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
-    kernel_poly_lanes_slab(&l, c->type, &slab);
-    kernel_poly_lanes_ends(s, &l, &slab, &e);
+    kernel_curved_lanes_slab(&l, c->type, &slab);
+    kernel_curved_lanes_ends(s, &l, &slab, &e);
     kernel_add_crossed(s, c, h->value, l.usual, (1u << c->count) - 1, &e);
 }
 
@@ -311,7 +313,7 @@ SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c,
     }
 }
 
-static __attribute__((noinline)) void kernel_find_polys(kernel_finder *s, const kernel_cells *c)
+static __attribute__((noinline)) void kernel_find_curved(kernel_finder *s, const kernel_cells *c)
 {
     if (c->vertices == 8)
         kernel_find_straddling(s, c, 8);

@@ -41,7 +41,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
     else if (c->type == GRID_TET)
         kernel_find_tets(s, c);
     else
-        kernel_find_polys(s, c);
+        kernel_find_curved(s, c);
     c->count = 0;
 }
 

@@ -30,7 +30,7 @@ typedef struct kernel_tile_trace {
     const kernel_surface *surface;
     int layer;
     struct kernel_cell *cell;
-    struct kernel_poly *poly;
+    struct kernel_curved *curved;
     struct kernel_tile_finder *search;          /* of cells down the trees */
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
@@ -216,16 +216,16 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
 
 /* ---- lanes that are pixels of several cells ---- */
 
-enum { KERNEL_HEX_RAYS = 512, KERNEL_HEX_ROOM = KERNEL_HEX_RAYS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
+enum { KERNEL_LIST_PIXELS = 512, KERNEL_LIST_ROOM = KERNEL_LIST_PIXELS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
 
 /* A ray: its pixel in the tile, row by row, and its cell's lane. */
-typedef struct kernel_hex_rays {
+typedef struct kernel_pixel_list {
     int count;
-    uint8_t pixel[KERNEL_HEX_ROOM], lane[KERNEL_HEX_ROOM];
-} kernel_hex_rays;
+    uint8_t pixel[KERNEL_LIST_ROOM], lane[KERNEL_LIST_ROOM];
+} kernel_pixel_list;
 
 /* Lists a ray for each pixel of a box, row by row, for the cell in the lane. */
-SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lane)
+SIMD_INLINE void kernel_curved_rays_of(kernel_pixel_list *rays, unsigned box, int lane)
 {
     static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     typedef uint8_t kernel_row_bytes __attribute__((vector_size(KERNEL_TILE)));
@@ -242,7 +242,7 @@ SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lan
 }
 
 /* Pads the list so that whole vectors may be read. */
-SIMD_INLINE void kernel_hex_rays_close(kernel_hex_rays *rays)
+SIMD_INLINE void kernel_pixel_list_close(kernel_pixel_list *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
     memset(rays->lane + rays->count, 0, SIMD_WIDTH);

@@ -271,8 +271,8 @@ typedef struct kernel_frame {
 typedef struct kernel_thread {
     /* memory_bytes of the kernel table, and where the kernels' rooms have theirs in it: set by the table's begin(). */
     void *memory;
-    struct kernel_cell_cache *cells; /* that packets on their own have met, */
-    struct kernel_poly *polys;       /* and what surfaces know of the cells in the same places */
+    struct kernel_cell_cache *cells;    /* that packets on their own have met, */
+    struct kernel_curved *curved_cells; /* and what surfaces know of the cells in the same places */
     struct kernel_tile_trace *tile;
     struct kernel_tile_cells *tile_cells;
     struct kernel_tile_volume *tile_volume;

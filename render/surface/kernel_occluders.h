@@ -43,8 +43,8 @@ enum {
     KERNEL_SLAB_ROWS
 };
 
-/* A hex's record: 8 vertices with their values less the isovalue, corners and turned as in kernel_placed_polys. */
-enum { KERNEL_HEX_RECORD_QUADS = 32, KERNEL_HEX_RECORD_TURNED = 38, KERNEL_HEX_RECORD_WORDS = 40 };
+/* A hex's record: 8 vertices with their values less the isovalue, corners and turned as in kernel_placed_curved. */
+enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_TURNED = 38, KERNEL_CURVED_RECORD_WORDS = 40 };
 
 /* A cell with one of its isovalues. */
 typedef struct kernel_occluder {

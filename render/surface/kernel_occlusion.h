@@ -80,12 +80,12 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
 }
 
 /* Takes the roots of the interval in turn, until one counts on each ray. */
-SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_poly *poly,
+SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
                                         const kernel_interval *i, vm rays)
 {
     kernel_search_cell cell;
     kernel_search s;
-    if (!kernel_search_in(&s, &cell, p, &poly->map, &poly->bounds, i, rays)) return;
+    if (!kernel_search_in(&s, &cell, p, &curved->map, &curved->bounds, i, rays)) return;
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
@@ -94,25 +94,25 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
     } while (kernel_search_on(&s));
 }
 
-static __attribute__((noinline)) void kernel_occlusion_poly(kernel_packet *p, const kernel_occlusion *o,
-                                                            const kernel_cell *c, vm rays)
+static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, const kernel_occlusion *o,
+                                                              const kernel_cell *c, vm rays)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-    kernel_poly poly;
+    kernel_curved curved;
     bool is_set_up = false;
-    const int count = kernel_poly_intervals(p, c, rays, false, list);
+    const int count = kernel_curved_intervals(p, c, rays, false, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(kernel_is_near(p, i), room);
         if (!vm_any(wanted)) continue;
         if (!is_set_up) {
-            kernel_map_setup(&poly.map, c);
-            kernel_bounds_setup(&poly.bounds, &poly.map, c->type, &beam);
+            kernel_map_setup(&curved.map, c);
+            kernel_bounds_setup(&curved.bounds, &curved.map, c->type, &beam);
             is_set_up = true;
         }
-        kernel_occlusion_roots(p, o, &poly, i, wanted);
+        kernel_occlusion_roots(p, o, &curved, i, wanted);
     }
 }
 
@@ -187,7 +187,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     if (c->type == GRID_TET)
         kernel_occlusion_tet(p, o, c, p->active);
     else
-        kernel_occlusion_poly(p, o, c, p->active);
+        kernel_occlusion_curved(p, o, c, p->active);
 }
 
 /* Closes the bundle's open rays that the cell blocks. */

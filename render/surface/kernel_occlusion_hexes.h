@@ -1,27 +1,27 @@
 /* Rays and hexes in pairs, one a lane: does the hex's surface block the ray? Where the ray crosses two faces, the
  * values there tell in most cases; what is left is in doubt, and asked of the cell as primary rays ask it. A face is
- * crossed by the operations of kernel_hex_rays.h on places that are the ray's and the vertex's alone, so that of two
+ * crossed by the operations of kernel_curved_rays.h on places that are the ray's and the vertex's alone, so that of two
  * hexes that share the face, on whichever ranks, one has what the other leaves. */
 #ifndef RENDER_KERNEL_OCCLUSION_HEXES_H
 #define RENDER_KERNEL_OCCLUSION_HEXES_H
 
 #include <string.h>
 
-#include "kernel_bounds_polys.h"
-#include "kernel_hex_rays.h"
+#include "kernel_bounds_curved.h"
+#include "kernel_curved_rays.h"
 #include "kernel_map.h"
 #include "kernel_occluders.h"
-#include "kernel_placed_hexes.h"
+#include "kernel_placed_curved.h"
 #include "kernel_shapes.h"
 #include "kernel_wide.h"
 #include "simd.h"
 
-typedef struct kernel_hex_pairs {
+typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-    kernel_placed_polys placed;
-} kernel_hex_pairs;
+    kernel_placed_curved placed;
+} kernel_curved_pairs;
 
 SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occluder)
 {
@@ -42,7 +42,7 @@ SIMD_INLINE void kernel_pair_ray(const kernel_straight *ray, int32_t record, int
     kernel_plumb_axes(ray, &p);
     const int axes[3] = {p.kx, p.ky, p.kz};
     for (int a = 0; a < 3; a++) {
-        out->index[a][lane] = record * KERNEL_HEX_RECORD_WORDS + axes[a];
+        out->index[a][lane] = record * KERNEL_CURVED_RECORD_WORDS + axes[a];
         out->origin[a][lane] = ray->origin[axes[a]];
     }
     out->shear[0][lane] = p.shear_x;
@@ -59,10 +59,10 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 }
 
 /* Vertices as their rays see them: across it x and y, with the ray at the origin, and along it the distance. */
-SIMD_INLINE void kernel_pairs_place(kernel_hex_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays,
+SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays,
                                     vi record)
 {
-    kernel_placed_polys *h = &pairs->placed;
+    kernel_placed_curved *h = &pairs->placed;
     for (int i = 0; i < 8; i++) {
         vf at[3];
         for (int a = 0; a < 3; a++)
@@ -72,14 +72,14 @@ SIMD_INLINE void kernel_pairs_place(kernel_hex_pairs *pairs, const float *hexes,
         vf_store(h->at[2][i], at[2] * vf_load(rays->stretch));
         vf_store(h->at[3][i], vf_gather(hexes, record + (4 * i + 3)));
     }
-    for (int face = 0; face < KERNEL_HEX_FACES; face++)
+    for (int face = 0; face < KERNEL_CURVED_FACES; face++)
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH),
-                 vf_gather(hexes, record + (KERNEL_HEX_RECORD_QUADS + face)));
-    vf_store((float *)(void *)h->turned, vf_gather(hexes, record + KERNEL_HEX_RECORD_TURNED));
+                 vf_gather(hexes, record + (KERNEL_CURVED_RECORD_QUADS + face)));
+    vf_store((float *)(void *)h->turned, vf_gather(hexes, record + KERNEL_CURVED_RECORD_TURNED));
 }
 
 /* The edge function of the ray itself, its sign exact: products of float32 are, in double. */
-SIMD_INLINE void kernel_pairs_line(kernel_placed_polys *h, int n, const vf from[2], const vf to[2])
+SIMD_INLINE void kernel_pairs_line(kernel_placed_curved *h, int n, const vf from[2], const vf to[2])
 {
     vf c = vf_set(0);
     for (int half = 0; half < 2; half++)
@@ -91,15 +91,15 @@ SIMD_INLINE void kernel_pairs_line(kernel_placed_polys *h, int n, const vf from[
     vf_store(h->cv[n], vf_set(0));
 }
 
-SIMD_INLINE void kernel_pairs_lines(kernel_placed_polys *h)
+SIMD_INLINE void kernel_pairs_lines(kernel_placed_curved *h)
 {
     const vi turned = kernel_load_ints(h->turned);
     vf at[8][2];
     for (int i = 0; i < 8; i++)
         for (int a = 0; a < 2; a++) at[i][a] = vf_load(h->at[a][i]);
-    for (int n = 0; n < KERNEL_HEX_EDGES; n++)
+    for (int n = 0; n < KERNEL_CURVED_EDGES; n++)
         kernel_pairs_line(h, n, at[kernel_shapes[0].edges[n][0]], at[kernel_shapes[0].edges[n][1]]);
-    for (int face = 0; face < KERNEL_HEX_FACES; face++) {
+    for (int face = 0; face < KERNEL_CURVED_FACES; face++) {
         const signed char *loop = kernel_shapes[0].faces[face].vertices;
         const vm odd = vm_sign(turned << (31 - face));
         vf from[2], to[2];
@@ -107,7 +107,7 @@ SIMD_INLINE void kernel_pairs_lines(kernel_placed_polys *h)
             from[a] = vf_select(odd, at[loop[1]][a], at[loop[0]][a]);
             to[a] = vf_select(odd, at[loop[3]][a], at[loop[2]][a]);
         }
-        kernel_pairs_line(h, KERNEL_HEX_EDGES + face, from, to);
+        kernel_pairs_line(h, KERNEL_CURVED_EDGES + face, from, to);
     }
     vf_store(h->doubt, vf_set(0));
 }
@@ -118,13 +118,13 @@ typedef struct kernel_pair_verdict {
 } kernel_pair_verdict;
 
 /* L at the distance. */
-SIMD_INLINE vf kernel_pairs_level(const kernel_hex_pairs *pairs, vf t)
+SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
 {
     return vf_load(pairs->level) + vf_load(pairs->rise) * t;
 }
 
 /* L is farther from 0 than where the surface is, on one side all the way. */
-SIMD_INLINE vm kernel_pairs_clear(const kernel_hex_pairs *pairs, vf from, vf to)
+SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf to)
 {
     const vf first = kernel_pairs_level(pairs, from), last = kernel_pairs_level(pairs, to);
     const vf thick = vf_load(pairs->thickness);
@@ -132,32 +132,33 @@ SIMD_INLINE vm kernel_pairs_clear(const kernel_hex_pairs *pairs, vf from, vf to)
 }
 
 /* The field is monotone along the ray, and at neither end so near 0 that what it jumps by at faces may matter. */
-static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_hex_pairs *pairs, const kernel_hex_place ends[2])
+static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pairs *pairs,
+                                                          const kernel_curved_place ends[2])
 {
     static const kernel_beam beam = {.spread = 0};
-    kernel_polys_bounds bounds;
-    kernel_polys_bound(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
+    kernel_curved_batch_bounds bounds;
+    kernel_curved_batch_bound(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
     const vf jump = vf_load(bounds.jump);
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))));
 }
 
-SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_hex_pairs *pairs, vm active, vf far)
+SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pairs, vm active, vf far)
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach);
-    kernel_hex_packet p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
-    kernel_hex_crossed crossed;
-    kernel_hex_place face[2], ends[2];
+    kernel_curved_packet p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
+    kernel_curved_crossed crossed;
+    kernel_curved_place face[2], ends[2];
     int32_t lanes[SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
-    kernel_poly_faces(&pairs->placed, &p, GRID_HEX, &crossed);
+    kernel_curved_faces(&pairs->placed, &p, GRID_HEX, &crossed);
     kernel_pair_verdict out = {vm_none(), crossed.alone};
     if (!vm_any(crossed.two)) return out;
     p.active = crossed.two;
-    kernel_poly_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, face);
+    kernel_curved_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, face);
     const vm swap = vf_lt(face[1].t, face[0].t);
-    kernel_hex_place_select(swap, &face[1], &face[0], &ends[0]);
-    kernel_hex_place_select(swap, &face[0], &face[1], &ends[1]);
+    kernel_curved_place_select(swap, &face[1], &face[0], &ends[0]);
+    kernel_curved_place_select(swap, &face[0], &face[1], &ends[1]);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
@@ -174,7 +175,7 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_hex_pairs *pairs
 }
 
 static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_straights *s,
-                                                       kernel_hex_pairs *pairs)
+                                                       kernel_curved_pairs *pairs)
 {
     kernel_plumb_lanes rays;
     int32_t record[SIMD_WIDTH];
@@ -184,7 +185,7 @@ static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o
         const int from = i < pairs->count ? i : 0;
         record[i] = o->cells[pairs->occluder[from]].record;
         kernel_pair_ray(&s->rays[pairs->ray[from]], record[i], i, &rays);
-        record[i] *= KERNEL_HEX_RECORD_WORDS;
+        record[i] *= KERNEL_CURVED_RECORD_WORDS;
     }
     kernel_pairs_place(pairs, o->hexes, &rays, kernel_load_ints(record));
     kernel_pairs_lines(&pairs->placed);

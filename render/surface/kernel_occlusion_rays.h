@@ -83,7 +83,7 @@ typedef struct kernel_leaf_lanes {
 } kernel_leaf_lanes;
 
 /* Queues the ray for the cell in lane i: with other hexes, or as a doubt. Returns false where memory ran out. */
-static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs,
+static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_curved_pairs *pairs,
                               const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
     if (o->cells[occluder].record < 0) return kernel_doubts_add(s, lanes->ray, occluder);
@@ -97,7 +97,7 @@ static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, ke
     return pairs->count < SIMD_WIDTH || kernel_pairs_run(o, s, pairs);
 }
 
-static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs, int ray)
+static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, kernel_curved_pairs *pairs, int ray)
 {
     const kernel_occluder_tree *tree = &o->slabs;
     kernel_path path;
@@ -128,7 +128,7 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, k
 /* Closes the rays that are blocked for certain, and notes the cells in which the others must be traced. */
 static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o, kernel_straights *s)
 {
-    kernel_hex_pairs pairs;
+    kernel_curved_pairs pairs;
     bool is_well = true;
     pairs.count = 0;
     for (int i = 0; i < s->count; i++)

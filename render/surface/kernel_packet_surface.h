@@ -21,7 +21,7 @@
 
 /* Makes the cell ready for the isovalue. */
 SIMD_INLINE void kernel_surface_prepare(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
-                                        int part, int value, kernel_cell *c, kernel_poly *poly)
+                                        int part, int value, kernel_cell *c, kernel_curved *curved)
 {
     const bool is_fresh = !c->is_placed;
     if (is_fresh) {
@@ -30,7 +30,7 @@ SIMD_INLINE void kernel_surface_prepare(const kernel_frame *f, const kernel_tile
     }
     if (is_fresh || s->layer->value_count > 1) {
         kernel_cell_relative(c, s->layer->values[value]);
-        poly->is_set_up = false;
+        curved->is_set_up = false;
     }
 }
 
@@ -45,22 +45,22 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
             kernel_polyhedron_surfaces(p, state, part, cells[n], rays);
             continue;
         }
-        kernel_poly *poly = kernel_poly_find(p, c);
+        kernel_curved *curved = kernel_curved_find(p, c);
         if (!c->is_finite) continue;
         kernel_cell own_cell;
-        kernel_poly own_poly;
+        kernel_curved own_curved;
         if (layer->normal == RENDER_DIFFERENCES) {
             /* Looking for samples fills the cache with other cells while this one is in use. */
             own_cell = *c;
-            own_poly = *poly;
+            own_curved = *curved;
             c = &own_cell;
-            poly = &own_poly;
+            curved = &own_curved;
         }
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;
-            kernel_surface_prepare(p->frame, p->tile, state->surface, part, value, c, poly);
+            kernel_surface_prepare(p->frame, p->tile, state->surface, part, value, c, curved);
             kernel_cell_lines(c, p->frame, p->tile);
-            kernel_cell_surface(p, state, c, poly, value, rays);
+            kernel_cell_surface(p, state, c, curved, value, rays);
         }
     }
 }

@@ -15,7 +15,7 @@
 #include "grid.h"
 #include "kernel_accept.h"
 #include "kernel_bounds.h"
-#include "kernel_bounds_polys.h"
+#include "kernel_bounds_curved.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
@@ -151,14 +151,14 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     kernel_accept(p, state, c, value, hit, &at);
 }
 
-SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_cell *c)
+SIMD_INLINE kernel_curved *kernel_curved_find(const kernel_packet *p, const kernel_cell *c)
 {
-    return &p->thread->polys[c - p->thread->cells->cells];
+    return &p->thread->curved_cells[c - p->thread->cells->cells];
 }
 
 /* Takes the crossings that are visible, and returns them. */
-SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                  const kernel_poly *poly, vm found, const kernel_point *at)
+SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                    const kernel_curved *curved, vm found, const kernel_point *at)
 {
     const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
@@ -166,70 +166,71 @@ SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state,
     if (state->surface->layer->normal == RENDER_VERTEX) {
         memcpy(places.normal, at->r, sizeof places.normal);
     } else {
-        kernel_map_normal(&poly->map, at->r, places.normal);
+        kernel_map_normal(&curved->map, at->r, places.normal);
         kernel_unshear(p, places.normal);
     }
-    if (state->surface->layer->colour_map) places.w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
-    kernel_accept(p, state, c, poly->value, hit, &places);
+    if (state->surface->layer->colour_map) places.w = kernel_map_value(&curved->map, &curved->map.colour, at->r);
+    kernel_accept(p, state, c, curved->value, hit, &places);
     return hit;
 }
 
 /* Takes the crossings of the interval in turn. A ray ends at an opaque surface's first visible one. */
-SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                    const kernel_poly *poly, const kernel_interval *i, vm rays)
+SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                      const kernel_curved *curved, const kernel_interval *i, vm rays)
 {
     kernel_search_cell cell;
     kernel_search s;
-    if (!kernel_search_in(&s, &cell, p, &poly->map, &poly->bounds, i, rays)) return;
+    if (!kernel_search_in(&s, &cell, p, &curved->map, &curved->bounds, i, rays)) return;
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
-        const vm hit = kernel_poly_accept(p, state, c, poly, s.found, &at);
+        const vm hit = kernel_curved_accept(p, state, c, curved, s.found, &at);
         if (state->is_opaque) kernel_search_close(&s, hit);
     } while (kernel_search_on(&s));
 }
 
 /* The cell's contraction, as lanes have it. */
-static __attribute__((noinline)) void kernel_poly_contraction(const kernel_packet *p, kernel_poly *poly,
-                                                              const kernel_cell *c)
+static __attribute__((noinline)) void kernel_curved_contraction(const kernel_packet *p, kernel_curved *curved,
+                                                                const kernel_cell *c)
 {
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
     float at[4][8][SIMD_WIDTH];
-    kernel_polys_bounds lanes;
+    kernel_curved_batch_bounds lanes;
     for (int n = 0; n < 4; n++)
         for (int i = 0; i < 8; i++)
             for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
-    kernel_polys_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, &beam, &lanes);
-    kernel_polys_bounds_lane(&lanes, c->type, &poly->contraction);
-    poly->has_contraction = true;
+    kernel_curved_batch_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, &beam, &lanes);
+    kernel_curved_batch_bounds_lane(&lanes, c->type, &curved->contraction);
+    curved->has_contraction = true;
 }
 
 /* Takes the crossings that a contraction knows (kernel_contraction.h); returns the rays that are decided by it. */
-static __attribute__((noinline)) vm kernel_poly_known(kernel_packet *p, kernel_surface_state *state,
-                                                      const kernel_cell *c, kernel_poly *poly, vm rays)
+static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel_surface_state *state,
+                                                        const kernel_cell *c, kernel_curved *curved, vm rays)
 {
     const kernel_rays own = kernel_packet_rays(p);
     kernel_contracted known;
-    kernel_contract_cell(&poly->contraction, poly->map.origin, c->type, &own, rays, &known);
+    kernel_contract_cell(&curved->contraction, curved->map.origin, c->type, &own, rays, &known);
     if (vm_any(known.one)) {
         kernel_map_lanes map;
         kernel_point at = {.t = known.t};
         memcpy(at.r, known.r, sizeof at.r);
-        kernel_map_spread(&poly->map, &map);
+        kernel_map_spread(&curved->map, &map);
         kernel_polish_near(&own, &map, known.one, KERNEL_CONTRACTION_END, &at);
-        kernel_poly_accept(p, state, c, poly, known.one, &at);
+        kernel_curved_accept(p, state, c, curved, known.one, &at);
     }
     return vm_or(known.one, known.none);
 }
 
-static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state,
-                                                          const kernel_cell *c, kernel_poly *poly, int value, vm rays)
+static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, kernel_surface_state *state,
+                                                            const kernel_cell *c, kernel_curved *curved, int value,
+                                                            vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const int count = kernel_poly_intervals(p, c, rays, false, list);
+    const int count = kernel_curved_intervals(p, c, rays, false, list);
     vm asked[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
@@ -240,34 +241,34 @@ static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kern
         any = vm_or(any, asked[n]);
     }
     if (!vm_any(any)) return;
-    kernel_poly_setup(p->frame, p->tile, poly, layer, c, value);
+    kernel_curved_setup(p->frame, p->tile, curved, layer, c, value);
     if (layer->root == RENDER_ROBUST && !state->is_contracted) {
-        if (!poly->has_contraction) kernel_poly_contraction(p, poly, c); /* from here: less stack */
-        known = kernel_poly_known(p, state, c, poly, any);
+        if (!curved->has_contraction) kernel_curved_contraction(p, curved, c); /* from here: less stack */
+        known = kernel_curved_known(p, state, c, curved, any);
     }
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
         if (!vm_any(wanted)) continue;
         if (layer->root == RENDER_ROBUST) {
-            kernel_poly_robust(p, state, c, poly, i, wanted);
+            kernel_curved_robust(p, state, c, curved, i, wanted);
             continue;
         }
         kernel_point at;
-        kernel_neubauer(p, &poly->map, i, wanted, layer->root_steps, &at);
-        kernel_poly_accept(p, state, c, poly, wanted, &at);
+        kernel_neubauer(p, &curved->map, i, wanted, layer->root_steps, &at);
+        kernel_curved_accept(p, state, c, curved, wanted, &at);
     }
 }
 
 /* Traces an isovalue's surface in a cell with finite values that is no polyhedron. The cell is in the
  * frame's coordinates. */
 SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                     kernel_poly *poly, int value, vm rays)
+                                     kernel_curved *curved, int value, vm rays)
 {
     if (c->type == GRID_TET)
         kernel_tet_surface(p, state, c, value, rays);
     else
-        kernel_poly_surface(p, state, c, poly, value, rays);
+        kernel_curved_surface(p, state, c, curved, value, rays);
 }
 
 /* Isosurfaces in polyhedra: the places on the profile where the sign changes. They are exact: a linear piece has one
@@ -665,7 +666,7 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
                                       .is_opaque = t->layer < t->frame->opaque_count};
         p->is_nearer = false;
         if (cell)
-            kernel_cell_surface(p, &state, cell, t->poly, value, p->active);
+            kernel_cell_surface(p, &state, cell, t->curved, value, p->active);
         else
             kernel_polyhedron_surfaces(p, &state, part, index, p->active);
         is_nearer = is_nearer || p->is_nearer;

@@ -31,7 +31,7 @@ typedef struct slab {
 } slab;
 
 typedef struct hex_record {
-    float words[KERNEL_HEX_RECORD_WORDS];
+    float words[KERNEL_CURVED_RECORD_WORDS];
 } hex_record;
 
 /* A list that grows. */
@@ -243,7 +243,7 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Faces' corners and diagonals as kernel_placed_polys has them. */
+/* Faces' corners and diagonals as kernel_placed_curved has them. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
     int32_t turned = 0;
@@ -253,10 +253,10 @@ static void fill_faces(const kernel_cell *c, hex_record *out)
         kernel_quad_corners(c, loop, corner);
         const int32_t word = corner[0] | corner[1] << 4 | corner[2] << 8 | corner[3] << 12;
         if (corner[0] == loop[1] || corner[0] == loop[3]) turned |= 1 << face;
-        memcpy(&out->words[KERNEL_HEX_RECORD_QUADS + face], &word, sizeof word);
+        memcpy(&out->words[KERNEL_CURVED_RECORD_QUADS + face], &word, sizeof word);
     }
-    memcpy(&out->words[KERNEL_HEX_RECORD_TURNED], &turned, sizeof turned);
-    out->words[KERNEL_HEX_RECORD_WORDS - 1] = 0;
+    memcpy(&out->words[KERNEL_CURVED_RECORD_TURNED], &turned, sizeof turned);
+    out->words[KERNEL_CURVED_RECORD_WORDS - 1] = 0;
 }
 
 static bool collapses(const kernel_cell *c)

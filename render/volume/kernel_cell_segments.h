@@ -611,12 +611,12 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
 }
 
 /* Cells with quads. map NULL: of one value. */
-static __attribute__((noinline)) void kernel_poly_segments(kernel_packet *p, kernel_segment_state *state,
-                                                                const kernel_cell *c, const kernel_map *map)
+static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, kernel_segment_state *state,
+                                                             const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_span span = {.map = map, .cell = c};
-    const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
+    const int intervals = kernel_curved_intervals(p, c, p->active, false, list);
     if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
     for (int k = 0; k < intervals; k++) {
         span.interval = &list[k];

@@ -1,6 +1,7 @@
 /* Where rays cross the faces of hexes, wedges and pyramids, a ray and its cell a lane: the faces by the signs of
- * projected edges, the places on quads by kernel_quad.h and on triangles by weights, both as kernel_poly_intervals()
- * has them for a packet in one cell, and so with the same bits. A function's type is a constant where it is called from. */
+ * projected edges, the places on quads by kernel_quad.h and on triangles by weights, both as kernel_curved_intervals()
+ * has them for a packet in one cell, and so with the same bits. A function's type is a constant where it is called
+ * from. */
 #ifndef RENDER_KERNEL_LOCAL_CROSSINGS_H
 #define RENDER_KERNEL_LOCAL_CROSSINGS_H
 
@@ -10,7 +11,7 @@
 #include "grid.h"
 #include "kernel_crossings.h"
 #include "kernel_local.h"
-#include "kernel_placed_hexes.h"
+#include "kernel_placed_curved.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
@@ -21,7 +22,7 @@
  * four bits a corner. */
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
-    float words[KERNEL_HEX_FACES][SIMD_WIDTH];
+    float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
 } kernel_local_faces;
 
 /* ---- cells ---- */
@@ -60,7 +61,7 @@ SIMD_INLINE void kernel_local_faces_of(vf (*const lists)[8], int type, kernel_lo
         kernel_lanes_order unused;
         vm odd, falls[3];
         const vi word = shape->faces[face].count == 3 ? kernel_triangle_word(loop, lists[4], &unused, falls)
-                                                      : kernel_hex_quad_word(loop, lists[4], &odd);
+                                                      : kernel_curved_quad_word(loop, lists[4], &odd);
         vf_store(out->words[face], vf_from_bits(word));
     }
 }
@@ -93,11 +94,11 @@ SIMD_INLINE vm kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *l
 }
 
 /* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. */
-SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vm rays, int type, kernel_hex_crossed *out)
+SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vm rays, int type, kernel_curved_crossed *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_hex_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
-    kernel_poly_sides sides = {.least = vf_set(INFINITY)};
+    kernel_curved_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
+    kernel_curved_sides sides = {.least = vf_set(INFINITY)};
     vm alone = vm_none();
     for (int n = 0; n < shape->edge_count; n++)
         sides.negative[n] = kernel_local_edge(s, shape->edges[n][0], shape->edges[n][1], &sides.least);
@@ -110,12 +111,12 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vm rays, in
         } else {
             const vm outside = vm_and(rays, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
             once = kernel_halves_once(around, kernel_local_edge(s, loop[0], loop[2], &sides.least));
-            alone = vm_or(alone, kernel_hex_bends(s->at[0], s->at[1], loop, outside, around[0], around[3]));
+            alone = vm_or(alone, kernel_curved_bends(s->at[0], s->at[1], loop, outside, around[0], around[3]));
         }
-        kernel_hex_count_face(&count, face, vm_and(rays, once));
+        kernel_curved_count_face(&count, face, vm_and(rays, once));
     }
     alone = vm_or(alone, vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least)));
-    kernel_hex_count_end(&count, rays, alone, out);
+    kernel_curved_count_end(&count, rays, alone, out);
 }
 
 /* ---- corners ---- */
@@ -150,7 +151,7 @@ SIMD_INLINE void kernel_local_corner_of(const kernel_local_seen *s, int type, vi
         return;
     }
     vf own[3];
-    for (int a = 0; a < 3; a++) own[a] = kernel_hex_own(shape, count, a, vertex & 7);
+    for (int a = 0; a < 3; a++) own[a] = kernel_curved_own(shape, count, a, vertex & 7);
     for (int a = 0; a < 2; a++) out->r[a] = type == GRID_WEDGE ? own[a] - 1.0f / 3 : own[a] - 0.5f * own[2];
     out->r[2] = own[2] - (type == GRID_WEDGE ? 0.5f : 0);
 }
@@ -235,7 +236,7 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_seen *s, int type, 
 
 /* Where rays that cross two faces come in and go out. */
 SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_seen *s, vi lane,
-                                    const kernel_hex_crossed *crossed, int type, kernel_local_crossing out[2])
+                                    const kernel_curved_crossed *crossed, int type, kernel_local_crossing out[2])
 {
     const vi face[2] = {crossed->first, crossed->last};
     vi words[2];
@@ -243,7 +244,7 @@ SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_lo
     kernel_local_crossing ends[2];
     for (int n = 0; n < 2; n++) {
         words[n] = kernel_local_word(f, type, lane, face[n]);
-        on_quad[n] = vm_and(crossed->two, kernel_hex_on_quad(type, n, face[n]));
+        on_quad[n] = vm_and(crossed->two, kernel_curved_on_quad(type, n, face[n]));
     }
     if (type != GRID_HEX) memset(ends, 0, sizeof ends);
     if (type == GRID_HEX || vm_any(vm_or(on_quad[0], on_quad[1])))

@@ -12,7 +12,7 @@
 #include "kernel_cell.h"
 #include "kernel_interest.h"
 #include "kernel_local.h"
-#include "kernel_placed_hexes.h"
+#include "kernel_placed_curved.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"

@@ -19,7 +19,7 @@
 
 #include "grid.h"
 #include "kernel_crossings.h"
-#include "kernel_hex_rays.h"
+#include "kernel_curved_rays.h"
 #include "kernel_local.h"
 #include "kernel_local_queue.h"
 #include "kernel_map.h"
@@ -50,7 +50,7 @@ typedef struct kernel_local_batch {
     kernel_tile_ray_samples *packets; /* the tile's */
     kernel_local_lanes lanes;
     int first, count; /* of the window's samples */
-    kernel_hex_rays rays;
+    kernel_pixel_list rays;
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
     /* By packet and lane: the first sample of all and the step side by side, and where the window ends the ray. */
@@ -104,7 +104,7 @@ static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trac
     kernel_local_lanes *l = &b->lanes;
     if (!kernel_tile_ready_alone(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
-    const int intervals = kernel_poly_intervals(p, &cells->cell, ray, false, list);
+    const int intervals = kernel_curved_intervals(p, &cells->cell, ray, false, list);
     for (int k = 0; k < intervals; k++)
         kernel_fill_some(p, &state, cells->cell.is_constant ? NULL : &cells->map, &list[k], number, number + 1);
 }
@@ -215,7 +215,7 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
 
 static __attribute__((noinline)) void kernel_local_cast(kernel_tile_trace *t, kernel_local_batch *b, int type)
 {
-    kernel_hex_rays_close(&b->rays);
+    kernel_pixel_list_close(&b->rays);
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_cast_lanes(t, b, type, n);
     b->rays.count = 0;
 }
@@ -251,8 +251,8 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
-        kernel_hex_rays_of(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_cast(t, b, types[queue]);
+        kernel_curved_rays_of(&b->rays, box, n);
+        if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_cast(t, b, types[queue]);
     }
     kernel_local_cast(t, b, types[queue]);
     if (b->sample_count) kernel_local_fill(t, b, types[queue]);
@@ -351,7 +351,7 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
 static __attribute__((noinline)) void kernel_tet_samples_cast(kernel_tile_trace *t, kernel_local_batch *b)
 {
     const kernel_placed *tets = &t->thread->tile_cells->placed;
-    kernel_hex_rays_close(&b->rays);
+    kernel_pixel_list_close(&b->rays);
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
         const int left = b->rays.count - n;
         kernel_tet_rays r;
@@ -386,7 +386,7 @@ static unsigned kernel_tet_samples(kernel_tile_trace *t, kernel_local_batch *b, 
         if (columns * rows > KERNEL_TET_PIXELS)
             others |= 1u << n;
         else
-            kernel_hex_rays_of(&b->rays, box, n);
+            kernel_curved_rays_of(&b->rays, box, n);
     }
     kernel_tet_samples_cast(t, b);
     return others;

@@ -92,7 +92,7 @@ typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *st
  * KERNEL_LOCAL_CELL on, and the faces that are crossed from KERNEL_LOCAL_FACES on, three bits each. */
 typedef struct kernel_local_list {
     int count;
-    float words[KERNEL_HEX_ROOM];
+    float words[KERNEL_LIST_ROOM];
 } kernel_local_list;
 
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
@@ -106,7 +106,7 @@ typedef struct kernel_local_stretches {
     kernel_local_faces faces;
     kernel_local_bounds bounds;
     kernel_local_nonlinear nonlinear;
-    kernel_hex_rays rays;
+    kernel_pixel_list rays;
     kernel_local_list met, crossed[2]; /* crossed: by whether the first of the two faces is a triangle */
     /* By packet and lane: where the window begins and ends, side by side; the same of the ray; unit distances per t. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS], per_t[KERNEL_LOCAL_PIXELS];
@@ -384,12 +384,12 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
 {
     kernel_local_rays rays;
     kernel_local_seen seen;
-    kernel_hex_crossed crossed;
+    kernel_curved_crossed crossed;
     vi words;
     const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
     kernel_local_see(&b->faces, &rays, type, &seen);
     kernel_local_find_faces(&seen, all, type, &crossed);
-    const vm on_quad = kernel_hex_on_quad(type, 0, crossed.first);
+    const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
     if (type != GRID_HEX) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
@@ -406,8 +406,8 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     vi words;
     vf end, near, far;
     p.active = kernel_local_list_take(list, &t->tile, n, &words, &p.rays);
-    const kernel_hex_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
-                                        words >> (KERNEL_LOCAL_FACES + 3) & 7};
+    const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
+                                           words >> (KERNEL_LOCAL_FACES + 3) & 7};
     kernel_local_see(&b->faces, &p.rays, type, &seen);
     kernel_local_cross(&b->faces, &seen, p.rays.lane, &crossed, type, p.ends);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
@@ -468,7 +468,7 @@ static __attribute__((noinline)) void kernel_local_segments_pyramids(kernel_tile
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                  const kernel_local_queue *q, int type)
 {
-    kernel_hex_rays_close(&b->rays);
+    kernel_pixel_list_close(&b->rays);
     b->met.count = 0;
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
     if (type == GRID_HEX)
@@ -551,8 +551,8 @@ static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trac
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
-        kernel_hex_rays_of(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_segments_cast(t, b, q, type);
+        kernel_curved_rays_of(&b->rays, box, n);
+        if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_segments_cast(t, b, q, type);
     }
     kernel_local_segments_cast(t, b, q, type);
     for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {

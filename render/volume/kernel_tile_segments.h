@@ -65,7 +65,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
             else if (c->type == GRID_TET)
                 kernel_tet_segments(p, state, c, &s->precise, p->active);
             else
-                kernel_poly_segments(p, state, c, map);
+                kernel_curved_segments(p, state, c, map);
             is_shortened = is_shortened || state->list->is_shortened;
             state->list->is_shortened = false;
         }
@@ -143,7 +143,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         if (blocks >> b & 1) far = kernel_block_window_end(t, s->packets, b);
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
     }
-    kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments, kernel_poly_segments);
+    kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments,
+                                kernel_curved_segments);
     if (t->frame->volume_candidates)
         kernel_visit_open(t, &kernel_segments_visitor, blocks);
     else

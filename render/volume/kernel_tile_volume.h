@@ -52,11 +52,11 @@ static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, 
     if (vm_any(i.mask)) kernel_fill(p, state, NULL, &i);
 }
 
-static __attribute__((noinline)) void kernel_tile_poly_samples(kernel_packet *p, kernel_volume_state *state,
-                                                               const kernel_cell *c, const kernel_map *map)
+static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *p, kernel_volume_state *state,
+                                                                 const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
+    const int intervals = kernel_curved_intervals(p, c, p->active, false, list);
     for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
 }
 
@@ -75,7 +75,7 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
             else if (c->type == GRID_TET)
                 kernel_tile_tet_samples(p, &state, c);
             else
-                kernel_tile_poly_samples(p, &state, c, map);
+                kernel_tile_curved_samples(p, &state, c, map);
         }
     }
 }

@@ -63,7 +63,7 @@ static void kernel_volume_leaf(kernel_packet *p, void *opaque_state, int part, c
         }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
         kernel_map map;
-        const int intervals = kernel_poly_intervals(p, c, rays, false, list);
+        const int intervals = kernel_curved_intervals(p, c, rays, false, list);
         if (intervals && !c->is_constant) kernel_map_setup(&map, c);
         for (int k = 0; k < intervals; k++) kernel_fill(p, state, c->is_constant ? NULL : &map, &list[k]);
     }
@@ -146,7 +146,7 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
         kernel_span span = {.cell = c};
         kernel_map map;
-        const int intervals = kernel_poly_intervals(p, c, rays, false, list);
+        const int intervals = kernel_curved_intervals(p, c, rays, false, list);
         if (intervals && !c->is_constant) {
             kernel_map_setup(&map, c);
             span.map = &map;

@@ -1,14 +1,14 @@
-/* Rays of several hexes, wedges or pyramids side by side (kernel_polys.h, kernel_occlusion_hexes.h): which two faces of
- * its cell a ray crosses, and where. A lane takes its cell's numbers out of the batch's vectors. */
-#ifndef RENDER_KERNEL_HEX_RAYS_H
-#define RENDER_KERNEL_HEX_RAYS_H
+/* Rays of several hexes, wedges or pyramids side by side (kernel_curved_batch.h, kernel_occlusion_hexes.h): which two
+ * faces of its cell a ray crosses, and where. A lane takes its cell's numbers out of the batch's vectors. */
+#ifndef RENDER_KERNEL_CURVED_RAYS_H
+#define RENDER_KERNEL_CURVED_RAYS_H
 
 #include <math.h>
 #include <string.h>
 
 #include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_placed_hexes.h"
+#include "kernel_placed_curved.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
@@ -16,19 +16,19 @@
 #include "simd.h"
 
 /* Rays between two faces of their cells. */
-typedef struct kernel_hex_ends {
-    float t[2][KERNEL_HEX_ROOM], v[2][KERNEL_HEX_ROOM], r[2][3][KERNEL_HEX_ROOM];
-} kernel_hex_ends;
+typedef struct kernel_curved_ends {
+    float t[2][KERNEL_LIST_ROOM], v[2][KERNEL_LIST_ROOM], r[2][3][KERNEL_LIST_ROOM];
+} kernel_curved_ends;
 
-typedef struct kernel_hex_packet {
+typedef struct kernel_curved_packet {
     vm active;
     vi lane, at;
     vf far, u, v;
     kernel_rays rays;
-} kernel_hex_packet;
+} kernel_curved_packet;
 
-SIMD_INLINE void kernel_hex_packet_begin(kernel_hex_packet *p, const kernel_tile_trace *t, const kernel_hex_rays *rays,
-                                         int first)
+SIMD_INLINE void kernel_curved_packet_begin(kernel_curved_packet *p, const kernel_tile_trace *t,
+                                            const kernel_pixel_list *rays, int first)
 {
     const kernel_tile *tile = &t->tile;
     const bool flat = t->frame->job->camera.is_orthographic;
@@ -44,34 +44,36 @@ SIMD_INLINE void kernel_hex_packet_begin(kernel_hex_packet *p, const kernel_tile
     p->v = flat ? p->rays.origin_y : p->rays.slope_y;
 }
 
-SIMD_INLINE vf kernel_hex_take(const float *of, vi lane)
+SIMD_INLINE vf kernel_curved_take(const float *of, vi lane)
 {
     return vf_permute(vf_load(of), lane);
 }
 
-SIMD_INLINE void kernel_hex_ray_add(kernel_hex_rays *to, const kernel_hex_rays *from, int i)
+SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel_list *from, int i)
 {
     to->pixel[to->count] = from->pixel[i];
     to->lane[to->count] = from->lane[i];
     to->count++;
 }
 
-SIMD_INLINE void kernel_poly_side(const kernel_placed_polys *h, const kernel_hex_packet *p, int n, kernel_poly_sides *s)
+SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_curved_packet *p, int n,
+                                    kernel_curved_sides *s)
 {
-    const vf e = vf_muladd(kernel_hex_take(h->cv[n], p->lane), p->v,
-                           vf_muladd(kernel_hex_take(h->cu[n], p->lane), p->u, kernel_hex_take(h->c[n], p->lane)));
+    const vf e =
+        vf_muladd(kernel_curved_take(h->cv[n], p->lane), p->v,
+                  vf_muladd(kernel_curved_take(h->cu[n], p->lane), p->u, kernel_curved_take(h->c[n], p->lane)));
     s->least = vf_min(vf_abs(e), s->least);
     s->negative[n] = vm_sign(vi_from_bits(e));
 }
 
-SIMD_INLINE void kernel_poly_sides_of(const kernel_placed_polys *h, const kernel_hex_packet *p, int type,
-                                      kernel_poly_sides *s)
+SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+                                        kernel_curved_sides *s)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     s->least = vf_set(INFINITY);
-    for (int n = 0; n < shape->edge_count; n++) kernel_poly_side(h, p, n, s);
+    for (int n = 0; n < shape->edge_count; n++) kernel_curved_side(h, p, n, s);
     for (int face = 0; face < shape->face_count; face++)
-        if (shape->faces[face].count == 4) kernel_poly_side(h, p, shape->edge_count + face, s);
+        if (shape->faces[face].count == 4) kernel_curved_side(h, p, shape->edge_count + face, s);
 }
 
 /* kernel_halves_once() of a quad whose diagonal is from the loop's vertex 1 where turn is set, else from vertex 0. */
@@ -83,27 +85,27 @@ SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
 }
 
 /* Projects the vertices along the rays. */
-SIMD_INLINE void kernel_poly_project(const kernel_placed_polys *h, const kernel_hex_packet *p, int count, vf x[8],
-                                     vf y[8])
+SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kernel_curved_packet *p, int count, vf x[8],
+                                       vf y[8])
 {
     for (int i = 0; i < count; i++) {
-        const vf z = kernel_hex_take(h->at[2][i], p->lane);
-        x[i] = (kernel_hex_take(h->at[0][i], p->lane) - p->rays.origin_x) - p->rays.slope_x * z;
-        y[i] = (kernel_hex_take(h->at[1][i], p->lane) - p->rays.origin_y) - p->rays.slope_y * z;
+        const vf z = kernel_curved_take(h->at[2][i], p->lane);
+        x[i] = (kernel_curved_take(h->at[0][i], p->lane) - p->rays.origin_x) - p->rays.slope_x * z;
+        y[i] = (kernel_curved_take(h->at[1][i], p->lane) - p->rays.origin_y) - p->rays.slope_y * z;
     }
 }
 
-SIMD_INLINE void kernel_poly_faces(const kernel_placed_polys *h, const kernel_hex_packet *p, int type,
-                                   kernel_hex_crossed *out)
+SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+                                     kernel_curved_crossed *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_hex_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
-    kernel_poly_sides sides;
+    kernel_curved_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
+    kernel_curved_sides sides;
     vf x[8], y[8];
-    kernel_poly_sides_of(h, p, type, &sides);
-    vm alone = vm_not(vf_lt(kernel_hex_take(h->doubt, p->lane), sides.least));
-    kernel_poly_project(h, p, grid_type_vertices(type), x, y);
-    const vi turned = vi_from_bits(kernel_hex_take((const float *)(const void *)h->turned, p->lane));
+    kernel_curved_sides_of(h, p, type, &sides);
+    vm alone = vm_not(vf_lt(kernel_curved_take(h->doubt, p->lane), sides.least));
+    kernel_curved_project(h, p, grid_type_vertices(type), x, y);
+    const vi turned = vi_from_bits(kernel_curved_take((const float *)(const void *)h->turned, p->lane));
     for (int face = 0; face < shape->face_count; face++) {
         vm around[4], once;
         kernel_face_sides(shape, face, &sides, around);
@@ -114,57 +116,57 @@ SIMD_INLINE void kernel_poly_faces(const kernel_placed_polys *h, const kernel_he
             const vm outside = vm_and(p->active, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
             const signed char *loop = shape->faces[face].vertices;
             once = vm_and(p->active, kernel_halves_once_turned(around, turn, sides.negative[shape->edge_count + face]));
-            alone = vm_or(alone, kernel_hex_bends(x, y, loop, outside, around[0], around[3]));
+            alone = vm_or(alone, kernel_curved_bends(x, y, loop, outside, around[0], around[3]));
         }
-        kernel_hex_count_face(&count, face, once);
+        kernel_curved_count_face(&count, face, once);
     }
-    kernel_hex_count_end(&count, p->active, alone, out);
+    kernel_curved_count_end(&count, p->active, alone, out);
 }
 
 /* The place where rays cross a face, as kernel_quad_crossings() or kernel_triangle_crossing() finds it. */
-typedef struct kernel_hex_place {
+typedef struct kernel_curved_place {
     vf t, v, r[3];
-} kernel_hex_place;
+} kernel_curved_place;
 
 /* A quad's corners as rays see them, each ray's of its own face: as vertices of the cell, and their values. */
-typedef struct kernel_hex_quad {
+typedef struct kernel_curved_quad {
     vi corner[4];
     vf f[4];
-} kernel_hex_quad;
+} kernel_curved_quad;
 
 /* A number of each ray's own vertex of its cell, which has count. Of 16 lanes, selections among all vertices' are
  * faster than a gather, of 8 they are slower. */
-SIMD_INLINE vf kernel_hex_pick(const float of[8][SIMD_WIDTH], int count, vi lane, vi corner)
+SIMD_INLINE vf kernel_curved_pick(const float of[8][SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
     vf four[4], two[2];
     const vm odd = vm_sign(corner << 31), second = vm_sign(corner << 30), upper = vm_sign(corner << 29);
     for (int i = 0; 2 * i < count; i++) {
-        four[i] = kernel_hex_take(of[2 * i], lane);
-        if (2 * i + 1 < count) four[i] = vf_select(odd, kernel_hex_take(of[2 * i + 1], lane), four[i]);
+        four[i] = kernel_curved_take(of[2 * i], lane);
+        if (2 * i + 1 < count) four[i] = vf_select(odd, kernel_curved_take(of[2 * i + 1], lane), four[i]);
     }
     for (int i = 0; 4 * i < count; i++)
         two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
 }
 
-SIMD_INLINE vi kernel_face_word(const kernel_placed_polys *h, vi lane, vi face)
+SIMD_INLINE vi kernel_face_word(const kernel_placed_curved *h, vi lane, vi face)
 {
     return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
 }
 
-SIMD_INLINE void kernel_hex_quad_take(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vi face,
-                                      kernel_quad *q, kernel_hex_quad *out)
+SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+                                         vi face, kernel_quad *q, kernel_curved_quad *out)
 {
     const int count = grid_type_vertices(type);
     const vi word = kernel_face_word(h, p->lane, face);
     for (int i = 0; i < 4; i++) {
         const vi corner = word >> (4 * i) & 7;
         out->corner[i] = corner;
-        q->z[i] = kernel_hex_pick(h->at[2], count, p->lane, corner);
-        q->x[i] = (kernel_hex_pick(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
-        q->y[i] = (kernel_hex_pick(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
-        out->f[i] = kernel_hex_pick(h->at[3], count, p->lane, corner);
+        q->z[i] = kernel_curved_pick(h->at[2], count, p->lane, corner);
+        q->x[i] = (kernel_curved_pick(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
+        q->y[i] = (kernel_curved_pick(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
+        out->f[i] = kernel_curved_pick(h->at[3], count, p->lane, corner);
     }
     /* Not in doubt, so these have the lines' signs. */
     q->e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
@@ -173,28 +175,29 @@ SIMD_INLINE void kernel_hex_quad_take(const kernel_placed_polys *h, const kernel
     q->e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
 }
 
-SIMD_INLINE void kernel_hex_quad_place(int type, const kernel_hex_quad *own, const kernel_quad_place *place,
-                                       kernel_hex_place *out)
+SIMD_INLINE void kernel_curved_quad_place(int type, const kernel_curved_quad *own, const kernel_quad_place *place,
+                                          kernel_curved_place *out)
 {
     out->t = place->t;
     out->v = kernel_bilinear(own->f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
-            at[i] = kernel_hex_own(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
+            at[i] = kernel_curved_own(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
         out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
     }
 }
 
 /* A triangle's edge functions on rays that cross it, each with its own of its cell's: ij, jk and ik. */
-typedef struct kernel_hex_triangle {
+typedef struct kernel_curved_triangle {
     vi corner[3];
     vf e[3];
-} kernel_hex_triangle;
+} kernel_curved_triangle;
 
 /* kernel_triangle_mend(). */
-static __attribute__((noinline, cold)) void
-kernel_hex_triangle_mend(const kernel_placed_polys *h, const kernel_hex_packet *p, vm weak, kernel_hex_triangle *own)
+static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
+                                                                        const kernel_curved_packet *p, vm weak,
+                                                                        kernel_curved_triangle *own)
 {
     vf x[3], y[3];
     for (int i = 0; i < 3; i++) {
@@ -209,8 +212,8 @@ kernel_hex_triangle_mend(const kernel_placed_polys *h, const kernel_hex_packet *
 }
 
 /* The triangle that is the face, on the given rays; on others another. */
-SIMD_INLINE void kernel_hex_triangle_take(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vm rays,
-                                          vi face, kernel_hex_triangle *own)
+SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+                                             vm rays, vi face, kernel_curved_triangle *own)
 {
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
@@ -223,68 +226,68 @@ SIMD_INLINE void kernel_hex_triangle_take(const kernel_placed_polys *h, const ke
     }
     const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
     const vm weak = vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + p->lane)));
-    if (__builtin_expect(vm_any(weak), 0)) kernel_hex_triangle_mend(h, p, weak, own);
+    if (__builtin_expect(vm_any(weak), 0)) kernel_curved_triangle_mend(h, p, weak, own);
 }
 
 /* kernel_weigh(). */
-SIMD_INLINE vf kernel_hex_weigh(const kernel_hex_triangle *own, const vf v[3], vf inverse)
+SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v[3], vf inverse)
 {
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
 }
 
-SIMD_INLINE void kernel_hex_triangle_place(const kernel_placed_polys *h, int type, vi lane,
-                                           const kernel_hex_triangle *own, kernel_hex_place *out)
+SIMD_INLINE void kernel_curved_triangle_place(const kernel_placed_curved *h, int type, vi lane,
+                                              const kernel_curved_triangle *own, kernel_curved_place *out)
 {
     const int count = grid_type_vertices(type);
     const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
     vf v[3];
-    for (int i = 0; i < 3; i++) v[i] = kernel_hex_pick(h->at[2], count, lane, own->corner[i]);
-    out->t = kernel_hex_weigh(own, v, inverse);
-    for (int i = 0; i < 3; i++) v[i] = kernel_hex_pick(h->at[3], count, lane, own->corner[i]);
-    out->v = kernel_hex_weigh(own, v, inverse);
+    for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[2], count, lane, own->corner[i]);
+    out->t = kernel_curved_weigh(own, v, inverse);
+    for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[3], count, lane, own->corner[i]);
+    out->v = kernel_curved_weigh(own, v, inverse);
     for (int a = 0; a < 3; a++) {
-        for (int i = 0; i < 3; i++) v[i] = kernel_hex_own(kernel_cell_shape(type), count, a, own->corner[i]);
-        out->r[a] = kernel_hex_weigh(own, v, inverse);
+        for (int i = 0; i < 3; i++) v[i] = kernel_curved_own(kernel_cell_shape(type), count, a, own->corner[i]);
+        out->r[a] = kernel_curved_weigh(own, v, inverse);
     }
 }
 
-SIMD_INLINE void kernel_hex_place_select(vm m, const kernel_hex_place *a, const kernel_hex_place *b,
-                                         kernel_hex_place *out)
+SIMD_INLINE void kernel_curved_place_select(vm m, const kernel_curved_place *a, const kernel_curved_place *b,
+                                            kernel_curved_place *out)
 {
     out->t = vf_select(m, a->t, b->t);
     out->v = vf_select(m, a->v, b->v);
     for (int i = 0; i < 3; i++) out->r[i] = vf_select(m, a->r[i], b->r[i]);
 }
 
-SIMD_INLINE void kernel_poly_cross(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vi faces,
-                                   kernel_hex_place out[2])
+SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel_curved_packet *p, int type, vi faces,
+                                     kernel_curved_place out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};
-    const vm on_quad[2] = {kernel_hex_on_quad(type, 0, face[0]), kernel_hex_on_quad(type, 1, face[1])};
+    const vm on_quad[2] = {kernel_curved_on_quad(type, 0, face[0]), kernel_curved_on_quad(type, 1, face[1])};
     const vm once[2] = {vm_and(p->active, on_quad[0]), vm_and(p->active, on_quad[1])};
     const int quads = type == GRID_PYRAMID ? 1 : 2;
     memset(out, 0, 2 * sizeof *out);
     if (type == GRID_HEX || vm_any(vm_or(once[0], once[1]))) {
         kernel_quad own[2];
-        kernel_hex_quad corners[2];
+        kernel_curved_quad corners[2];
         kernel_quad_place places[2];
-        for (int n = 0; n < quads; n++) kernel_hex_quad_take(h, p, type, face[n], &own[n], &corners[n]);
+        for (int n = 0; n < quads; n++) kernel_curved_quad_take(h, p, type, face[n], &own[n], &corners[n]);
         kernel_quads_cross(own, quads, once, places);
-        for (int n = 0; n < quads; n++) kernel_hex_quad_place(type, &corners[n], &places[n], &out[n]);
+        for (int n = 0; n < quads; n++) kernel_curved_quad_place(type, &corners[n], &places[n], &out[n]);
     }
     for (int n = 0; n < 2 && type != GRID_HEX; n++) {
         const vm on_triangle = vm_andnot(p->active, on_quad[n]);
-        kernel_hex_triangle own;
-        kernel_hex_place place;
+        kernel_curved_triangle own;
+        kernel_curved_place place;
         if (!vm_any(on_triangle)) continue;
-        kernel_hex_triangle_take(h, p, type, on_triangle, face[n], &own);
-        kernel_hex_triangle_place(h, type, p->lane, &own, &place);
-        kernel_hex_place_select(on_triangle, &place, &out[n], &out[n]);
+        kernel_curved_triangle_take(h, p, type, on_triangle, face[n], &own);
+        kernel_curved_triangle_place(h, type, p->lane, &own, &place);
+        kernel_curved_place_select(on_triangle, &place, &out[n], &out[n]);
     }
 }
 
-SIMD_INLINE void kernel_hex_ends_add(const kernel_hex_rays *met, int n, const kernel_hex_place ends[2], unsigned bits,
-                                     kernel_hex_rays *rays, kernel_hex_ends *out)
+SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_curved_place ends[2],
+                                        unsigned bits, kernel_pixel_list *rays, kernel_curved_ends *out)
 {
     if (!bits) return;
     float lanes[2][5][SIMD_WIDTH];
@@ -300,7 +303,7 @@ SIMD_INLINE void kernel_hex_ends_add(const kernel_hex_rays *met, int n, const ke
             out->v[e][to] = lanes[e][1][i];
             for (int a = 0; a < 3; a++) out->r[e][a][to] = lanes[e][2 + a][i];
         }
-        kernel_hex_ray_add(rays, met, n + i);
+        kernel_curved_ray_add(rays, met, n + i);
     }
 }
 

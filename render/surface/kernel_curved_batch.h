@@ -14,8 +14,8 @@
  * Rays of which an edge function is in doubt, or which cross not just two of a cell's faces once each, are for the cell
  * alone (kernel_surface.h). Every operation is that of a cell alone in the same order, so that a hit has the same bits
  * however it came to be found. */
-#ifndef RENDER_KERNEL_POLYS_H
-#define RENDER_KERNEL_POLYS_H
+#ifndef RENDER_KERNEL_CURVED_BATCH_H
+#define RENDER_KERNEL_CURVED_BATCH_H
 
 #include <math.h>
 #include <string.h>
@@ -24,14 +24,14 @@
 #include "kernel_accept.h"
 #include "kernel_arrays.h"
 #include "kernel_bounds.h"
-#include "kernel_bounds_polys.h"
+#include "kernel_bounds_curved.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
 #include "kernel_contraction.h"
-#include "kernel_hex_rays.h"
+#include "kernel_curved_rays.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_placed_hexes.h"
+#include "kernel_placed_curved.h"
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
@@ -41,10 +41,10 @@
 #include "render.h"
 #include "simd.h"
 
-enum { KERNEL_POLY_PIXELS = 64 }; /* of a large cell's box in the tile there are more */
+enum { KERNEL_CURVED_PIXELS = 64 }; /* of a large cell's box in the tile there are more */
 
 /* Cells of one type that wait to be placed together. */
-typedef struct kernel_polys_pending {
+typedef struct kernel_curved_batch_pending {
     int type, count;
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
@@ -52,25 +52,25 @@ typedef struct kernel_polys_pending {
     int32_t vertex[8][SIMD_WIDTH];
     int value[SIMD_WIDTH];
     float near[SIMD_WIDTH];
-} kernel_polys_pending;
+} kernel_curved_batch_pending;
 
-typedef struct kernel_polys {
-    int layer, part;                 /* -1: of none yet */
-    kernel_arrays arrays;            /* of the layer's field on the part */
-    kernel_polys_pending pending[3]; /* by kernel_shape_number() */
-    kernel_polys_pending *own;       /* those that are traced */
-    kernel_placed_polys placed;
+typedef struct kernel_curved_batch {
+    int layer, part;                        /* -1: of none yet */
+    kernel_arrays arrays;                   /* of the layer's field on the part */
+    kernel_curved_batch_pending pending[3]; /* by kernel_shape_number() */
+    kernel_curved_batch_pending *own;       /* those that are traced */
+    kernel_placed_curved placed;
     float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
-    kernel_polys_bounds bounds;
+    kernel_curved_batch_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
-    kernel_poly polys[SIMD_WIDTH];
-    kernel_hex_rays rays, met, found, others;
-    uint8_t faces[KERNEL_HEX_ROOM]; /* of those met: the first, and 8 times the second */
-    kernel_hex_ends found_ends, other_ends;
-} kernel_polys;
+    kernel_curved curved[SIMD_WIDTH];
+    kernel_pixel_list rays, met, found, others;
+    uint8_t faces[KERNEL_LIST_ROOM]; /* of those met: the first, and 8 times the second */
+    kernel_curved_ends found_ends, other_ends;
+} kernel_curved_batch;
 
-static void kernel_polys_begin(kernel_polys *h)
+static void kernel_curved_batch_begin(kernel_curved_batch *h)
 {
     static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     h->rays.count = 0;
@@ -85,21 +85,21 @@ static void kernel_polys_begin(kernel_polys *h)
 /* ---- cells alone ---- */
 
 /* The lane as a cell, whose map is not set up yet. */
-SIMD_INLINE void kernel_poly_ready(kernel_polys *h, int n)
+SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
 {
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
-    kernel_placed_poly_cell(&h->placed, h->own->type, n, &h->cells[n]);
+    kernel_placed_curved_cell(&h->placed, h->own->type, n, &h->cells[n]);
     h->cells[n].part = h->part;
     h->cells[n].index = h->own->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
-    h->polys[n].is_set_up = false;
+    h->curved[n].is_set_up = false;
 }
 
 /* Rays that are for the cell alone. */
-static __attribute__((noinline)) unsigned kernel_polys_alone(kernel_tile_trace *t, kernel_polys *h,
-                                                             const kernel_hex_rays *rays, int first, vi at_lanes,
-                                                             unsigned wanted)
+static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                    const kernel_pixel_list *rays, int first,
+                                                                    vi at_lanes, unsigned wanted)
 {
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
@@ -121,8 +121,8 @@ static __attribute__((noinline)) unsigned kernel_polys_alone(kernel_tile_trace *
                                       .is_opaque = true,
                                       .is_contracted = true};
         p->is_nearer = false;
-        kernel_poly_ready(h, n);
-        kernel_cell_surface(p, &state, &h->cells[n], &h->polys[n], h->own->value[n],
+        kernel_curved_ready(h, n);
+        kernel_cell_surface(p, &state, &h->cells[n], &h->curved[n], h->own->value[n],
                             vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
@@ -132,47 +132,50 @@ static __attribute__((noinline)) unsigned kernel_polys_alone(kernel_tile_trace *
 /* ---- rays ---- */
 
 /* kernel_linear_at(). */
-SIMD_INLINE vf kernel_polys_linear_at(const kernel_polys *h, const kernel_hex_packet *p, vf t)
+SIMD_INLINE vf kernel_curved_batch_linear_at(const kernel_curved_batch *h, const kernel_curved_packet *p, vf t)
 {
     vf g[3], at[3];
     for (int a = 0; a < 3; a++) {
-        g[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
-        at[a] = kernel_hex_take(h->placed.at[a][0], p->lane);
+        g[a] = kernel_curved_take(h->bounds.gradient[a], p->lane);
+        at[a] = kernel_curved_take(h->placed.at[a][0], p->lane);
     }
     const vf x = (p->rays.origin_x + p->rays.slope_x * t) - at[0], y = (p->rays.origin_y + p->rays.slope_y * t) - at[1];
-    return (kernel_hex_take(h->bounds.level, p->lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
+    return (kernel_curved_take(h->bounds.level, p->lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
 }
 
 /* Rays on which L leaves the cell's slab out on one side from depth to depth. */
-SIMD_INLINE vm kernel_polys_far(const kernel_polys *h, const kernel_hex_packet *p, vf side, vf from, vf to)
+SIMD_INLINE vm kernel_curved_batch_far(const kernel_curved_batch *h, const kernel_curved_packet *p, vf side, vf from,
+                                       vf to)
 {
-    const vf thick = kernel_hex_take(h->bounds.thickness, p->lane);
-    return vm_and(vf_lt(thick, side * kernel_polys_linear_at(h, p, from)),
-                  vf_lt(thick, side * kernel_polys_linear_at(h, p, to)));
+    const vf thick = kernel_curved_take(h->bounds.thickness, p->lane);
+    return vm_and(vf_lt(thick, side * kernel_curved_batch_linear_at(h, p, from)),
+                  vf_lt(thick, side * kernel_curved_batch_linear_at(h, p, to)));
 }
 
 /* The rays as their cells have them. */
-SIMD_INLINE void kernel_polys_sight(const kernel_polys *h, const kernel_hex_packet *p, kernel_sight *out)
+SIMD_INLINE void kernel_curved_batch_sight(const kernel_curved_batch *h, const kernel_curved_packet *p,
+                                           kernel_sight *out)
 {
     vf origin[3], normal[3][3], gradient[3];
     for (int a = 0; a < 3; a++) {
-        origin[a] = kernel_hex_take(h->placed.at[a][0], p->lane);
-        gradient[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
-        for (int i = 0; i < 3; i++) normal[i][a] = kernel_hex_take(h->bounds.normal[i][a], p->lane);
+        origin[a] = kernel_curved_take(h->placed.at[a][0], p->lane);
+        gradient[a] = kernel_curved_take(h->bounds.gradient[a], p->lane);
+        for (int i = 0; i < 3; i++) normal[i][a] = kernel_curved_take(h->bounds.normal[i][a], p->lane);
     }
-    kernel_sight_of(&p->rays, origin, (const vf(*)[3])normal, gradient, kernel_hex_take(h->bounds.level, p->lane), out);
+    kernel_sight_of(&p->rays, origin, (const vf(*)[3])normal, gradient, kernel_curved_take(h->bounds.level, p->lane),
+                    out);
 }
 
 /* Rays that are far from the slab between the planes that their cells lie between: a face's value has L's sign on
  * these, and there is no root. Depths are from vertex 0's on. */
-SIMD_INLINE vm kernel_polys_beside(const kernel_polys *h, vi lane, const kernel_sight *ray)
+SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_sight *ray)
 {
-    const vf thick = kernel_hex_take(h->bounds.thickness, lane);
+    const vf thick = kernel_curved_take(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
         const vf inverse = 1.0f / ray->w[i];
-        const vf low = (kernel_hex_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
-        const vf high = (kernel_hex_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
+        const vf low = (kernel_curved_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
+        const vf high = (kernel_curved_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
         from = vf_max(vf_min(low, high), from);
         to = vf_min(vf_max(low, high), to);
     }
@@ -180,30 +183,31 @@ SIMD_INLINE vm kernel_polys_beside(const kernel_polys *h, vi lane, const kernel_
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-SIMD_INLINE void kernel_polys_contraction(const kernel_polys *h, vi lane, int type, kernel_contraction *out)
+SIMD_INLINE void kernel_curved_batch_contraction(const kernel_curved_batch *h, vi lane, int type,
+                                                 kernel_contraction *out)
 {
     const kernel_contractions *c = &h->bounds.contractions;
-    for (int i = 0; i < 3; i++) out->offset[i] = kernel_hex_take(c->offset[i], lane);
+    for (int i = 0; i < 3; i++) out->offset[i] = kernel_curved_take(c->offset[i], lane);
     for (int k = 0; k < kernel_bent_terms(type); k++) {
-        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_hex_take(c->bent[k][i], lane);
-        out->field[k] = kernel_hex_take(c->field[k], lane);
+        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_curved_take(c->bent[k][i], lane);
+        out->field[k] = kernel_curved_take(c->field[k], lane);
     }
-    out->middle = kernel_hex_take(c->middle, lane);
-    out->grow = kernel_hex_take(c->grow, lane);
-    out->blur = kernel_hex_take(c->blur, lane);
-    out->rim = kernel_hex_take(c->rim, lane);
+    out->middle = kernel_curved_take(c->middle, lane);
+    out->grow = kernel_curved_take(c->grow, lane);
+    out->blur = kernel_curved_take(c->blur, lane);
+    out->rim = kernel_curved_take(c->rim, lane);
 }
 
 /* Crossings that are known, at these depths, are found, as places in found_ends[0]; of the others only those that are
  * undecided stay, moved to kept and on. Returns how many are kept then. */
-SIMD_INLINE int kernel_polys_part(kernel_polys *h, int n, const kernel_contracted *at, vf depth, unsigned undecided,
-                                  int kept)
+SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_contracted *at, vf depth,
+                                         unsigned undecided, int kept)
 {
     for (unsigned bits = vm_bits(at->one); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), to = h->found.count;
         h->found_ends.t[0][to] = depth[i];
         for (int a = 0; a < 3; a++) h->found_ends.r[0][a][to] = at->r[a][i];
-        kernel_hex_ray_add(&h->found, &h->rays, n + i);
+        kernel_curved_ray_add(&h->found, &h->rays, n + i);
     }
     for (; undecided; undecided &= undecided - 1) {
         const int i = n + __builtin_ctz(undecided);
@@ -215,112 +219,113 @@ SIMD_INLINE int kernel_polys_part(kernel_polys *h, int n, const kernel_contracte
 }
 
 /* What is known of rays without faces. */
-SIMD_INLINE void kernel_polys_contract_of(const kernel_tile_trace *t, kernel_polys *h, int type)
+SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     int kept = 0;
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
-        kernel_hex_packet p;
+        kernel_curved_packet p;
         kernel_sight ray;
         kernel_contraction c;
         kernel_contracted at;
-        kernel_hex_packet_begin(&p, t, &h->rays, n);
-        p.active = vm_and(p.active, vf_le(kernel_hex_take(h->own->near, p.lane), p.far));
-        kernel_polys_sight(h, &p, &ray);
-        p.active = vm_andnot(p.active, kernel_polys_beside(h, p.lane, &ray));
+        kernel_curved_packet_begin(&p, t, &h->rays, n);
+        p.active = vm_and(p.active, vf_le(kernel_curved_take(h->own->near, p.lane), p.far));
+        kernel_curved_batch_sight(h, &p, &ray);
+        p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
-        kernel_polys_contraction(h, p.lane, type, &c);
+        kernel_curved_batch_contraction(h, p.lane, type, &c);
         kernel_contract(&c, &ray, p.active, &at, type);
-        const vf depth = at.t + kernel_hex_take(h->placed.at[2][0], p.lane);
-        kept = kernel_polys_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
+        const vf depth = at.t + kernel_curved_take(h->placed.at[2][0], p.lane);
+        kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
     }
     h->rays.count = kept;
-    kernel_hex_rays_close(&h->rays);
-    kernel_hex_rays_close(&h->found);
+    kernel_pixel_list_close(&h->rays);
+    kernel_pixel_list_close(&h->found);
 }
 
-static __attribute__((noinline)) void kernel_polys_contract(const kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->own->type, kernel_polys_contract_of, t, h);
+    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_contract_of, t, h);
 }
 
 /* The rays that cross two faces of their cells go on. Returns the blocks in which something is nearer. */
-SIMD_INLINE unsigned kernel_polys_meet_of(kernel_tile_trace *t, kernel_polys *h, int type)
+SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
     h->met.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
-        kernel_hex_packet p;
-        kernel_hex_crossed crossed;
+        kernel_curved_packet p;
+        kernel_curved_crossed crossed;
         uint8_t faces[SIMD_WIDTH];
-        kernel_hex_packet_begin(&p, t, &h->rays, n);
-        p.active = vm_and(p.active, vf_le(kernel_hex_take(h->own->near, p.lane), p.far));
+        kernel_curved_packet_begin(&p, t, &h->rays, n);
+        p.active = vm_and(p.active, vf_le(kernel_curved_take(h->own->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
-        kernel_poly_faces(&h->placed, &p, type, &crossed);
+        kernel_curved_faces(&h->placed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
         for (int i = 0; i < SIMD_WIDTH; i++) faces[i] = (uint8_t)both[i];
         for (unsigned bits = vm_bits(crossed.two); bits; bits &= bits - 1) {
             const int i = __builtin_ctz(bits);
             h->faces[h->met.count] = faces[i];
-            kernel_hex_ray_add(&h->met, &h->rays, n + i);
+            kernel_curved_ray_add(&h->met, &h->rays, n + i);
         }
         if (__builtin_expect(vm_any(crossed.alone), 0))
-            nearer |= kernel_polys_alone(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
+            nearer |= kernel_curved_batch_alone(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
     }
-    kernel_hex_rays_close(&h->met);
+    kernel_pixel_list_close(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_polys_meet(kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_meet(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_polys_meet_of, t, h);
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_meet_of, t, h);
 }
 
-/* kernel_poly_intervals() and the begin of kernel_poly_surface() and kernel_search_ends(). */
-SIMD_INLINE void kernel_polys_cross_of(const kernel_tile_trace *t, kernel_polys *h, int type)
+/* kernel_curved_intervals() and the begin of kernel_curved_surface() and kernel_search_ends(). */
+SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     h->found.count = h->others.count = 0;
     for (int n = 0; n < h->met.count; n += SIMD_WIDTH) {
-        kernel_hex_packet p;
-        kernel_hex_place face[2], ends[2];
+        kernel_curved_packet p;
+        kernel_curved_place face[2], ends[2];
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
         const vi faces = kernel_bytes(h->faces + n);
-        kernel_hex_packet_begin(&p, t, &h->met, n);
-        kernel_poly_cross(&h->placed, &p, type, faces, face);
+        kernel_curved_packet_begin(&p, t, &h->met, n);
+        kernel_curved_cross(&h->placed, &p, type, faces, face);
         const vm swap = vf_lt(face[1].t, face[0].t);
-        kernel_hex_place_select(swap, &face[1], &face[0], &ends[0]);
-        kernel_hex_place_select(swap, &face[0], &face[1], &ends[1]);
+        kernel_curved_place_select(swap, &face[1], &face[0], &ends[0]);
+        kernel_curved_place_select(swap, &face[0], &face[1], &ends[1]);
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
-        const vf jump = kernel_hex_take(h->bounds.jump, p.lane);
+        const vf jump = kernel_curved_take(h->bounds.jump, p.lane);
         const vm far = vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))), other = vf_lt(jump, zero);
         const vm room = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
         const vm close = vm_andnot(room, vm_or(change, far)), found = vm_andnot(vm_and(near, change), other);
-        kernel_hex_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
+        kernel_curved_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
         vm searched = vm_and(room, other);
         if (vm_any(searched))
             searched = vm_andnot(
-                searched, vm_andnot(kernel_polys_far(h, &p, kernel_side(ends[0].v), ends[0].t, ends[1].t), change));
-        kernel_hex_ends_add(&h->met, n, ends, vm_bits(vm_or(close, searched)), &h->others, &h->other_ends);
+                searched,
+                vm_andnot(kernel_curved_batch_far(h, &p, kernel_side(ends[0].v), ends[0].t, ends[1].t), change));
+        kernel_curved_ends_add(&h->met, n, ends, vm_bits(vm_or(close, searched)), &h->others, &h->other_ends);
     }
 }
 
-static __attribute__((noinline)) void kernel_polys_cross(const kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->own->type, kernel_polys_cross_of, t, h);
+    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
 }
 
 /* kernel_map_setup() of a cell a lane. */
-SIMD_INLINE void kernel_poly_maps(const kernel_polys *h, int type, vi lane, kernel_map_lanes *out)
+SIMD_INLINE void kernel_curved_maps(const kernel_curved_batch *h, int type, vi lane, kernel_map_lanes *out)
 {
     const int count = grid_type_vertices(type);
     out->is_pyramid = type == GRID_PYRAMID;
     out->tolerance = KERNEL_MAP_TOLERANCE;
     for (int n = 0; n < 4; n++) {
         vf v[8], *const c = n < 3 ? out->position[n] : out->field;
-        for (int i = 0; i < count; i++) v[i] = kernel_hex_take(h->placed.at[n][i], lane);
+        for (int i = 0; i < count; i++) v[i] = kernel_curved_take(h->placed.at[n][i], lane);
         if (n < 3) out->origin[n] = v[0];
         for (int half = 0; half < 2; half++) {
             kernel_half d[8], *const e = out->exact[half][n];
@@ -334,11 +339,11 @@ SIMD_INLINE void kernel_poly_maps(const kernel_polys *h, int type, vi lane, kern
 }
 
 /* kernel_map_colour() of a cell a lane, and kernel_map_value() of it. */
-SIMD_INLINE vf kernel_polys_colour_value(const kernel_polys *h, vi lane, const vf r[3], int type)
+SIMD_INLINE vf kernel_curved_batch_colour_value(const kernel_curved_batch *h, vi lane, const vf r[3], int type)
 {
     const int count = grid_type_vertices(type);
     vf v[8], c[8];
-    for (int i = 0; i < count; i++) v[i] = kernel_hex_take(h->colours[i], lane);
+    for (int i = 0; i < count; i++) v[i] = kernel_curved_take(h->colours[i], lane);
     for (int half = 0; half < 2; half++) {
         kernel_half d[8], e[8];
         for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
@@ -350,7 +355,8 @@ SIMD_INLINE vf kernel_polys_colour_value(const kernel_polys *h, vi lane, const v
 }
 
 /* The colours' field of the lanes' cells, in the order of their vertices. */
-static __attribute__((noinline)) void kernel_polys_fetch_colours(const kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const kernel_tile_trace *t,
+                                                                        kernel_curved_batch *h)
 {
     const kernel_surface *s = t->surface;
     const grid_field *field = &s->layer->colour_field.fields[h->part];
@@ -364,22 +370,22 @@ static __attribute__((noinline)) void kernel_polys_fetch_colours(const kernel_ti
 }
 
 /* The places of hits in lanes: r, in the cells' own coordinates, is used for colours; normal is as in kernel_hits. */
-typedef struct kernel_polys_places {
+typedef struct kernel_curved_batch_places {
     vf t, normal[3], r[3];
-} kernel_polys_places;
+} kernel_curved_batch_places;
 
 /* Returns the blocks in which something is nearer. */
-static __attribute__((noinline)) unsigned kernel_polys_accept(kernel_tile_trace *t, const kernel_polys *h,
-                                                              const kernel_hex_rays *rays, int first,
-                                                              const kernel_hex_packet *p, unsigned hit,
-                                                              const kernel_polys_places *places)
+static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
+                                                                     const kernel_pixel_list *rays, int first,
+                                                                     const kernel_curved_packet *p, unsigned hit,
+                                                                     const kernel_curved_batch_places *places)
 {
     const render_surface_layer *layer = t->surface->layer;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     vf colours[3];
     if (layer->colour_map) {
-        const vf place = KERNEL_OF_TYPE(h->own->type, kernel_polys_colour_value, h, p->lane, places->r);
+        const vf place = KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_colour_value, h, p->lane, places->r);
         kernel_base_colour(t->surface, 0, place, colours);
     }
     memcpy(at, &p->at, sizeof at);
@@ -400,8 +406,8 @@ static __attribute__((noinline)) unsigned kernel_polys_accept(kernel_tile_trace 
 }
 
 /* kernel_map_normal() and kernel_unshear(); or r, where kernel_vertex_normals() wants it. */
-SIMD_INLINE void kernel_polys_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
-                                     vf normal[3])
+SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
+                                            vf normal[3])
 {
     if (t->surface->layer->normal == RENDER_VERTEX) {
         for (int a = 0; a < 3; a++) normal[a] = r[a];
@@ -411,73 +417,74 @@ SIMD_INLINE void kernel_polys_normal(const kernel_tile_trace *t, const kernel_ma
     normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
 }
 
-/* kernel_polish() and kernel_poly_accept(). */
-SIMD_INLINE unsigned kernel_polys_hit_of(kernel_tile_trace *t, kernel_polys *h, int type)
+/* kernel_polish() and kernel_curved_accept(). */
+SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
-        kernel_hex_packet p;
+        kernel_curved_packet p;
         kernel_map_lanes map;
         kernel_point ends[2], at;
-        kernel_polys_places places;
-        kernel_hex_packet_begin(&p, t, &h->found, n);
+        kernel_curved_batch_places places;
+        kernel_curved_packet_begin(&p, t, &h->found, n);
         for (int e = 0; e < 2; e++) {
             ends[e].t = vf_load(h->found_ends.t[e] + n);
             ends[e].value = vf_load(h->found_ends.v[e] + n);
             for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(h->found_ends.r[e][a] + n);
         }
-        kernel_poly_maps(h, type, p.lane, &map);
+        kernel_curved_maps(h, type, p.lane, &map);
         const vm open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        if (__builtin_expect(vm_any(open), 0)) nearer |= kernel_polys_alone(t, h, &h->found, n, p.at, vm_bits(open));
+        if (__builtin_expect(vm_any(open), 0))
+            nearer |= kernel_curved_batch_alone(t, h, &h->found, n, p.at, vm_bits(open));
         if (!vm_any(hit)) continue;
-        kernel_polys_normal(t, &map, at.r, places.normal);
+        kernel_curved_batch_normal(t, &map, at.r, places.normal);
         places.t = at.t;
         memcpy(places.r, at.r, sizeof places.r);
-        nearer |= kernel_polys_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
+        nearer |= kernel_curved_batch_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
     }
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_polys_hit(kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_polys_hit_of, t, h);
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h);
 }
 
-/* The crossings that kernel_polys_contract() has found. */
-SIMD_INLINE unsigned kernel_polys_known_of(kernel_tile_trace *t, kernel_polys *h, int type)
+/* The crossings that kernel_curved_batch_contract() has found. */
+SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
-        kernel_hex_packet p;
+        kernel_curved_packet p;
         kernel_map_lanes map;
         kernel_point at;
-        kernel_polys_places places;
-        kernel_hex_packet_begin(&p, t, &h->found, n);
+        kernel_curved_batch_places places;
+        kernel_curved_packet_begin(&p, t, &h->found, n);
         at.t = vf_load(h->found_ends.t[0] + n);
         for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
-        kernel_poly_maps(h, type, p.lane, &map);
+        kernel_curved_maps(h, type, p.lane, &map);
         kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
         const vm hit = vm_and(p.active, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (!vm_any(hit)) continue;
-        kernel_polys_normal(t, &map, at.r, places.normal);
+        kernel_curved_batch_normal(t, &map, at.r, places.normal);
         places.t = at.t;
         memcpy(places.r, at.r, sizeof places.r);
-        nearer |= kernel_polys_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
+        nearer |= kernel_curved_batch_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
     }
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_polys_known(kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_polys_known_of, t, h);
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_known_of, t, h);
 }
 
 /* kernel_limits_spread(), each lane with its own cell's. */
-SIMD_INLINE void kernel_polys_limits(const kernel_polys *h, vi lane, kernel_limits *out)
+SIMD_INLINE void kernel_curved_batch_limits(const kernel_curved_batch *h, vi lane, kernel_limits *out)
 {
-    const vi at = lane * (int)(sizeof(kernel_poly) / sizeof(float));
-    const kernel_bounds *b = &h->polys[0].bounds;
+    const vi at = lane * (int)(sizeof(kernel_curved) / sizeof(float));
+    const kernel_bounds *b = &h->curved[0].bounds;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 8; j++) out->bent[i][j] = j < 4 ? vf_set(0) : vf_gather(&b->bent[i].c[j], at);
         for (int a = 0; a < 3; a++) out->inverse[i][a] = vf_gather(&b->inverse[i][a], at);
@@ -487,20 +494,21 @@ SIMD_INLINE void kernel_polys_limits(const kernel_polys *h, vi lane, kernel_limi
     out->curve = vf_gather(&b->curve, at);
     out->twist = vf_gather(&b->twist, at);
     out->coarsest = vf_gather(&b->coarsest, at);
-    out->is_monotone = vf_le(vf_set(0), kernel_hex_take(h->bounds.jump, lane));
+    out->is_monotone = vf_le(vf_set(0), kernel_curved_take(h->bounds.jump, lane));
 }
 
-/* kernel_poly_robust() of the others from n on, of which kernel_polys_cross() has asked what their ends tell. */
-SIMD_INLINE unsigned kernel_polys_search_of(kernel_tile_trace *t, kernel_polys *h, int n, int type)
+/* kernel_curved_robust() of the others from n on, of which kernel_curved_batch_cross() has asked what their ends tell.
+ */
+SIMD_INLINE unsigned kernel_curved_batch_search_of(kernel_tile_trace *t, kernel_curved_batch *h, int n, int type)
 {
-    const kernel_hex_ends *ends = &h->other_ends;
-    kernel_hex_packet p;
+    const kernel_curved_ends *ends = &h->other_ends;
+    kernel_curved_packet p;
     kernel_map_lanes map;
     kernel_limits limits;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    kernel_polys_places places = {.t = vf_set(0)};
+    kernel_curved_batch_places places = {.t = vf_set(0)};
     vm hits = vm_none();
-    kernel_hex_packet_begin(&p, t, &h->others, n);
+    kernel_curved_packet_begin(&p, t, &h->others, n);
     i.mask = p.active;
     i.t_in = vf_load(ends->t[0] + n);
     i.t_out = vf_load(ends->t[1] + n);
@@ -512,11 +520,12 @@ SIMD_INLINE unsigned kernel_polys_search_of(kernel_tile_trace *t, kernel_polys *
     }
     for (int k = n; k < n + SIMD_WIDTH && k < h->others.count; k++) {
         const int lane = h->others.lane[k];
-        kernel_poly_ready(h, lane);
-        kernel_poly_setup(t->frame, &t->tile, &h->polys[lane], t->surface->layer, &h->cells[lane], h->own->value[lane]);
+        kernel_curved_ready(h, lane);
+        kernel_curved_setup(t->frame, &t->tile, &h->curved[lane], t->surface->layer, &h->cells[lane],
+                            h->own->value[lane]);
     }
-    kernel_poly_maps(h, type, p.lane, &map);
-    kernel_polys_limits(h, p.lane, &limits);
+    kernel_curved_maps(h, type, p.lane, &map);
+    kernel_curved_batch_limits(h, p.lane, &limits);
     kernel_search s = {
         .rays = p.rays, .map = &map, .limits = &limits, .interval = &i, .failures = &t->thread->map_failures};
     kernel_search_begin(&s);
@@ -527,7 +536,7 @@ SIMD_INLINE unsigned kernel_polys_search_of(kernel_tile_trace *t, kernel_polys *
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
         const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        kernel_polys_normal(t, &map, at.r, normal);
+        kernel_curved_batch_normal(t, &map, at.r, normal);
         for (int a = 0; a < 3; a++) {
             places.normal[a] = vf_select(hit, normal[a], places.normal[a]);
             places.r[a] = vf_select(hit, at.r[a], places.r[a]);
@@ -536,92 +545,96 @@ SIMD_INLINE unsigned kernel_polys_search_of(kernel_tile_trace *t, kernel_polys *
         hits = vm_or(hits, hit);
         kernel_search_close(&s, hit);
     } while (kernel_search_on(&s));
-    return vm_any(hits) ? kernel_polys_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
+    return vm_any(hits) ? kernel_curved_batch_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
 }
 
-static __attribute__((noinline)) unsigned kernel_polys_search(kernel_tile_trace *t, kernel_polys *h, int n)
+static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                     int n)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_polys_search_of, t, h, n);
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_search_of, t, h, n);
 }
 
 /* ---- batches ---- */
 
 /* The rays that wait are traced. */
-static __attribute__((noinline)) void kernel_polys_trace(kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    kernel_hex_rays_close(&h->rays);
-    kernel_polys_contract(t, h);
-    unsigned nearer = kernel_polys_known(t, h);
-    nearer |= kernel_polys_meet(t, h);
-    kernel_polys_cross(t, h);
-    kernel_hex_rays_close(&h->found);
-    kernel_hex_rays_close(&h->others);
-    nearer |= kernel_polys_hit(t, h);
-    for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_polys_search(t, h, n);
+    kernel_pixel_list_close(&h->rays);
+    kernel_curved_batch_contract(t, h);
+    unsigned nearer = kernel_curved_batch_known(t, h);
+    nearer |= kernel_curved_batch_meet(t, h);
+    kernel_curved_batch_cross(t, h);
+    kernel_pixel_list_close(&h->found);
+    kernel_pixel_list_close(&h->others);
+    nearer |= kernel_curved_batch_hit(t, h);
+    for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
     for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
     h->rays.count = 0;
 }
 
 /* A lane's rays, and its blocks, of the tile's. */
-SIMD_INLINE void kernel_polys_rays_of(kernel_tile_trace *t, kernel_polys *h, int lane, unsigned box, unsigned blocks)
+SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved_batch *h, int lane, unsigned box,
+                                             unsigned blocks)
 {
-    kernel_hex_rays_of(&h->rays, box, lane);
+    kernel_curved_rays_of(&h->rays, box, lane);
     for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_begin(t, __builtin_ctz(blocks));
-    if (h->rays.count >= KERNEL_HEX_RAYS) kernel_polys_trace(t, h);
+    if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
 /* The cells that wait are placed. */
-static __attribute__((noinline)) void kernel_polys_place(kernel_tile_trace *t, kernel_polys *h)
+static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
-    kernel_polys_pending *own = h->own;
+    kernel_curved_batch_pending *own = h->own;
     for (int n = own->count; n < SIMD_WIDTH; n++) {
         for (int i = 0; i < 8; i++) own->vertex[i][n] = own->vertex[i][0];
         own->isovalue[n] = own->isovalue[0];
     }
     const vm collapsed =
-        kernel_place_polys(&h->placed, &h->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
-    kernel_polys_bound(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
-    if (t->surface->layer->colour_map) kernel_polys_fetch_colours(t, h);
+        kernel_place_curved(&h->placed, &h->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
+    kernel_curved_batch_bound(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
+    if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     h->ready = 0;
     for (int n = 0; n < own->count; n++) {
         const unsigned blocks = own->blocks[n] & t->wanted & kernel_blocks_beyond(t, own->near[n]);
         if (!blocks) continue;
         if (!(vm_bits(collapsed) >> n & 1)) {
-            kernel_polys_rays_of(t, h, n, own->box[n], own->blocks[n]);
+            kernel_curved_batch_rays_of(t, h, n, own->box[n], own->blocks[n]);
             continue;
         }
-        kernel_poly_ready(h, n);
-        t->poly->is_set_up = false;
+        kernel_curved_ready(h, n);
+        t->curved->is_set_up = false;
         kernel_blocks_meet(t, blocks, h->part, own->cell[n], &h->cells[n], own->value[n]);
     }
 }
 
-static __attribute__((noinline)) void kernel_polys_run(kernel_tile_trace *t, kernel_polys *h, kernel_polys_pending *own)
+static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                              kernel_curved_batch_pending *own)
 {
     h->own = own;
-    kernel_polys_place(t, h);
-    if (h->rays.count) kernel_polys_trace(t, h);
+    kernel_curved_batch_place(t, h);
+    if (h->rays.count) kernel_curved_batch_trace(t, h);
     own->count = 0;
 }
 
 /* Traces the pending cells. */
-SIMD_INLINE void kernel_polys_end(kernel_tile_trace *t, kernel_polys *h)
+SIMD_INLINE void kernel_curved_batch_end(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     const int layer = t->layer;
     for (int n = 0; n < 3; n++) {
         if (!h->pending[n].count) continue;
         kernel_tile_set_layer(t, h->layer);
-        kernel_polys_run(t, h, &h->pending[n]);
+        kernel_curved_batch_run(t, h, &h->pending[n]);
         kernel_tile_set_layer(t, layer);
     }
 }
 
 /* Starts a new part and layer. */
-SIMD_INLINE void kernel_polys_turn(kernel_tile_trace *t, kernel_polys *h, const kernel_arrays *arrays, int part)
+SIMD_INLINE void kernel_curved_batch_turn(kernel_tile_trace *t, kernel_curved_batch *h, const kernel_arrays *arrays,
+                                          int part)
 {
     if (h->layer == t->layer && h->part == part) return;
-    kernel_polys_end(t, h);
+    kernel_curved_batch_end(t, h);
     h->layer = t->layer;
     h->part = part;
     h->arrays = *arrays;
@@ -634,17 +647,17 @@ SIMD_INLINE int kernel_box_pixels(unsigned box)
 }
 
 /* Can hexes, wedges and pyramids of the layer under way be traced in batches? */
-SIMD_INLINE bool kernel_polys_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
+SIMD_INLINE bool kernel_curved_batch_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
 {
     return arrays->has_lanes && t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
 }
 
 /* Adds a cell of the type to the pending ones. */
-SIMD_INLINE void kernel_polys_wait(kernel_tile_trace *t, kernel_polys *h, int type,
-                                   const kernel_tile_candidate *candidate, int value)
+SIMD_INLINE void kernel_curved_batch_wait(kernel_tile_trace *t, kernel_curved_batch *h, int type,
+                                          const kernel_tile_candidate *candidate, int value)
 {
-    kernel_polys_pending *own = &h->pending[kernel_shape_number(type)];
-    if (own->count == SIMD_WIDTH) kernel_polys_run(t, h, own);
+    kernel_curved_batch_pending *own = &h->pending[kernel_shape_number(type)];
+    if (own->count == SIMD_WIDTH) kernel_curved_batch_run(t, h, own);
     const int n = own->count++;
     own->cell[n] = candidate->cell;
     own->blocks[n] = candidate->blocks;

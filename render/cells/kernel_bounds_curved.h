@@ -2,8 +2,8 @@
  * what is asked, with a corner of the domain a lane; here lanes are cells, and the same operations in the same order
  * give the same answers. A slope that does not depend on all three of a corner's coordinates is computed once for the
  * corners that share it. */
-#ifndef RENDER_KERNEL_BOUNDS_POLYS_H
-#define RENDER_KERNEL_BOUNDS_POLYS_H
+#ifndef RENDER_KERNEL_BOUNDS_CURVED_H
+#define RENDER_KERNEL_BOUNDS_CURVED_H
 
 #include <math.h>
 #include <string.h>
@@ -25,14 +25,14 @@ typedef struct kernel_contractions {
 } kernel_contractions;
 
 /* Lane by lane what kernel_bounds has of a cell. */
-typedef struct kernel_polys_bounds {
+typedef struct kernel_curved_batch_bounds {
     float jump[SIMD_WIDTH]; /* less than nothing where the field is not known to be monotone; */
     /* there L and its thickness, which is infinite where that is of no use */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
     /* The cell lies between pairs of planes: low <= normal . (X - vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     kernel_contractions contractions;
-} kernel_polys_bounds;
+} kernel_curved_batch_bounds;
 
 /* Half of the lanes. */
 typedef struct kernel_bounds_lanes {
@@ -274,7 +274,7 @@ SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_hal
 
 /* The planes across J0's columns that the vertices lie between, widened by what a ray's places may be off. */
 SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int i, kernel_half pad, int half,
-                                    kernel_polys_bounds *out)
+                                    kernel_curved_batch_bounds *out)
 {
     kernel_half low = {0}, high = {0};
     for (int n = 1; n < grid_type_vertices(type); n++) {
@@ -378,7 +378,7 @@ static __attribute__((noinline)) void kernel_half_contraction(const kernel_bound
 
 /* kernel_bounds_linear(), with kernel_bounds_jump() and kernel_bounds_rise() of rays about (0, 0, 1). */
 SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
-                                    kernel_polys_bounds *out, int type)
+                                    kernel_curved_batch_bounds *out, int type)
 {
     const kernel_half zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
     kernel_bounds_lanes b;
@@ -439,14 +439,16 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
 }
 
 /* Lane by lane, of places in tile space and values. */
-static __attribute__((noinline)) void kernel_polys_bound(int type, const float at[4][8][SIMD_WIDTH],
-                                                         const kernel_beam *beam, kernel_polys_bounds *out)
+static __attribute__((noinline)) void kernel_curved_batch_bound(int type, const float at[4][8][SIMD_WIDTH],
+                                                                const kernel_beam *beam,
+                                                                kernel_curved_batch_bounds *out)
 {
     for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
 }
 
 /* The contraction of the first lane's cell. */
-SIMD_INLINE void kernel_polys_bounds_lane(const kernel_polys_bounds *b, int type, kernel_cell_contraction *out)
+SIMD_INLINE void kernel_curved_batch_bounds_lane(const kernel_curved_batch_bounds *b, int type,
+                                                 kernel_cell_contraction *out)
 {
     const kernel_contractions *c = &b->contractions;
     for (int i = 0; i < 3; i++) {

@@ -1,10 +1,10 @@
 /* Hexes, wedges or pyramids, one a lane, placed for a tile and given their lines: the operations of
- * kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_poly_lines(), and so the same bits, for as
- * many cells of one type at once as a vector has lanes. Vertices are turned into the order of coordinates first, so
+ * kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_curved_lines(), and so the same bits, for
+ * as many cells of one type at once as a vector has lanes. Vertices are turned into the order of coordinates first, so
  * that all else comes in order. What is computed in double is computed in two halves. A function's type is a constant
  * where it is called from, so that its loops have known lengths. */
-#ifndef RENDER_KERNEL_PLACED_HEXES_H
-#define RENDER_KERNEL_PLACED_HEXES_H
+#ifndef RENDER_KERNEL_PLACED_CURVED_H
+#define RENDER_KERNEL_PLACED_CURVED_H
 
 #include <math.h>
 #include <string.h>
@@ -18,8 +18,8 @@
 #include "simd.h"
 
 enum {
-    KERNEL_HEX_EDGES = 12,
-    KERNEL_HEX_FACES = 6,
+    KERNEL_CURVED_EDGES = 12,
+    KERNEL_CURVED_FACES = 6,
     KERNEL_MAX_TRIANGLES = 4, /* of a cell's faces */
 };
 
@@ -30,20 +30,20 @@ typedef struct kernel_triangle_lines {
 
 /* Cells of one type in lanes. A line's direction is the shape's: from an edge's first vertex to its second, and on a
  * quad from its loop's vertex 0 to 2, or 1 to 3 where it is turned. */
-typedef struct kernel_placed_polys {
+typedef struct kernel_placed_curved {
     float at[4][8][SIMD_WIDTH]; /* places in tile space, and the field less the isovalue, scaled */
     float c[KERNEL_MAX_LINES][SIMD_WIDTH], cu[KERNEL_MAX_LINES][SIMD_WIDTH], cv[KERNEL_MAX_LINES][SIMD_WIDTH];
     float doubt[SIMD_WIDTH];    /* the largest of the bounds */
     int32_t turned[SIMD_WIDTH]; /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
     /* face by face, four bits a corner: kernel_quad_corners() or kernel_triangle_order() */
-    int32_t corners[KERNEL_HEX_FACES * SIMD_WIDTH];
+    int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
     kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES]; /* from the shape's first triangle on, */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];         /* and kernel_triangle_least() */
-    /* for kernel_placed_poly_cell() */
+    /* for kernel_placed_curved_cell() */
     float bound[KERNEL_MAX_LINES][SIMD_WIDTH], least_of_all[SIMD_WIDTH];
     kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
-} kernel_placed_polys;
+} kernel_placed_curved;
 
 /* The number of a type's first face that is a triangle, and how many such faces there are, one after the other. */
 SIMD_INLINE int kernel_first_triangle(int type)
@@ -59,11 +59,11 @@ SIMD_INLINE int kernel_triangle_count(int type)
 /* ---- order ---- */
 
 /* Vertices on their way into order. */
-typedef struct kernel_turned_polys {
+typedef struct kernel_turned_curved {
     kernel_taken at[8][3];
     vf rank[8];
     vi vertex[8];
-} kernel_turned_polys;
+} kernel_turned_curved;
 
 SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
 {
@@ -72,7 +72,7 @@ SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
     *b = vf_select(lanes, was, *b);
 }
 
-SIMD_INLINE void kernel_turned_swap(kernel_turned_polys *h, bool is_narrow, vm lanes, int i, int j)
+SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm lanes, int i, int j)
 {
     const vi was = h->vertex[i];
     for (int a = 0; a < 3; a++) kernel_taken_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
@@ -82,7 +82,7 @@ SIMD_INLINE void kernel_turned_swap(kernel_turned_polys *h, bool is_narrow, vm l
 }
 
 /* kernel_rank_positions(), of vertices as they came. */
-SIMD_INLINE void kernel_turned_rank(kernel_turned_polys *h, bool is_narrow, int count)
+SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
@@ -95,7 +95,7 @@ SIMD_INLINE void kernel_turned_rank(kernel_turned_polys *h, bool is_narrow, int 
 }
 
 /* kernel_cell_turn() of a hex: the least vertex first, then the axes in the order of its neighbours. */
-SIMD_INLINE void kernel_turned_hex(kernel_turned_polys *h, bool is_narrow)
+SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
 {
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
@@ -116,7 +116,7 @@ SIMD_INLINE void kernel_turned_hex(kernel_turned_polys *h, bool is_narrow)
 }
 
 /* Turns a wedge: its least vertex comes first, then the lesser neighbour of that in its triangle. */
-SIMD_INLINE void kernel_turned_wedge(kernel_turned_polys *h, bool is_narrow)
+SIMD_INLINE void kernel_turned_wedge(kernel_turned_curved *h, bool is_narrow)
 {
     vm over = vm_none();
     for (int i = 3; i < 6; i++) over = vm_or(over, vf_eq(h->rank[i], vf_set(0)));
@@ -132,7 +132,7 @@ SIMD_INLINE void kernel_turned_wedge(kernel_turned_polys *h, bool is_narrow)
 }
 
 /* Turns a pyramid: the base's least vertex comes first, then its lesser neighbour in the base; the apex stays. */
-SIMD_INLINE void kernel_turned_pyramid(kernel_turned_polys *h, bool is_narrow)
+SIMD_INLINE void kernel_turned_pyramid(kernel_turned_curved *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
     const vm second = vf_eq(h->rank[1], least), third = vf_eq(h->rank[2], least), fourth = vf_eq(h->rank[3], least);
@@ -144,7 +144,7 @@ SIMD_INLINE void kernel_turned_pyramid(kernel_turned_polys *h, bool is_narrow)
     kernel_turned_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
 }
 
-SIMD_INLINE void kernel_turned_turn(kernel_turned_polys *h, bool is_narrow, int type)
+SIMD_INLINE void kernel_turned_turn(kernel_turned_curved *h, bool is_narrow, int type)
 {
     if (type == GRID_HEX)
         kernel_turned_hex(h, is_narrow);
@@ -155,7 +155,7 @@ SIMD_INLINE void kernel_turned_turn(kernel_turned_polys *h, bool is_narrow, int 
 }
 
 /* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face, or a triangle's edge. */
-SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_polys *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vm out = vm_none();
@@ -170,11 +170,11 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_polys *h, bool is_nar
 }
 
 /* Sets the vertices, their places and ranks; returns the lanes in which an edge has no length. */
-SIMD_INLINE vm kernel_turned_fetch(kernel_placed_polys *out, const kernel_arrays *p, bool is_narrow, int type,
+SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_arrays *p, bool is_narrow, int type,
                                    int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
 {
     const int count = grid_type_vertices(type);
-    kernel_turned_polys h;
+    kernel_turned_curved h;
     for (int i = 0; i < count; i++) {
         memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
         kernel_arrays_place(p, is_narrow, h.vertex[i], h.at[i]);
@@ -244,14 +244,14 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* The largest bound of kernel_poly_lines() over all lines, and that of kernel_line_blur(). */
+/* The largest bound of kernel_curved_lines() over all lines, and that of kernel_line_blur(). */
 typedef struct kernel_lanes_blur {
     vf doubt, error, extent;
 } kernel_lanes_blur;
 
 /* kernel_line_between(), and of cells with triangles kernel_line_blur(); which of the two is the first decides signs
  * alone. */
-SIMD_INLINE void kernel_placed_line_of(kernel_placed_polys *out, const kernel_frame *f, float radius, int type, int n,
+SIMD_INLINE void kernel_placed_line_of(kernel_placed_curved *out, const kernel_frame *f, float radius, int type, int n,
                                        const kernel_lanes_spot ends[2], kernel_lanes_blur *own)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -279,7 +279,7 @@ SIMD_INLINE void kernel_placed_line_of(kernel_placed_polys *out, const kernel_fr
 }
 
 /* kernel_quad_corners() of the loop, four bits a corner; odd_lanes: where that begins at the loop's vertex 1 or 3. */
-SIMD_INLINE vi kernel_hex_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
+SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
     /* The least of 0 and 2, of 1 and 3, and of all. */
@@ -299,12 +299,12 @@ SIMD_INLINE vi kernel_hex_quad_word(const signed char *loop, const vf rank[8], v
 }
 
 /* A quad's corners, and its diagonal. */
-SIMD_INLINE void kernel_placed_quad(kernel_placed_polys *out, int type, int face, const vf rank[8],
+SIMD_INLINE void kernel_placed_quad(kernel_placed_curved *out, int type, int face, const vf rank[8],
                                     const kernel_lanes_spot spots[8], kernel_lanes_spot ends[2])
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     vm odd;
-    const vi word = kernel_hex_quad_word(loop, rank, &odd);
+    const vi word = kernel_curved_quad_word(loop, rank, &odd);
     vi turned;
     memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
     memcpy(&turned, out->turned, sizeof turned);
@@ -348,7 +348,7 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
 }
 
 /* kernel_triangle_order() and kernel_triangle_least(), and the lines of its edges, whose blurs are given. */
-SIMD_INLINE void kernel_placed_triangle(kernel_placed_polys *out, int type, int face, const vf rank[8],
+SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int face, const vf rank[8],
                                         const kernel_lanes_blur *blurs)
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
@@ -387,8 +387,8 @@ SIMD_INLINE void kernel_blur_add(kernel_lanes_blur *most, int type, const kernel
     most->extent = vf_max(own->extent, most->extent);
 }
 
-/* kernel_poly_lines(). */
-SIMD_INLINE void kernel_placed_lines_of(kernel_placed_polys *out, const kernel_frame *f, const kernel_tile *tile,
+/* kernel_curved_lines(). */
+SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
                                         int type, const vf rank[8])
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -423,9 +423,9 @@ SIMD_INLINE void kernel_placed_lines_of(kernel_placed_polys *out, const kernel_f
 
 /* ---- all of it ---- */
 
-SIMD_INLINE vm kernel_place_polys_of(kernel_placed_polys *out, const kernel_arrays *p, const kernel_frame *f,
-                                     const kernel_tile *tile, int32_t vertices[8][SIMD_WIDTH],
-                                     const double isovalues[SIMD_WIDTH], int type)
+SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_arrays *p, const kernel_frame *f,
+                                      const kernel_tile *tile, int32_t vertices[8][SIMD_WIDTH],
+                                      const double isovalues[SIMD_WIDTH], int type)
 {
     const int count = grid_type_vertices(type);
     kernel_whole values[8];
@@ -451,12 +451,12 @@ SIMD_INLINE vm kernel_place_polys_of(kernel_placed_polys *out, const kernel_arra
 }
 
 /* The vertices of cells of one type, lane by lane. Returns the lanes in which an edge has no length. */
-static __attribute__((noinline)) vm kernel_place_polys(kernel_placed_polys *out, const kernel_arrays *p,
-                                                       const kernel_frame *f, const kernel_tile *tile,
-                                                       int32_t vertices[8][SIMD_WIDTH],
-                                                       const double isovalues[SIMD_WIDTH], int type)
+static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *out, const kernel_arrays *p,
+                                                        const kernel_frame *f, const kernel_tile *tile,
+                                                        int32_t vertices[8][SIMD_WIDTH],
+                                                        const double isovalues[SIMD_WIDTH], int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_place_polys_of, out, p, f, tile, vertices, isovalues);
+    return KERNEL_OF_TYPE(type, kernel_place_curved_of, out, p, f, tile, vertices, isovalues);
 }
 
 /* ---- one cell ---- */
@@ -469,8 +469,8 @@ SIMD_INLINE void kernel_placed_flip(kernel_line *line)
 }
 
 /* Lane n as a cell, with all that surfaces ask of it; its lines from the vertex of less rank. */
-static __attribute__((noinline)) void kernel_placed_poly_cell(const kernel_placed_polys *h, int type, int n,
-                                                              kernel_cell *c)
+static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_placed_curved *h, int type, int n,
+                                                                kernel_cell *c)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     c->type = type;
@@ -497,18 +497,18 @@ static __attribute__((noinline)) void kernel_placed_poly_cell(const kernel_place
 }
 
 /* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */
-typedef struct kernel_hex_crossed {
+typedef struct kernel_curved_crossed {
     vm two, alone;
     vi first, last;
-} kernel_hex_crossed;
+} kernel_curved_crossed;
 
 /* The faces that rays have crossed so far. */
-typedef struct kernel_hex_count {
+typedef struct kernel_curved_count {
     vm one, two, more;
     vf first, last;
-} kernel_hex_count;
+} kernel_curved_count;
 
-SIMD_INLINE void kernel_hex_count_face(kernel_hex_count *c, int face, vm once)
+SIMD_INLINE void kernel_curved_count_face(kernel_curved_count *c, int face, vm once)
 {
     const vf number = vf_set((float)face);
     c->more = vm_or(c->more, vm_and(c->two, once));
@@ -519,7 +519,7 @@ SIMD_INLINE void kernel_hex_count_face(kernel_hex_count *c, int face, vm once)
 }
 
 /* alone: the rays that are for the cell alone, whatever they cross. */
-SIMD_INLINE void kernel_hex_count_end(const kernel_hex_count *c, vm rays, vm alone, kernel_hex_crossed *out)
+SIMD_INLINE void kernel_curved_count_end(const kernel_curved_count *c, vm rays, vm alone, kernel_curved_crossed *out)
 {
     out->alone = vm_and(rays, vm_or(alone, c->more));
     out->two = vm_andnot(c->two, out->alone);
