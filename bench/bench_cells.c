@@ -181,10 +181,10 @@ static void time_new_values(bench_scene *s, int number, bench_series *series)
     bench_end(began, number, series);
 }
 
-static void print_cost(const bench_scene *s, const char *measure, const bench_series *series, double shown)
+static void print_cost(const bench_scene *s, const char *measure, bench_series *series, double shown)
 {
     double costs[BENCH_MAX_RUNS];
-    char name[96];
+    char name[112];
     for (int k = 0; k < series->count; k++) costs[k] = 1e9 * series->seconds[k] * s->subject.threads / shown;
     bench_print_series(&s->subject, measure, series);
     snprintf(name, sizeof name, "%s cost", measure);

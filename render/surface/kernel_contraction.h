@@ -216,12 +216,4 @@ SIMD_INLINE void kernel_contract_cell_of(const kernel_cell_contraction *c, const
     out->t += origin[2];
 }
 
-/* Decides rays of a packet in a cell, whose vertex 0 is given. */
-static __attribute__((noinline)) void kernel_contract_cell(const kernel_cell_contraction *c, const float vertex[3],
-                                                           int type, const kernel_rays *rays, vm wanted,
-                                                           kernel_contracted *out)
-{
-    KERNEL_OF_TYPE(type, kernel_contract_cell_of, c, vertex, rays, wanted, out);
-}
-
 #endif

@@ -206,6 +206,14 @@ static __attribute__((noinline)) void kernel_curved_contraction(const kernel_pac
     curved->has_contraction = true;
 }
 
+/* Decides rays of a packet in a cell, whose vertex 0 is given. */
+static __attribute__((noinline)) void kernel_contract_cell(const kernel_cell_contraction *c, const float vertex[3],
+                                                           int type, const kernel_rays *rays, vm wanted,
+                                                           kernel_contracted *out)
+{
+    KERNEL_OF_TYPE(type, kernel_contract_cell_of, c, vertex, rays, wanted, out);
+}
+
 /* Takes the crossings that a contraction knows (kernel_contraction.h); returns the rays that are decided by it. */
 static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel_surface_state *state,
                                                         const kernel_cell *c, kernel_curved *curved, vm rays)
