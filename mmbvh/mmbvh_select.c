@@ -184,7 +184,8 @@ MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, f
         uint64_t poisoned = 0, meeting = 0, p, m;
         int64_t i = 0;
         for (; i + 4 <= count && drawn; i += 4) {
-            for (int ahead = 0; ahead < 4; ahead += 2) fetch_ahead(s->g, first + i + ahead, how.shape);
+            for (int ahead = 0; ahead < 4; ahead += s->g->connectivity.is_wide ? 1 : 2)
+                fetch_ahead(s->g, first + i + ahead, how.shape);
             const four_ranges r =
                 how.wide_number ? read_four_doubles(s, first + i, how) : read_four_floats(s, first + i, how);
             find_four(s, &r, &p, &m);

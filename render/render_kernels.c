@@ -159,6 +159,16 @@ static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
     kernel_curved_batch_end(t, &m->curved_batch);
 }
 
+/* What a thread keeps from tile to tile: with what it finds cells down the trees, and the queue of those, or of binned
+ * ones. */
+typedef struct kernel_tile_search {
+    kernel_tile_finder nodes; /* the first member, as a tile has the address of it alone */
+    kernel_candidate_list list;
+    kernel_tile_trace *tile;
+    kernel_tile_queue queue;
+    kernel_candidate items[2 * SIMD_WIDTH];
+} kernel_tile_search;
+
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
 /* Prefetches what is read first of a cell: its vertices' indices, or its active record. */
@@ -208,9 +218,9 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {
-    kernel_tile_queue meeting;
+    kernel_tile_queue *queue = &((kernel_tile_search *)t->search)->queue;
     kernel_pending pending = {0};
-    kernel_tile_queue_begin(&meeting);
+    kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
             const kernel_tile_candidate *candidate = &q->items[i];
@@ -220,10 +230,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &meeting, &pending);
+            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, queue, &pending);
         }
-    kernel_tile_meet_pending(t, &meeting, &pending);
-    kernel_tile_queue_end(t, &meeting);
+    kernel_tile_meet_pending(t, queue, &pending);
+    kernel_tile_queue_end(t, queue);
 }
 
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
@@ -239,15 +249,6 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 }
 
 /* ---- isosurfaces in the cells that a tile finds itself ---- */
-
-/* What a thread finds cells with, and what they then go through. */
-typedef struct kernel_tile_search {
-    kernel_tile_finder nodes; /* the first member, as a tile has the address of it alone */
-    kernel_candidate_list list;
-    kernel_tile_trace *tile;
-    kernel_tile_queue queue;
-    kernel_candidate items[2 * SIMD_WIDTH];
-} kernel_tile_search;
 
 /* The blocks of a box of pixels. */
 SIMD_INLINE unsigned kernel_box_blocks(unsigned box)

@@ -207,6 +207,9 @@ static insitu_status check_job(const render_job *job, base_error *error)
     int values = 0;
     for (int i = 0; i < job->surface_count; i++) {
         values += job->surfaces[i].value_count;
+        if (job->surfaces[i].value_count < 1)
+            return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: %d isovalues, expected 1 or more", i,
+                             job->surfaces[i].value_count);
         if (job->surfaces[i].root_steps < 0 || job->surfaces[i].root_steps > 64)
             return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: %d root steps, expected 0 to 64", i,
                              job->surfaces[i].root_steps);
@@ -217,9 +220,10 @@ static insitu_status check_job(const render_job *job, base_error *error)
         if (job->surfaces[i].normal == RENDER_VERTEX && !job->surfaces[i].gradients)
             return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: no gradients at vertices were given", i);
     }
-    if (job->camera.width < 1 || job->camera.height < 1)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "image of %d x %d pixels, expected at least 1 x 1",
-                         job->camera.width, job->camera.height);
+    if (job->camera.width < 1 || job->camera.height < 1 || job->camera.width > UINT16_MAX ||
+        job->camera.height > UINT16_MAX)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "image of %d x %d pixels, expected 1 to %d on each side",
+                         job->camera.width, job->camera.height, UINT16_MAX);
     if (values > RENDER_MAX_ISOVALUES || job->volume_count > RENDER_MAX_VOLUMES || job->light_count > RENDER_MAX_LIGHTS)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%d isovalues, %d volumes, %d lights: at most %d, %d, %d",
                          values, job->volume_count, job->light_count, RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES,
@@ -326,8 +330,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     const insitu_status segments = prepare_segments(frame, error);
     if (segments != INSITU_OK) render_unprepare(frame);
     frame->by_tiles = job->traversal <= RENDER_TILES && !(frame->has_segments && frame->has_transparent);
-    const bool bins = frame->by_tiles && job->traversal == RENDER_BINNED && !job->pixels &&
-                      job->camera.width <= UINT16_MAX && job->camera.height <= UINT16_MAX;
+    const bool bins = frame->by_tiles && job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
     /* A tile's list of cells is used up by one turn. */
     frame->bins_volume =

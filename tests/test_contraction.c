@@ -8,7 +8,7 @@
  *
  * Depth: the last step of Newton's method begins at most KERNEL_CONTRACTION_END from the root, in the cell's
  * coordinates. f's second derivative is no more than some 4 K (its first one is K at the domain's corners, and 0 in the
- * middle), so with K <= 0.95 the step leaves 2 K / (1 - K) (4e-5)^2 = 6e-8 of r, which is as much of the cell's extent
+ * middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which is as much of the cell's extent
  * along the ray; t is rounded to half a unit, twice. */
 #include "kernel_bounds_curved.h"
 #include "kernel_contraction.h"

@@ -72,7 +72,8 @@ static inline double grid_array_number(const grid_array *a, int64_t i)
 static inline int64_t grid_array_index(const grid_array *a, int64_t i)
 {
     const char *p = a->data + i * a->stride;
-    return (a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p) - a->base;
+    const int64_t index = a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
+    return (int64_t)((uint64_t)index - (uint64_t)a->base); /* whatever the index is */
 }
 
 /* 0 for polyhedra and polygons, whose cells differ in it, and for numbers that are no type. */

@@ -310,8 +310,8 @@ typedef struct kernel_half_rates {
  * vertices' extents from vertex 0 and wide the most of a ray's |x| and |y| and of the vertices':
  * - y and w have some 4 u of |inverse| times wide across and times e, of inverse's own rounding among them: an eighth
  * of the 2e-6 that kernel_bounds.h takes for a face's places, and 3e-7 e.
- * - L and E have 4 u of 1, which values are below, of the gradient times wide across and e along the ray, and as much
- * for the gradient's own rounding: 5e-7. Over the field's slope, times |w|, that moves r.
+ * - L and E have 4 u of 2, which values are below (rim has a factor 2 for it), of the gradient times wide across and e
+ * along the ray, and as much for the gradient's own rounding: 5e-7. Over the field's slope, times |w|, that moves r.
  * - An iteration adds some units of r, and near a pyramid's apex k is no less than 1e-6: 1e-6.
  * Faces have their crossings within gap of the ray, and values within KERNEL_FACE_BAND of what the field is there
  * (kernel_bounds_jump()). Either moves the root by itself over 1 - K. rim is twice the sum. */

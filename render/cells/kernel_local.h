@@ -55,7 +55,7 @@ SIMD_INLINE int kernel_bent_terms(int type)
 }
 
 /* A number at the vertices as the terms' factors: in the middle, along r, bent. */
-SIMD_INLINE void kernel_curved_terms(const vf v[8], vf out[8])
+SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
 {
     const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
     const vf m0 = v[1] - v[0], m1 = v[2] - v[3], m2 = v[5] - v[4], m3 = v[6] - v[7];
@@ -101,7 +101,7 @@ SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
 SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 {
     if (type == GRID_HEX)
-        kernel_curved_terms(v, out);
+        kernel_hex_terms(v, out);
     else if (type == GRID_WEDGE)
         kernel_wedge_terms(v, out);
     else if (type == GRID_PYRAMID)
@@ -185,7 +185,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
     }
 }
 
-SIMD_INLINE void kernel_curved_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
 {
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
     vm is_least[8];
@@ -240,7 +240,7 @@ SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
 SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
 {
     if (type == GRID_HEX)
-        kernel_curved_turn(at, lists);
+        kernel_hex_turn(at, lists);
     else if (type == GRID_WEDGE)
         kernel_wedge_turn(at, lists);
     else

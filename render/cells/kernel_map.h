@@ -40,7 +40,7 @@ typedef struct kernel_map {
 } kernel_map;
 
 /* A hex's coefficients of its vertices' numbers: doubles, or vectors of them. */
-#define KERNEL_CURVED_FIT(c, v)                                                                                        \
+#define KERNEL_HEX_FIT(c, v)                                                                                           \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
         (c)[1] = (v)[1] - (v)[0];                                                                                      \
@@ -76,7 +76,7 @@ typedef struct kernel_map {
     do {                                                                                                               \
         if ((type) != GRID_HEX) memset(c, 0, 8 * sizeof *(c));                                                         \
         if ((type) == GRID_HEX)                                                                                        \
-            KERNEL_CURVED_FIT(c, v);                                                                                   \
+            KERNEL_HEX_FIT(c, v);                                                                                      \
         else if ((type) == GRID_WEDGE)                                                                                 \
             KERNEL_WEDGE_FIT(c, v);                                                                                    \
         else                                                                                                           \

@@ -8,7 +8,7 @@
  *
  * A tile's own traversal (kernel_tile_surface.h) looks at the same nodes as its neighbours and places the same cells,
  * most of which lie beside it. It is better where surfaces hide more cells than they show, for it sees none of what is
- * behind them: frames go back to it where too many cells show.
+ * behind them: opaque surfaces with several cells a pixel are traced so, and frames in which too many cells show.
  *
  * Boxes are of the outline projected (kernel_outline.h), widened by pads that are more than all rounding. Rays test
  * what boxes hold, so that the picture is that of any traversal, to the last bit. */

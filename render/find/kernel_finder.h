@@ -59,7 +59,7 @@ typedef struct kernel_crossed {
     int value; /* the isovalue, of all of them */
 } kernel_crossed;
 
-/* One subtree's search. */
+/* The search of one subtree, or of a tile. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
     const kernel_surface *surface;   /* NULL: */

@@ -140,7 +140,7 @@ static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32
     return sum;
 }
 
-/* ---- where volumes are ---------------------------------------------------------------------------------------- */
+/* ---- where cells are ---------------------------------------------------------------------------------------- */
 
 /* The first and the last place of something along columns or rows of pixels. */
 typedef struct span {
@@ -238,6 +238,7 @@ static bool measure_parts(const kernel_frame *f, double *pixels, double *cells)
         *pixels += (own[0].high - own[0].low) * (own[1].high - own[1].low);
     }
     *pixels = fmin(*pixels, (all[0].high - all[0].low) * (all[1].high - all[1].low));
+    *pixels = fmax(*pixels, KERNEL_TILE * KERNEL_TILE); /* parts are seen edge on */
     return true;
 }
 
@@ -252,11 +253,14 @@ bool render_surfaces_are_small(const kernel_frame *f)
     if (!(values * cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
         leaf_sample leaves = {0, 0};
+        double own = 0; /* cells of parts that have the field */
         for (int part = 0; part < f->job->part_count; part++) {
-            const double share = (double)f->job->parts[part].tree->cell_count / cells;
-            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * share), &leaves);
+            const double held = (double)f->job->parts[part].tree->cell_count;
+            if (!f->surfaces[s].layer->field.ranges[part].low) continue;
+            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / cells)), &leaves);
+            own += held;
         }
-        if (leaves.cells > 0) crossed += leaves.crossed / leaves.cells * cells;
+        if (leaves.cells > 0) crossed += leaves.crossed / leaves.cells * own;
     }
     return crossed > SMALL_CROSSED * pixels;
 }
@@ -275,7 +279,7 @@ void render_trees_cover(kernel_frame *f)
         size = fmax(2 + fabs((job->camera.eye[a] - job->space.origin[a]) * job->space.scale), size);
     for (int a = 0; a < 2; a++) {
         const double pad = 1 + 32 * 6e-8 * size / (least * job->space.scale) / fabs(a ? f->slope_dy : f->slope_dx);
-        const bool is_known = least > 0 && pad < 1e6;
+        const bool is_known = least > 0 && pad < 1e6 && isfinite(spans[a].low) && isfinite(spans[a].high);
         f->cover[a][0] = is_known ? (int)fmin(fmax(spans[a].low - pad, 0), most[a] + 1) : 0;
         f->cover[a][1] = is_known ? (int)fmax(fmin(spans[a].high + pad, most[a]), -1) : most[a];
     }

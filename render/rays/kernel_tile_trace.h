@@ -225,7 +225,7 @@ typedef struct kernel_pixel_list {
 } kernel_pixel_list;
 
 /* Lists a ray for each pixel of a box, row by row, for the cell in the lane. */
-SIMD_INLINE void kernel_curved_rays_of(kernel_pixel_list *rays, unsigned box, int lane)
+SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box, int lane)
 {
     static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     typedef uint8_t kernel_row_bytes __attribute__((vector_size(KERNEL_TILE)));

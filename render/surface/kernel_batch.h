@@ -1,4 +1,4 @@
-/* Tets, as many at once as there are lanes, in a tile that traces what is binned there:
+/* Tets, as many at once as there are lanes, in a tile that traces what is binned there, or finds it itself:
  *
  *     lanes are cells:     fetched, ordered, placed, edge functions' lines          (once a batch)
  *     lanes are pixels:    each with the lines of its own cell                      (cells of few pixels)

@@ -21,9 +21,9 @@
  *             has none. With q = f(q) moved to the nearest place of D, that is the case wherever f(q) is outside.
  *
  * What else is rounding. f is computed to blur: of places, and of the field times |w| / |grad L . d|. Faces tell where
- * a crossing is to their own rounding, which moves a root by no more than rim, over 1 - K. A root is taken where it is
- * inside by more than that, and left out where all that is wider by rim has none; what is nearer to a face is for the
- * faces. So this agrees with them, in this cell and in the next one. */
+ * a crossing is to their own rounding, which moves a root by no more than rim, in which 1 / (1 - K) is counted. A root
+ * is taken where it is inside by more than that, and left out where all that is wider by rim has none; what is nearer
+ * to a face is for the faces. So this agrees with them, in this cell and in the next one. */
 #ifndef RENDER_KERNEL_CONTRACTION_H
 #define RENDER_KERNEL_CONTRACTION_H
 
@@ -131,8 +131,9 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
     return inside * (type == GRID_HEX ? 1.0f : 0.7f);
 }
 
-/* Rays on which s at q says that there is no root in D. 8 blur is 2 blur times |s| + 2, |s| being less than what one in
- * a thousand of |s|^2 leaves room for. */
+/* Rays on which s at q says that there is no root in D. A root needs
+ * |s| of two diameters of D at most, so 8 blur is no less than 2 blur times |s| + 2; what is beyond has room in a
+ * thousandth of |s|^2. */
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);

@@ -1,7 +1,7 @@
 /* Hexes, wedges and pyramids, as many of one type at once as there are lanes, in a tile that traces what is binned
- * there. A cell of a few pixels leaves most of a block's packet without anything to do, and of the rays in it a half
- * has no crossing to look for. So rays of several cells are put side by side, and what goes on of them is put side by
- * side again:
+ * there, or finds it itself. A cell of a few pixels leaves most of a block's packet without anything to do, and of the
+ * rays in it a half has no crossing to look for. So rays of several cells are put side by side, and what goes on of
+ * them is put side by side again:
  *
  *     pixels of boxes       is the one crossing known, or none?     kernel_contraction.h
  *     undecided rays        which faces does the ray cross?         signs of edge functions
@@ -576,7 +576,7 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
 SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved_batch *h, int lane, unsigned box,
                                              unsigned blocks)
 {
-    kernel_curved_rays_of(&h->rays, box, lane);
+    kernel_pixel_list_add_box(&h->rays, box, lane);
     for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_begin(t, __builtin_ctz(blocks));
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }

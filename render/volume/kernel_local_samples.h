@@ -251,7 +251,7 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
-        kernel_curved_rays_of(&b->rays, box, n);
+        kernel_pixel_list_add_box(&b->rays, box, n);
         if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_cast(t, b, types[queue]);
     }
     kernel_local_cast(t, b, types[queue]);
@@ -386,7 +386,7 @@ static unsigned kernel_tet_samples(kernel_tile_trace *t, kernel_local_batch *b, 
         if (columns * rows > KERNEL_TET_PIXELS)
             others |= 1u << n;
         else
-            kernel_curved_rays_of(&b->rays, box, n);
+            kernel_pixel_list_add_box(&b->rays, box, n);
     }
     kernel_tet_samples_cast(t, b);
     return others;

@@ -551,7 +551,7 @@ static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trac
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
-        kernel_curved_rays_of(&b->rays, box, n);
+        kernel_pixel_list_add_box(&b->rays, box, n);
         if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_segments_cast(t, b, q, type);
     }
     kernel_local_segments_cast(t, b, q, type);

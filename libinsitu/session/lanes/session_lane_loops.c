@@ -321,7 +321,8 @@ LANE_INLINE int64_t run(const lane_cells *cells, lane_sums *sums, int64_t *alone
         const int64_t end = cell + BLOCK_CELLS < cells->count ? cell + BLOCK_CELLS : cells->count;
         const int64_t next = measure(&s, cell, end, &bounds, volumes);
         if (!add_sizes(volumes, next - cell, &sizes)) {
-            *alone = next - cell;
+            for (const double *good = volumes; add_sizes(good, LANES, &sizes); good += LANES) cell += LANES;
+            *alone = LANES;
             break;
         }
         cell = next;

@@ -4,7 +4,7 @@
 
 static const lane_loops *loops_of(cpu_isa isa)
 {
-#if defined(__x86_64__)
+#ifdef SESSION_HAS_X86
     if (isa == CPU_AVX512) return &session_lanes_avx512;
     if (isa == CPU_AVX2) return &session_lanes_avx2;
 #endif

@@ -90,12 +90,28 @@ static bool is_flat_everywhere(int type, double points[][3])
     return is_flat(sum / of.shares, box_volume(points, grid_type_vertices(type)));
 }
 
+/* The cube root as lanes have it (session_lane_loops.c): a library's would take longer than the volume. */
+MMBVH_INLINE double cell_size(double volume)
+{
+    if (!(volume > 1e-280 && volume < 1e280)) return cbrt(volume);
+    uint64_t bits;
+    double y;
+    memcpy(&bits, &volume, sizeof bits);
+    bits = (((bits >> 32) * 0x55555556 >> 32) + 0x2a9f7893) << 32;
+    memcpy(&y, &bits, sizeof y);
+    for (int step = 0; step < 2; step++) {
+        const double cube = y * y * y;
+        y *= (cube + 2 * volume) / (2 * cube + volume);
+    }
+    return y;
+}
+
 /* 0 of a flat cell, whatever sign and size rounding left it. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn++;
     tally->inverted += volume < 0;
-    tally->sizes += cbrt(fabs(volume));
+    tally->sizes += cell_size(fabs(volume));
 }
 
 MMBVH_INLINE void tally_shell(mesh_tally *tally)
@@ -199,7 +215,7 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
     const grid_array *offsets = &mesh->cells.offsets;
     if (!offsets->data) return true;
     const int64_t first = grid_array_index(offsets, cell), next = grid_array_index(offsets, cell + 1);
-    return first >= 0 && next <= mesh->topology.connectivity_count && next - first == count;
+    return first >= 0 && next >= first && next <= mesh->topology.connectivity_count && next - first == count;
 }
 
 /* The vertices' positions; false where an index is out of range or, of a drawn cell, a coordinate is not finite. */
@@ -262,9 +278,10 @@ MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64
  * one. */
 static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
-    lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     *alone = alike->count;
-    if (alike->count < LANES || !run) return 0;
+    if (alike->count < LANES) return 0;
+    lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
+    if (!run) return 0;
     lane_sums sums;
     const int64_t taken = run(alike, &sums, alone);
     mesh_tally part = {.drawn = taken, .inverted = sums.inverted, .sizes = sums.sizes};
