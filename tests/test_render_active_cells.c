@@ -13,7 +13,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-enum { WIDTH = 64, HEIGHT = 50, TET_BYTES = 64, HEX_BYTES = 128, MOST_BYTES = 64 << 20 };
+enum { WIDTH = 45, HEIGHT = 35, TET_BYTES = 64, HEX_BYTES = 128, MOST_BYTES = 64 << 20 };
 
 static const double three_values[3] = {-0.2, 0.1, 0.6}, one_value[1] = {0.3};
 static const double origin[3] = {0, 0, 0};
@@ -129,7 +129,7 @@ static void plain_meshes_are_kept_and_draw_the_same(void **state)
             const double *values = variant & 1 ? three_values : one_value;
             render_fixture f;
             render_active_cells *kept = render_active_cells_create();
-            lattice(&f, plain_kinds[i], variant & 4 ? 6 : 4, variant & 2 ? interleaved : narrow, test_wave);
+            lattice(&f, plain_kinds[i], variant & 4 ? 5 : 3, variant & 2 ? interleaved : narrow, test_wave);
             fixture_add_surface(&f, values, count, 1);
             f.surfaces[0].root = RENDER_ROBUST;
             assert_int_equal(render_active_cells_bytes(kept), 0);
@@ -242,7 +242,7 @@ static void subsets_of_pixels_and_other_traversals_draw_the_same(void **state)
     for (int i = 0; i < 2; i++) {
         render_fixture f;
         render_active_cells *kept = render_active_cells_create();
-        lattice(&f, plain_kinds[i], 6, narrow, test_wave);
+        lattice(&f, plain_kinds[i], 4, narrow, test_wave);
         fixture_look(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
         fixture_add_surface(&f, three_values, 3, 1);
         for (int turn = 0; turn < 2; turn++) {
@@ -377,8 +377,8 @@ static void layers_of_two_fields_draw_the_same(void **state)
                 render_fixture f;
                 other_field other;
                 render_active_cells *kept = render_active_cells_create();
-                lattice(&f, plain_kinds[i], 6, narrow, test_wave);
-                other_field_create(&f, plain_kinds[i], 6, test_linear, &other);
+                lattice(&f, plain_kinds[i], 4, narrow, test_wave);
+                other_field_create(&f, plain_kinds[i], 4, test_linear, &other);
                 fixture_set_volume(&f, 0.3);
                 if (c < BOTH_OPAQUE_VOLUME) f.job.volume_count = 0;
                 const bool is_transparent = c == ONE_TRANSPARENT || c == ONE_TRANSPARENT_VOLUME;
@@ -415,8 +415,8 @@ static void layers_are_told_apart(void **state)
         other_field other;
         render_active_cells *kept = render_active_cells_create();
         int64_t expected = 0;
-        lattice(&f, plain_kinds[i], 6, narrow, test_wave);
-        other_field_create(&f, plain_kinds[i], 6, test_linear, &other);
+        lattice(&f, plain_kinds[i], 4, narrow, test_wave);
+        other_field_create(&f, plain_kinds[i], 4, test_linear, &other);
         fixture_add_surface(&f, one_value, 1, 1);
         const test_view view = {f.views[0].cells, other.field, {0}};
         for (int turn = 0; turn < 8; turn++) {
@@ -735,8 +735,8 @@ static void failing_allocations_are_survived(void **state)
             other_field other;
             fragment_list expected;
             int64_t n = 1;
-            lattice(&f, plain_kinds[i], 6, narrow, test_wave);
-            other_field_create(&f, plain_kinds[i], 6, test_linear, &other);
+            lattice(&f, plain_kinds[i], 4, narrow, test_wave);
+            other_field_create(&f, plain_kinds[i], 4, test_linear, &other);
             fixture_add_surface(&f, three_values, 3, 1);
             fixture_add_surface(&f, one_value, 1, 1);
             f.surfaces[1].field = (render_field){&other.field, &other.ranges};

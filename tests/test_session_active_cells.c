@@ -135,7 +135,7 @@ static void add_image(char *text, size_t size, int n, const char *layers)
 {
     static const char *const directions[IMAGES] = {"[1, 0.8, 1.2]", "[-1, 0.3, 0.5]", "[0.2, -1, -0.6]"};
     snprintf(text + strlen(text), size - strlen(text),
-             "  - {name: i%d, size: [53, 41], camera: {automatic: {direction: %s}}, layers: [%s],\n"
+             "  - {name: i%d, size: [103, 81], camera: {automatic: {direction: %s}}, layers: [%s],\n"
              "     outputs: [{path: i%d.exr}]}\n",
              n, directions[n], layers, n);
 }
