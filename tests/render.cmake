@@ -60,7 +60,7 @@ set_tests_properties(render_isa PROPERTIES TIMEOUT 120)
 insitu_render_program(test_partition_mpi)
 insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)
 insitu_render_program(test_overlap_mpi)
-insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 4 7)
+insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 7) # 4 ranks: in the long test alone
 foreach(ranks 1 2 3 4 7)
   insitu_add_long_test(overlap_whole_np${ranks} ${CMAKE_COMMAND} -E env ${INSITU_TEST_ENVIRONMENT} INSITU_TEST_WHOLE=1
     ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:test_overlap_mpi>)
