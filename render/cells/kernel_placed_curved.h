@@ -51,11 +51,6 @@ SIMD_INLINE int kernel_first_triangle(int type)
     return type == GRID_PYRAMID ? 1 : 0;
 }
 
-SIMD_INLINE int kernel_triangle_count(int type)
-{
-    return type == GRID_HEX ? 0 : type == GRID_WEDGE ? 2 : 4;
-}
-
 /* ---- order ---- */
 
 /* Vertices on their way into order. */
