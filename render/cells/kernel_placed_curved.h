@@ -45,7 +45,7 @@ typedef struct kernel_placed_curved {
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_placed_curved;
 
-/* The number of a type's first face that is a triangle, and how many such faces there are, one after the other. */
+/* The number of a type's first face that is a triangle; its others follow. */
 SIMD_INLINE int kernel_first_triangle(int type)
 {
     return type == GRID_PYRAMID ? 1 : 0;
