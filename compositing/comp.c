@@ -145,13 +145,17 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     return status;
 }
 
-static insitu_status begin(composition *c, int threads, base_error *error)
+/* Gives the fragments back where it fails. */
+static insitu_status begin(composition *c, fragment_list *items, int threads, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(c->group->comm, &ranks);
     const insitu_status status = comp_check_size(c->out, error);
     c->statistics->has_failed = status != INSITU_OK;
-    if (status) return status;
+    if (status) {
+        give_back(items);
+        return status;
+    }
     c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
     c->grid = comp_grid_of((uint32_t)c->out->width, (uint32_t)c->out->height, ranks);
     c->grid.threads = threads > 0 ? threads : omp_get_max_threads();
@@ -207,10 +211,8 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     *statistics = (comp_statistics){0};
     composition c = composition_of(group, background, out, statistics);
     int64_t none = 0;
-    const insitu_status status = begin(&c, threads, error);
-    if (!status) return composite(&c, items, &none, error);
-    give_back(items);
-    return status;
+    const insitu_status status = begin(&c, items, threads, error);
+    return status ? status : composite(&c, items, &none, error);
 }
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
@@ -237,11 +239,8 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
     composition c = composition_of(group, background, out, statistics);
     base_error here = {INSITU_OK, ""};
     if (!error) error = &here;
-    insitu_status status = begin(&c, threads, error);
-    if (status) {
-        give_back(items);
-        return status;
-    }
+    insitu_status status = begin(&c, items, threads, error);
+    if (status) return status;
     c.merged.overlaps = base_calloc(pixel_set_bytes(pixel_count(&c)), 1);
     if (!c.merged.overlaps && !error->status)
         base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",

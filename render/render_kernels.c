@@ -185,7 +185,7 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
     for (int at = 0; at < active->vertices * KERNEL_ACTIVE_FLOATS; at += 16) __builtin_prefetch(record + at);
 }
 
-/* Cells whose vertices' indices are being prefetched, or that are traced alone. */
+/* Cells whose vertices' indices are being prefetched. */
 typedef struct kernel_pending {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
@@ -250,17 +250,6 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 
 /* ---- isosurfaces in the cells that a tile finds itself ---- */
 
-/* The blocks of a box of pixels. */
-SIMD_INLINE unsigned kernel_box_blocks(unsigned box)
-{
-    const unsigned x0 = (box & 15) / KERNEL_BLOCK, x1 = (box >> 4 & 15) / KERNEL_BLOCK;
-    const unsigned y0 = (box >> 8 & 15) / KERNEL_BLOCK, y1 = (box >> 12) / KERNEL_BLOCK;
-    static const uint16_t spread[1 << KERNEL_BLOCKS_ACROSS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
-                                                               0x0110, 0x0111, 0x1000, 0x1001, 0x1010, 0x1011,
-                                                               0x1100, 0x1101, 0x1110, 0x1111};
-    return ((2u << x1) - (1u << x0)) * spread[(2u << y1) - (1u << y0)];
-}
-
 /* Puts the cells found so far on their way to the rays. */
 static bool kernel_tile_find_take(kernel_candidate_list *list)
 {
@@ -270,15 +259,10 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
         const kernel_candidate *found = &list->items[n];
         int part;
         const int value = kernel_tile_source(t, found->source, &part);
-        const unsigned box = (unsigned)(found->x0 - t->tile.x0) | (unsigned)(found->x1 - t->tile.x0) << 4 |
-                             (unsigned)(found->y0 - t->tile.y0) << 8 | (unsigned)(found->y1 - t->tile.y0) << 12;
-        const kernel_tile_candidate candidate = {.near = found->near,
-                                                 .far = found->far,
-                                                 .cell = found->cell,
-                                                 .source = found->source,
-                                                 .blocks = (uint16_t)kernel_box_blocks(box),
-                                                 .box = (uint16_t)box};
-        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, box, found->near))
+        const kernel_tile_candidate candidate =
+            kernel_candidate_in_tile(found, kernel_span_in_tile(found->x0, found->x1, t->tile.x0),
+                                     kernel_span_in_tile(found->y0, found->y1, t->tile.y0));
+        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
             kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
     }
     list->count = 0;

@@ -5,6 +5,36 @@
 #include "kernel_types.h"
 #include "simd.h"
 
+/* A row's or a column's pixels in a tile, from its first one on. */
+typedef struct kernel_tile_span {
+    unsigned first, last;
+} kernel_tile_span;
+
+/* Cuts pixels first .. last to the tile that begins at a pixel. */
+static inline kernel_tile_span kernel_span_in_tile(int first, int last, int begin)
+{
+    const int from = first - begin, to = last - begin;
+    return (kernel_tile_span){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
+}
+
+/* Returns the pixels' blocks as bits. */
+static inline unsigned kernel_span_blocks(kernel_tile_span s)
+{
+    return ~0u << s.first / KERNEL_BLOCK & ((2u << s.last / KERNEL_BLOCK) - 1);
+}
+
+static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, kernel_tile_span columns,
+                                                             kernel_tile_span rows)
+{
+    return (kernel_tile_candidate){
+        .near = c->near,
+        .far = c->far,
+        .cell = c->cell,
+        .source = c->source,
+        .blocks = (uint16_t)kernel_blocks_at(kernel_span_blocks(columns), kernel_span_blocks(rows)),
+        .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
+}
+
 /* The cells that the tile has of a picture's; returns how many they are. */
 SIMD_INLINE int kernel_bin(const kernel_frame *f, kernel_tile_candidate *candidates, const uint32_t *starts, int x0,
                            int y0, kernel_tile_candidate **items)

@@ -153,9 +153,9 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* Finds the pixels between the ends, of so many. Returns false where there are none. The pad, a part in 1e5 of the cell
- * and its place and a hundredth of a pixel, is more than rays are off by that hit by a rounding. blur is the error of
- * the places. */
+/* Finds the pixels between the ends, of those from one to another. Returns false where there are none. The pad, a part
+ * in 1e5 of the cell and its place and a hundredth of a pixel, is more than rays are off by that hit by a rounding.
+ * blur is the error of the places. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {

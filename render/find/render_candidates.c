@@ -3,6 +3,7 @@
  * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
  * hidden: there a million may be listed in any case. */
 #include "render_candidates.h"
+#include "kernel_bins.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_kernels.h"
@@ -15,7 +16,7 @@
 #include "memory.h"
 #include "mmbvh.h"
 
-enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
+enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
 /* So many cells a pixel that their tree covers are small; of surfaces, cells in leaves that isovalues may cross
  * (docs/decisions/find.md). */
@@ -82,45 +83,15 @@ static int64_t tile_count(const kernel_frame *f)
     return tiles_across(f) * ((f->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE);
 }
 
-/* Cuts pixels first .. last of a row or column to its n-th tile. */
-typedef struct within {
-    unsigned first, last;
-} within;
-
-static within within_tile(int first, int last, int tile)
-{
-    const int from = first - tile * KERNEL_TILE, to = last - tile * KERNEL_TILE;
-    return (within){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
-}
-
-/* Returns the pixels' blocks as bits. */
-static unsigned bits_of(within w)
-{
-    return ~0u << w.first / KERNEL_BLOCK & ((2u << w.last / KERNEL_BLOCK) - 1);
-}
-
-static kernel_tile_candidate shown_within(const kernel_candidate *s, within columns, within rows)
-{
-    /* A tile's rows of blocks, a bit each in the column of the first blocks. */
-    static const uint16_t spread[1 << BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
-                                                 0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
-    return (kernel_tile_candidate){
-        .near = s->near,
-        .far = s->far,
-        .cell = s->cell,
-        .source = s->source,
-        .blocks = (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
-        .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
-}
-
 /* Bins the cells; at[tile] is the place of the tile's next one. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
         for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++) {
-            const within rows = within_tile(s->y0, s->y1, y);
+            const kernel_tile_span rows = kernel_span_in_tile(s->y0, s->y1, y * KERNEL_TILE);
             for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
-                out[at[y * across + x]++] = shown_within(s, within_tile(s->x0, s->x1, x), rows);
+                out[at[y * across + x]++] =
+                    kernel_candidate_in_tile(s, kernel_span_in_tile(s->x0, s->x1, x * KERNEL_TILE), rows);
         }
 }
 
@@ -183,21 +154,36 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans
     return least;
 }
 
+/* What parts cover of the picture. */
+typedef struct coverage {
+    double cells;
+    double pixels; /* summed over the parts' boxes */
+    span all[2];   /* of all boxes */
+} coverage;
+
+/* Measures the parts that have ranges, of a field or, NULL, all. False where one is not all before the eye. */
+static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, coverage *out)
+{
+    *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
+    for (int part = 0; part < f->job->part_count; part++) {
+        const mmbvh *tree = f->job->parts[part].tree;
+        span own[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+        if ((ranges && !ranges[part].low) || !tree->node_count) continue;
+        if (!(widen_by_tree(f, tree, own) > 0)) return false;
+        for (int a = 0; a < 2; a++)
+            out->all[a] = (span){fmin(own[a].low, out->all[a].low), fmax(own[a].high, out->all[a].high)};
+        out->cells += (double)tree->cell_count;
+        out->pixels += (own[0].high - own[0].low) * (own[1].high - own[1].low);
+    }
+    return true;
+}
+
 /* Are the volume's cells so small that to list them costs more than it spares? A listed cell is fetched twice, once for
  * its pixels and once for its samples; tiles that go down the trees themselves fetch it once. */
 static bool is_of_small_cells(const kernel_frame *f)
 {
-    const render_job *job = f->job;
-    double cells = 0, pixels = 0;
-    for (int part = 0; part < job->part_count; part++) {
-        const mmbvh *tree = job->parts[part].tree;
-        span spans[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
-        if (!job->volumes[0].field.ranges[part].low || !tree->node_count) continue;
-        if (!(widen_by_tree(f, tree, spans) > 0)) return false;
-        cells += (double)tree->cell_count;
-        pixels += (spans[0].high - spans[0].low) * (spans[1].high - spans[1].low);
-    }
-    return cells > SMALL_CELLS * pixels;
+    coverage c;
+    return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
 }
 
 /* Counts of cells in leaves: all that were looked at, and those that isovalues may cross, each isovalue counted. */
@@ -223,41 +209,25 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
     }
 }
 
-/* The pixels that the parts cover, about, and the number of their cells; false where one is not all before the eye. */
-static bool measure_parts(const kernel_frame *f, double *pixels, double *cells)
-{
-    span all[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
-    *pixels = *cells = 0;
-    for (int part = 0; part < f->job->part_count; part++) {
-        const mmbvh *tree = f->job->parts[part].tree;
-        span own[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
-        if (!tree->node_count) continue;
-        if (!(widen_by_tree(f, tree, own) > 0)) return false;
-        widen_by_tree(f, tree, all);
-        *cells += (double)tree->cell_count;
-        *pixels += (own[0].high - own[0].low) * (own[1].high - own[1].low);
-    }
-    *pixels = fmin(*pixels, (all[0].high - all[0].low) * (all[1].high - all[1].low));
-    *pixels = fmax(*pixels, KERNEL_TILE * KERNEL_TILE); /* parts are seen edge on */
-    return true;
-}
-
 /* Where opaque surfaces have several cells a pixel most are hidden, or between pixels: tiles that go down the trees
  * themselves fetch fewer. */
 bool render_surfaces_are_small(const kernel_frame *f)
 {
-    double pixels, cells, crossed = 0;
+    coverage c;
+    double crossed = 0;
     int values = 0;
-    if (f->has_transparent || !measure_parts(f, &pixels, &cells)) return false;
+    if (f->has_transparent || !measure_parts(f, NULL, &c)) return false;
+    const double all = (c.all[0].high - c.all[0].low) * (c.all[1].high - c.all[1].low);
+    const double pixels = fmax(fmin(c.pixels, all), KERNEL_TILE * KERNEL_TILE); /* parts may be seen edge on */
     for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
-    if (!(values * cells > SMALL_CROSSED * pixels)) return false;
+    if (!(values * c.cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
         leaf_sample leaves = {0, 0};
         double own = 0; /* cells of parts that have the field */
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;
-            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / cells)), &leaves);
+            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / c.cells)), &leaves);
             own += held;
         }
         if (leaves.cells > 0) crossed += leaves.crossed / leaves.cells * own;

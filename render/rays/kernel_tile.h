@@ -217,10 +217,8 @@ static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, c
 /* Returns the blocks for which the body is on the inner side of all borders. */
 SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
 {
-    static const uint16_t spread[KERNEL_BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
-                                                   0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
     const unsigned inner = s.above & s.below >> 1;
-    return (inner & 15) * spread[inner >> KERNEL_ROWS_LANE & 15];
+    return kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
 /* Adds the bits of the lanes where low <= 0, and where high >= 0. */

@@ -184,6 +184,16 @@ typedef struct kernel_tile_candidate {
     uint16_t blocks, box;
 } kernel_tile_candidate;
 
+/* The tile's blocks that are in these columns and rows of blocks, a bit each. */
+static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
+{
+    /* A bit for each row, in the column of the first blocks. */
+    static const uint16_t spread[1 << KERNEL_TILE / KERNEL_BLOCK] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
+                                                                     0x0110, 0x0111, 0x1000, 0x1001, 0x1010, 0x1011,
+                                                                     0x1100, 0x1101, 0x1110, 0x1111};
+    return columns * spread[rows];
+}
+
 /* A list is a chain of chunks, none of which moves. */
 typedef struct kernel_candidate_chunk {
     struct kernel_candidate_chunk *before;

@@ -417,6 +417,18 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
     normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
 }
 
+/* Takes hits of the rays found, from n on. */
+SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curved_batch *h, int n,
+                                              const kernel_curved_packet *p, const kernel_map_lanes *map,
+                                              const kernel_point *at, vm hit)
+{
+    kernel_curved_batch_places places;
+    places.t = at->t;
+    kernel_curved_batch_normal(t, map, at->r, places.normal);
+    memcpy(places.r, at->r, sizeof places.r);
+    return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
+}
+
 /* kernel_polish() and kernel_curved_accept(). */
 SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
@@ -425,7 +437,6 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         kernel_curved_packet p;
         kernel_map_lanes map;
         kernel_point ends[2], at;
-        kernel_curved_batch_places places;
         kernel_curved_packet_begin(&p, t, &h->found, n);
         for (int e = 0; e < 2; e++) {
             ends[e].t = vf_load(h->found_ends.t[e] + n);
@@ -437,11 +448,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
             nearer |= kernel_curved_batch_alone(t, h, &h->found, n, p.at, vm_bits(open));
-        if (!vm_any(hit)) continue;
-        kernel_curved_batch_normal(t, &map, at.r, places.normal);
-        places.t = at.t;
-        memcpy(places.r, at.r, sizeof places.r);
-        nearer |= kernel_curved_batch_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
+        if (vm_any(hit)) nearer |= kernel_curved_batch_take(t, h, n, &p, &map, &at, hit);
     }
     return nearer;
 }
@@ -459,18 +466,13 @@ SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_c
         kernel_curved_packet p;
         kernel_map_lanes map;
         kernel_point at;
-        kernel_curved_batch_places places;
         kernel_curved_packet_begin(&p, t, &h->found, n);
         at.t = vf_load(h->found_ends.t[0] + n);
         for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
         kernel_curved_maps(h, type, p.lane, &map);
         kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
         const vm hit = vm_and(p.active, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        if (!vm_any(hit)) continue;
-        kernel_curved_batch_normal(t, &map, at.r, places.normal);
-        places.t = at.t;
-        memcpy(places.r, at.r, sizeof places.r);
-        nearer |= kernel_curved_batch_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
+        if (vm_any(hit)) nearer |= kernel_curved_batch_take(t, h, n, &p, &map, &at, hit);
     }
     return nearer;
 }

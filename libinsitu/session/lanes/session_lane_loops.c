@@ -244,13 +244,10 @@ LANE_INLINE int64_t measure(const lane_source *s, int64_t begin, int64_t end, la
 
 /* ---- sizes --------------------------------------------------------------------------------------------------- */
 
-/* A third of the upper bits is near the cube root, to 0.033, since a double's bits are its logarithm to within 0.09. A
- * step of Halley's method cubes the error: two leave 2.1e-5 of it cubed, then rounding. */
 LANE_INLINE doubles cube_root(doubles x)
 {
-    const uint32_t third = 0x55555556, offset = 0x2a9f7893; /* offset: two thirds of 1.0's, less the mantissa's part */
-    doubles y = (doubles)((((((bits)x >> 32) * third) >> 32) + offset) << 32);
-    for (int step = 0; step < 2; step++) {
+    doubles y = (doubles)((((((bits)x >> 32) * CUBE_ROOT_THIRD) >> 32) + CUBE_ROOT_OFFSET) << 32);
+    for (int step = 0; step < CUBE_ROOT_STEPS; step++) {
         const doubles cube = y * y * y;
         y *= (cube + 2 * x) / (2 * cube + x);
     }

@@ -97,9 +97,9 @@ MMBVH_INLINE double cell_size(double volume)
     uint64_t bits;
     double y;
     memcpy(&bits, &volume, sizeof bits);
-    bits = (((bits >> 32) * 0x55555556 >> 32) + 0x2a9f7893) << 32;
+    bits = (((bits >> 32) * CUBE_ROOT_THIRD >> 32) + CUBE_ROOT_OFFSET) << 32;
     memcpy(&y, &bits, sizeof y);
-    for (int step = 0; step < 2; step++) {
+    for (int step = 0; step < CUBE_ROOT_STEPS; step++) {
         const double cube = y * y * y;
         y *= (cube + 2 * volume) / (2 * cube + volume);
     }
