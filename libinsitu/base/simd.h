@@ -371,6 +371,63 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
+/* Stores indices for scalar loads. Compilers would take them from the vector's lanes instead, by two instructions each.
+ */
+SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
+{
+    memcpy(out, &a, sizeof a);
+#if defined(__GNUC__)
+    __asm__("" : "+m"(*(int32_t(*)[SIMD_WIDTH])out));
+#endif
+}
+
+/* base[index + n] to out[n], for n from 0 to 3. Rows of four are loaded whole and transposed, which takes fewer
+ * instructions than gathering their columns. */
+SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDTH], vf out[4])
+{
+#if defined(SIMD_AVX512)
+    __m512 row[4];
+    for (int i = 0; i < 4; i++) {
+        row[i] = _mm512_castps128_ps512(_mm_loadu_ps(base + index[i]));
+        row[i] = _mm512_insertf32x4(row[i], _mm_loadu_ps(base + index[i + 4]), 1);
+        row[i] = _mm512_insertf32x4(row[i], _mm_loadu_ps(base + index[i + 8]), 2);
+        row[i] = _mm512_insertf32x4(row[i], _mm_loadu_ps(base + index[i + 12]), 3);
+    }
+    const __m512d a = _mm512_castps_pd(_mm512_unpacklo_ps(row[0], row[1]));
+    const __m512d b = _mm512_castps_pd(_mm512_unpackhi_ps(row[0], row[1]));
+    const __m512d c = _mm512_castps_pd(_mm512_unpacklo_ps(row[2], row[3]));
+    const __m512d d = _mm512_castps_pd(_mm512_unpackhi_ps(row[2], row[3]));
+    out[0] = (vf)_mm512_castpd_ps(_mm512_unpacklo_pd(a, c));
+    out[1] = (vf)_mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
+    out[2] = (vf)_mm512_castpd_ps(_mm512_unpacklo_pd(b, d));
+    out[3] = (vf)_mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
+#elif defined(SIMD_AVX2)
+    __m256 row[4];
+    for (int i = 0; i < 4; i++)
+        row[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base + index[i])),
+                                      _mm_loadu_ps(base + index[i + 4]), 1);
+    const __m256d a = _mm256_castps_pd(_mm256_unpacklo_ps(row[0], row[1]));
+    const __m256d b = _mm256_castps_pd(_mm256_unpackhi_ps(row[0], row[1]));
+    const __m256d c = _mm256_castps_pd(_mm256_unpacklo_ps(row[2], row[3]));
+    const __m256d d = _mm256_castps_pd(_mm256_unpackhi_ps(row[2], row[3]));
+    out[0] = (vf)_mm256_castpd_ps(_mm256_unpacklo_pd(a, c));
+    out[1] = (vf)_mm256_castpd_ps(_mm256_unpackhi_pd(a, c));
+    out[2] = (vf)_mm256_castpd_ps(_mm256_unpacklo_pd(b, d));
+    out[3] = (vf)_mm256_castpd_ps(_mm256_unpackhi_pd(b, d));
+#elif defined(SIMD_SSE42)
+    __m128 row[4];
+    for (int i = 0; i < 4; i++) row[i] = _mm_loadu_ps(base + index[i]);
+    _MM_TRANSPOSE4_PS(row[0], row[1], row[2], row[3]);
+    for (int i = 0; i < 4; i++) out[i] = (vf)row[i];
+#else
+    for (int n = 0; n < 4; n++) {
+        float column[SIMD_WIDTH];
+        for (int i = 0; i < SIMD_WIDTH; i++) column[i] = base[index[i] + n];
+        out[n] = vf_load(column);
+    }
+#endif
+}
+
 /* Doubles, a lane for each of a half of a vf's; a whole is two of these. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 

@@ -61,9 +61,14 @@ SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
     const vf whole = vf_min(vf_floor(place), vf_set((float)(t->colour_count - 2)));
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;
-    vf c[6]; /* of two entries */
-    for (int i = 0; i < 6; i += 2) vf_gather_pair(t->colours + i, index, &c[i], &c[i + 1]);
-    for (int a = 0; a < 3; a++) out[a] = c[a] + part * (c[a + 3] - c[a]);
+    int32_t at[SIMD_WIDTH];
+    vf first[4], last[4]; /* of the six numbers of two entries */
+    vi_store(at, index);
+    vf_gather_rows(t->colours, at, first);
+    vf_gather_rows(t->colours + 2, at, last);
+    out[0] = first[0] + part * (first[3] - first[0]);
+    out[1] = first[1] + part * (last[2] - first[1]);
+    out[2] = first[2] + part * (last[3] - first[2]);
 }
 
 SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)

@@ -75,14 +75,14 @@ typedef struct kernel_steep {
     bool is_narrow;
 } kernel_steep;
 
-/* A bin of the sums (kernel_preintegral.h), in units; read as ten floats. */
+/* A bin of the sums (kernel_preintegral.h), in units; read as rows of four floats. sums are the extinction's, and those
+ * of the emission in three channels. */
 typedef struct kernel_pre_entry {
-    struct {
-        int32_t before; /* of all bins before it */
-        float own;
-    } sums[4];      /* the extinction's, and those of the emission in three channels */
+    int32_t before[4]; /* of all bins before it */
+    float own[4];
     int32_t colour; /* at its middle, 10 bits a channel */
     float rough;    /* by how much extinction and emission vary in it, as light */
+    float unused[2];
 } kernel_pre_entry;
 
 typedef struct kernel_preintegral {

@@ -18,6 +18,7 @@
 #define RENDER_KERNEL_CURVED_BATCH_H
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "grid.h"
@@ -482,20 +483,28 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_known_of, t, h);
 }
 
+_Static_assert(offsetof(kernel_bounds, coarsest) == offsetof(kernel_bounds, inverse) + 13 * sizeof(float) &&
+                   offsetof(kernel_bounds, inverse) + 16 * sizeof(float) <= sizeof(kernel_bounds),
+               "the inverse and what follows it are read as rows of four");
+
 /* kernel_limits_spread(), each lane with its own cell's. */
 SIMD_INLINE void kernel_curved_batch_limits(const kernel_curved_batch *h, vi lane, kernel_limits *out)
 {
-    const vi at = lane * (int)(sizeof(kernel_curved) / sizeof(float));
     const kernel_bounds *b = &h->curved[0].bounds;
+    int32_t at[SIMD_WIDTH];
+    vf row[4][4]; /* of the inverse and what follows it */
+    vi_store(at, lane * (int)(sizeof(kernel_curved) / sizeof(float)));
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 8; j++) out->bent[i][j] = j < 4 ? vf_set(0) : vf_gather(&b->bent[i].c[j], at);
-        for (int a = 0; a < 3; a++) out->inverse[i][a] = vf_gather(&b->inverse[i][a], at);
+        for (int j = 0; j < 4; j++) out->bent[i][j] = vf_set(0);
+        vf_gather_rows(&b->bent[i].c[4], at, out->bent[i] + 4);
     }
-    out->stretch = vf_gather(&b->stretch, at);
-    out->slope = vf_gather(&b->slope, at);
-    out->curve = vf_gather(&b->curve, at);
-    out->twist = vf_gather(&b->twist, at);
-    out->coarsest = vf_gather(&b->coarsest, at);
+    for (int i = 0; i < 4; i++) vf_gather_rows(&b->inverse[0][0] + 4 * i, at, row[i]);
+    for (int i = 0; i < 9; i++) out->inverse[i / 3][i % 3] = row[i / 4][i % 4];
+    out->stretch = row[2][1];
+    out->slope = row[2][2];
+    out->curve = row[2][3];
+    out->twist = row[3][0];
+    out->coarsest = row[3][1];
     out->is_monotone = vf_le(vf_set(0), kernel_curved_take(h->bounds.jump, lane));
 }
 

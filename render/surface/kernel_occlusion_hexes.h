@@ -32,7 +32,8 @@ SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occ
 
 /* Rays in lanes: the origin and the shear along each one's own axes. */
 typedef struct kernel_plumb_lanes {
-    int32_t index[3][SIMD_WIDTH]; /* where the record has the coordinate along kx, ky, kz of its first vertex */
+    int32_t record[SIMD_WIDTH]; /* where it begins */
+    float axis[SIMD_WIDTH];     /* kz; kx and ky follow it in turn */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
 } kernel_plumb_lanes;
 
@@ -41,10 +42,9 @@ SIMD_INLINE void kernel_pair_ray(const kernel_straight *ray, int32_t record, int
     kernel_plumb p;
     kernel_plumb_axes(ray, &p);
     const int axes[3] = {p.kx, p.ky, p.kz};
-    for (int a = 0; a < 3; a++) {
-        out->index[a][lane] = record * KERNEL_CURVED_RECORD_WORDS + axes[a];
-        out->origin[a][lane] = ray->origin[axes[a]];
-    }
+    out->record[lane] = record * KERNEL_CURVED_RECORD_WORDS;
+    out->axis[lane] = (float)p.kz;
+    for (int a = 0; a < 3; a++) out->origin[a][lane] = ray->origin[axes[a]];
     out->shear[0][lane] = p.shear_x;
     out->shear[1][lane] = p.shear_y;
     out->stretch[lane] = p.stretch;
@@ -59,23 +59,27 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 }
 
 /* Vertices as their rays see them: across it x and y, with the ray at the origin, and along it the distance. */
-SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays,
-                                    vi record)
+SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays)
 {
     kernel_placed_curved *h = &pairs->placed;
+    const vm along_x = vf_eq(vf_load(rays->axis), vf_set(0)), along_y = vf_eq(vf_load(rays->axis), vf_set(1));
+    vf words[2][4];
     for (int i = 0; i < 8; i++) {
-        vf at[3];
-        for (int a = 0; a < 3; a++)
-            at[a] = vf_gather(hexes, kernel_load_ints(rays->index[a]) + 4 * i) - vf_load(rays->origin[a]);
+        vf row[4], at[3];
+        vf_gather_rows(hexes + 4 * i, rays->record, row);
+        for (int a = 0; a < 3; a++) {
+            const vf turned = vf_select(along_x, row[(a + 1) % 3], vf_select(along_y, row[(a + 2) % 3], row[a]));
+            at[a] = turned - vf_load(rays->origin[a]);
+        }
         vf_store(h->at[0][i], at[0] - at[2] * vf_load(rays->shear[0]));
         vf_store(h->at[1][i], at[1] - at[2] * vf_load(rays->shear[1]));
         vf_store(h->at[2][i], at[2] * vf_load(rays->stretch));
-        vf_store(h->at[3][i], vf_gather(hexes, record + (4 * i + 3)));
+        vf_store(h->at[3][i], row[3]);
     }
+    for (int i = 0; i < 2; i++) vf_gather_rows(hexes + KERNEL_CURVED_RECORD_QUADS + 4 * i, rays->record, words[i]);
     for (int face = 0; face < KERNEL_CURVED_FACES; face++)
-        vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH),
-                 vf_gather(hexes, record + (KERNEL_CURVED_RECORD_QUADS + face)));
-    vf_store((float *)(void *)h->turned, vf_gather(hexes, record + KERNEL_CURVED_RECORD_TURNED));
+        vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
+    vf_store((float *)(void *)h->turned, words[1][KERNEL_CURVED_RECORD_TURNED - KERNEL_CURVED_RECORD_QUADS - 4]);
 }
 
 /* The edge function of the ray itself, its sign exact: products of float32 are, in double. */
@@ -178,16 +182,13 @@ static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o
                                                        kernel_curved_pairs *pairs)
 {
     kernel_plumb_lanes rays;
-    int32_t record[SIMD_WIDTH];
     bool is_well = true;
     if (!pairs->count) return true;
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const int from = i < pairs->count ? i : 0;
-        record[i] = o->cells[pairs->occluder[from]].record;
-        kernel_pair_ray(&s->rays[pairs->ray[from]], record[i], i, &rays);
-        record[i] *= KERNEL_CURVED_RECORD_WORDS;
+        kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, &rays);
     }
-    kernel_pairs_place(pairs, o->hexes, &rays, kernel_load_ints(record));
+    kernel_pairs_place(pairs, o->hexes, &rays);
     kernel_pairs_lines(&pairs->placed);
     const vm active = vm_from_bits((1u << pairs->count) - 1);
     const kernel_pair_verdict verdict = kernel_pairs_judge(pairs, active, vf_load(rays.far));

@@ -55,18 +55,19 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
 {
     const vf y = (value - t->low) * t->inverse + 1.0f;
     const float *entries = (const float *)t->entries;
-    vf colour;
+    vf before[4], rest[4];
     e->value = value;
     e->bin = vf_clamp(vf_floor(y), vf_set(0), vf_set((float)(t->bin_count + 1)));
     e->place = y - e->bin;
     const vi index = vi_from_vf(e->bin) * (int)(sizeof *t->entries / sizeof(float));
-    for (int i = 0; i < 4; i++) {
-        vf before;
-        vf_gather_pair(entries + 2 * i, index, &before, &e->own[i]);
-        e->before[i] = vi_from_bits(before);
-    }
-    vf_gather_pair(entries + 8, index, &colour, &e->rough);
-    e->colour = vi_from_bits(colour);
+    int32_t at[SIMD_WIDTH];
+    vi_store(at, index);
+    vf_gather_rows(entries, at, before);
+    vf_gather_rows(entries + 4, at, e->own);
+    vf_gather_rows(entries + 8, at, rest);
+    for (int i = 0; i < 4; i++) e->before[i] = vi_from_bits(before[i]);
+    e->rough = rest[1];
+    e->colour = vi_from_bits(rest[0]);
 }
 
 /* 1 - exp(-y), and that over y. Near 0 by its own series, whose first term left out is y^6 / 5040. */

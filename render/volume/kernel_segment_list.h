@@ -229,11 +229,6 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
     return vf_gather(&list->items[0][0].t_in + member, item);
 }
 
-SIMD_INLINE vf kernel_doubles_gather(const kernel_segments *list, int member, vi item)
-{
-    return vf_gather(&list->precise[0][0].length + member, item);
-}
-
 /* Rays whose two segments begin at one place, and the first of them, of no length in float32, ends there. */
 static __attribute__((noinline, cold)) vm kernel_segments_tied(const kernel_segments *list, vm same, vi item,
                                                                vi earlier)

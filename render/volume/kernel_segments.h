@@ -94,14 +94,18 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         const vi item = sorted.item[n];
         const vm has = vm_and(vf_lt(t_in, vf_set(INFINITY)), vf_lt(vf_set(KERNEL_DARK), b->light));
         if (!vm_any(has)) break;
-        const vf t_out = kernel_items_gather(list, 1, item);
-        kernel_run run = kernel_run_of((t_out - t_in) * list->per_t, kernel_items_gather(list, 2, item),
-                                       kernel_items_gather(list, 3, item));
+        int32_t items[SIMD_WIDTH];
+        vf segment[4], precise[4];
+        vi_store(items, item);
+        vf_gather_rows(&list->items[0][0].t_in, items, segment);
+        const vf t_out = segment[1];
+        kernel_run run = kernel_run_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
         kernel_light light = kernel_clear();
         if (list->is_double) {
-            run.length = kernel_doubles_gather(list, 0, item) * list->per_t;
-            run.rest_in = kernel_doubles_gather(list, 1, item);
-            run.rest_out = kernel_doubles_gather(list, 2, item);
+            vf_gather_rows(&list->precise[0][0].length, items, precise);
+            run.length = precise[0] * list->per_t;
+            run.rest_in = precise[1];
+            run.rest_out = precise[2];
         }
         if (pieces->preintegral)
             light = kernel_preintegrated(pieces, has, &run, &end);
@@ -133,8 +137,8 @@ SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 SIMD_INLINE kernel_blend kernel_blend_begin(void)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    return (kernel_blend){
-        vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one, zero, one};
+    return (kernel_blend){vm_none(),          zero, zero, zero, zero, {zero, zero, zero}, one, zero,
+                          {zero, zero, zero}, one,  zero, one};
 }
 
 #endif

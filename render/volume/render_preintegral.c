@@ -160,8 +160,8 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
         for (int n = 0; n < CHANNELS; n++) {
             const int32_t begin = (int32_t)(before[n] / units[n > 0]);
             before[n] += bin->sum[n];
-            e->sums[n].before = begin;
-            e->sums[n].own = (float)((int32_t)(before[n] / units[n > 0]) - begin);
+            e->before[n] = begin;
+            e->own[n] = (float)((int32_t)(before[n] / units[n > 0]) - begin);
         }
         e->colour = pack_colour(bin, contrast);
         const double rounding = 2 * (units[0] * contrast + units[1]) / width; /* what is nothing has none */
