@@ -29,9 +29,6 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
     return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
 }
 
-/* Below this the products' errors may be too small for float32. */
-#define KERNEL_EDGE_LEAST 1e-30f
-
 /* Decides e on rays on which it is all but zero. Its sign is taken in double, where products of float32 are exact. Its
  * size is too little beside that of any other edge to matter, but not all weights may be zero. Where e is zero the tie
  * is decided as kernel_cell.h has it, and the sign of the zero says how. */

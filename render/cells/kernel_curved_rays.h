@@ -63,7 +63,7 @@ SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_
         vf_muladd(kernel_curved_take(h->cv[n], p->lane), p->v,
                   vf_muladd(kernel_curved_take(h->cu[n], p->lane), p->u, kernel_curved_take(h->c[n], p->lane)));
     s->least = vf_min(vf_abs(e), s->least);
-    s->negative[n] = vm_sign(vi_from_bits(e));
+    s->side[n] = vi_from_bits(e);
 }
 
 SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
@@ -99,28 +99,29 @@ SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel
                                      kernel_curved_crossed *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_curved_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
     kernel_curved_sides sides;
     vf x[8], y[8];
+    vi faces = vi_set(0);
     kernel_curved_sides_of(h, p, type, &sides);
     vm alone = vm_not(vf_lt(kernel_curved_take(h->doubt, p->lane), sides.least));
     kernel_curved_project(h, p, grid_type_vertices(type), x, y);
     const vi turned = vi_from_bits(kernel_curved_take((const float *)(const void *)h->turned, p->lane));
     for (int face = 0; face < shape->face_count; face++) {
-        vm around[4], once;
+        vi around[4], once;
         kernel_face_sides(shape, face, &sides, around);
         if (shape->faces[face].count == 3) {
-            once = vm_andnot(p->active, vm_or(vm_xor(around[0], around[1]), vm_xor(around[1], around[2])));
+            once = kernel_sides_agree(around, 3);
         } else {
-            const vm turn = vm_sign(turned << (31 - face));
-            const vm outside = vm_and(p->active, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
+            const vm turn = vm_sign(turned << (31 - face)), diagonal = vm_sign(sides.side[shape->edge_count + face]);
+            const vm side[4] = {vm_sign(around[0]), vm_sign(around[1]), vm_sign(around[2]), vm_sign(around[3])};
+            const vm outside = vm_and(p->active, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
             const signed char *loop = shape->faces[face].vertices;
-            once = vm_and(p->active, kernel_halves_once_turned(around, turn, sides.negative[shape->edge_count + face]));
-            alone = vm_or(alone, kernel_curved_bends(x, y, loop, outside, around[0], around[3]));
+            once = vi_select(kernel_halves_once_turned(side, turn, diagonal), vi_set(-1), vi_set(0));
+            alone = vm_or(alone, kernel_curved_bends(x, y, loop, outside, side[0], side[3]));
         }
-        kernel_curved_count_face(&count, face, once);
+        faces |= kernel_face_bit(once, face);
     }
-    kernel_curved_count_end(&count, p->active, alone, out);
+    kernel_curved_count(faces, p->active, alone, out);
 }
 
 /* The place where rays cross a face, as kernel_quad_crossings() or kernel_triangle_crossing() finds it. */

@@ -454,6 +454,81 @@ static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *ou
     return KERNEL_OF_TYPE(type, kernel_place_curved_of, out, p, f, tile, vertices, isovalues);
 }
 
+/* ---- faces that look convex ----
+ *
+ * Seen along a ray, a quad's corners turn all one way, or it looks folded or dented. Where they do, the ray crosses the
+ * quad once if it is on one side of all four edges, else never: neither the quad's diagonal nor how its patch bends
+ * has to be asked (kernel_quad.h). The turn at a corner is p × q of the edges p and q there, as projected, and this is
+ * N · (u, v, 1) with their normal N and the ray's slopes u and v. So over a box of rays it keeps its sign where
+ *
+ *     |N · middle| > |Nx| half width + |Ny| half height + what rounding may do.
+ *
+ * Rounding: let l be the longest edge as projected, |x| + |y| + (|u| + |v|) |z|, and S a bound of places less origins
+ * plus slopes times depth. A vertex projected in float32 is off by 2 units (6e-8) of S at most, d = 1.2e-7 S; a turn of
+ * such vertices by 2 d on each coordinate of both edges, 4 d l + 8 d d. What is computed here is the sum of products
+ * whose sizes add up to l l, each rounded 10 times at most: 6e-7 l l. Products below KERNEL_EDGE_LEAST say nothing. */
+
+/* Rays' slopes and origins across the view, from the lesser to the larger. */
+typedef struct kernel_ray_box {
+    vf slope[2][2], origin[2][2];
+} kernel_ray_box;
+
+/* What rounding may do to a turn, of all of a cell's quads. */
+SIMD_INLINE vf kernel_turn_margin(vf (*const at)[8], const kernel_ray_box *box, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    vf most[3] = {vf_set(0), vf_set(0), vf_set(0)}, steep[2], length = vf_set(0);
+    for (int i = 0; i < grid_type_vertices(type); i++)
+        for (int a = 0; a < 3; a++) most[a] = vf_max(vf_abs(at[a][i]), most[a]);
+    for (int a = 0; a < 2; a++) {
+        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
+        most[a] += vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1])) + steep[a] * most[2];
+    }
+    for (int n = 0; n < shape->edge_count; n++) {
+        const int a = shape->edges[n][0], b = shape->edges[n][1];
+        const vf along = vf_abs(at[2][b] - at[2][a]) * (steep[0] + steep[1]);
+        length = vf_max((vf_abs(at[0][b] - at[0][a]) + vf_abs(at[1][b] - at[1][a])) + along, length);
+    }
+    const vf off = 1.25e-7f * vf_max(most[0], most[1]);
+    return (1e-6f * length * length + 4.0f * off * length) + (8.0f * off * off + KERNEL_EDGE_LEAST);
+}
+
+/* Lanes whose quad looks convex along all rays of the box. */
+SIMD_INLINE vm kernel_quad_is_convex(vf (*const at)[8], const signed char *loop, const kernel_ray_box *box, vf margin)
+{
+    vf edge[4][3], middle[2], half[2];
+    vm left = vm_all_lanes(), right = vm_all_lanes();
+    for (int a = 0; a < 2; a++) {
+        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
+        half[a] = 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
+    }
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < 3; a++) edge[i][a] = at[a][(int)loop[(i + 1) & 3]] - at[a][(int)loop[i]];
+    for (int i = 0; i < 4; i++) {
+        const vf *p = edge[i], *q = edge[(i + 1) & 3];
+        const vf x = p[1] * q[2] - p[2] * q[1], y = p[2] * q[0] - p[0] * q[2], z = p[0] * q[1] - p[1] * q[0];
+        const vf turn = z + (x * middle[0] + y * middle[1]);
+        const vf spread = (vf_abs(x) * half[0] + vf_abs(y) * half[1]) + margin;
+        left = vm_and(left, vf_lt(spread, turn));
+        right = vm_and(right, vf_lt(spread, -turn));
+    }
+    return vm_or(left, right);
+}
+
+/* Bits of the quads that may look other than convex along some ray of the box. */
+SIMD_INLINE vi kernel_curved_dents(vf (*const at)[8], const kernel_ray_box *box, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    const vf margin = kernel_turn_margin(at, box, type);
+    vi dents = vi_set(0);
+    for (int face = 0; face < shape->face_count; face++) {
+        if (shape->faces[face].count == 3) continue;
+        const vm convex = kernel_quad_is_convex(at, shape->faces[face].vertices, box, margin);
+        dents |= vi_select(convex, vi_set(0), vi_set(1 << face));
+    }
+    return dents;
+}
+
 /* ---- one cell ---- */
 
 SIMD_INLINE void kernel_placed_flip(kernel_line *line)
@@ -497,29 +572,20 @@ typedef struct kernel_curved_crossed {
     vi first, last;
 } kernel_curved_crossed;
 
-/* The faces that rays have crossed so far. */
-typedef struct kernel_curved_count {
-    vm one, two, more;
-    vf first, last;
-} kernel_curved_count;
-
-SIMD_INLINE void kernel_curved_count_face(kernel_curved_count *c, int face, vm once)
+/* The number of the least bit that is set; of 0 whatever. */
+SIMD_INLINE vi kernel_least_bit(vi bits)
 {
-    const vf number = vf_set((float)face);
-    c->more = vm_or(c->more, vm_and(c->two, once));
-    c->two = vm_or(c->two, vm_and(c->one, once));
-    c->first = vf_select(vm_andnot(once, c->one), number, c->first);
-    c->last = vf_select(once, number, c->last);
-    c->one = vm_or(c->one, once);
+    return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* alone: the rays that are for the cell alone, whatever they cross. */
-SIMD_INLINE void kernel_curved_count_end(const kernel_curved_count *c, vm rays, vm alone, kernel_curved_crossed *out)
+/* faces: bits of those that each ray crosses once. alone: the rays that are for the cell alone, whatever they cross. */
+SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm alone, kernel_curved_crossed *out)
 {
-    out->alone = vm_and(rays, vm_or(alone, c->more));
-    out->two = vm_andnot(c->two, out->alone);
-    out->first = vi_from_vf(c->first);
-    out->last = vi_from_vf(c->last);
+    const vi others = faces & (faces - 1), more = others & (others - 1);
+    out->alone = vm_and(rays, vm_or(alone, vm_sign(-more)));
+    out->two = vm_andnot(vm_and(rays, vm_sign(-others)), out->alone);
+    out->first = kernel_least_bit(faces);
+    out->last = kernel_least_bit(others);
 }
 
 #endif

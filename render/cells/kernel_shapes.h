@@ -70,19 +70,37 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
     return &kernel_shapes[kernel_shape_number(type)];
 }
 
-/* A cell's lines on the rays: the sides of each, and the least of all. */
+/* Below this the errors of an edge function's products may be too small for float32. */
+#define KERNEL_EDGE_LEAST 1e-30f
+
+/* A cell's lines on the rays: the sides of each, whose sign bits are set where they are negative, and the least of all
+ * by size. */
 typedef struct kernel_curved_sides {
-    vm negative[KERNEL_MAX_LINES];
+    vi side[KERNEL_MAX_LINES];
     vf least;
 } kernel_curved_sides;
 
-/* Tells on which rays the sides of a face's edges, taken around it, are negative. */
-SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_curved_sides *s, vm around[4])
+/* The sides of a face's edges, taken around it; of a triangle the fourth is any. */
+SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_curved_sides *s, vi around[4])
 {
-    for (int i = 0; i < shape->faces[face].count; i++) {
+    for (int i = 0; i < 4; i++) {
         const signed char *edge = shape->faces[face].sides[i];
-        around[i] = edge[1] ? vm_not(s->negative[(int)edge[0]]) : s->negative[(int)edge[0]];
+        around[i] = edge[1] ? ~s->side[(int)edge[0]] : s->side[(int)edge[0]];
     }
+}
+
+/* Tells by its sign bit which rays are on the same side of all edges of a face of count. */
+SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
+{
+    vi differ = (around[0] ^ around[1]) | (around[1] ^ around[2]);
+    if (count == 4) differ |= around[2] ^ around[3];
+    return ~differ;
+}
+
+/* The bit of a face where the sign bit is set. */
+SIMD_INLINE vi kernel_face_bit(vi sign, int face)
+{
+    return sign >> (31 - face) & vi_set(1 << face);
 }
 
 /* Returns the own coordinate on an axis, 0 or 1, of each ray's corner. */

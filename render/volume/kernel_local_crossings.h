@@ -23,6 +23,7 @@
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
+    float dents[SIMD_WIDTH]; /* kernel_curved_dents() over the pixels of the cell */
 } kernel_local_faces;
 
 /* ---- cells ---- */
@@ -50,10 +51,28 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
         for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
 }
 
-/* lists: places, the field and ranks by vertex. */
-SIMD_INLINE void kernel_local_faces_of(vf (*const lists)[8], int type, kernel_local_faces *out)
+/* Rays of the tile from the first to the last of columns and rows, lane by lane. */
+SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], kernel_ray_box *out)
+{
+    const vf first = vf_set(0), last = vf_set(KERNEL_TILE - 1);
+    for (int n = 0; n < 4; n++) {
+        const int a = n / 2, end = n % 2;
+        vi at;
+        memcpy(&at, ends[n], sizeof at);
+        at = vi_from_vf(vf_clamp(vf_from_vi(at), first, last));
+        out->slope[a][end] = kernel_batch_of_tile(a ? tile->slope_y : tile->slope_x, at);
+        out->origin[a][end] = kernel_batch_of_tile(a ? tile->origin_y : tile->origin_x, at);
+    }
+}
+
+/* lists: places, the field and ranks by vertex. ends: kernel_local_pixels(). */
+SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists)[8], int32_t ends[4][SIMD_WIDTH],
+                                       int type, kernel_local_faces *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
+    kernel_ray_box box;
+    kernel_local_ray_box(tile, ends, &box);
+    vf_store(out->dents, vf_from_bits(kernel_curved_dents(lists, &box, type)));
     for (int n = 0; n < 4; n++)
         for (int i = 0; i < grid_type_vertices(type); i++) vf_store(out->at[n][i], lists[n][i]);
     for (int face = 0; face < shape->face_count; face++) {
@@ -85,38 +104,52 @@ SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_loca
     }
 }
 
-/* The sign of an edge function, and where it is so small that its sign is not known. */
-SIMD_INLINE vm kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *least)
+/* An edge function, by its sign bit, and where it is so small that its sign is not known. */
+SIMD_INLINE vi kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(s->at[0][a], s->at[1][b], s->at[0][b], s->at[1][a]);
     *least = vf_min(vf_abs(e), *least);
-    return vm_sign(vi_from_bits(e));
+    return vi_from_bits(e);
 }
 
-/* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. */
-SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vm rays, int type, kernel_curved_crossed *out)
+/* Rays that cross a quad once, by the sign bit, whatever it looks like, and those that may cross it twice. diagonal is
+ * the edge function from the loop's vertex 0 to 2. */
+SIMD_INLINE vi kernel_local_quad_sides(const kernel_local_seen *s, const signed char *loop, const vi around[4],
+                                       vi diagonal, vm rays, vm *alone)
+{
+    const vm side[4] = {vm_sign(around[0]), vm_sign(around[1]), vm_sign(around[2]), vm_sign(around[3])};
+    const vm outside = vm_and(rays, vm_sign((around[0] ^ around[2]) & (around[1] ^ around[3])));
+    *alone = vm_or(*alone, kernel_curved_bends(s->at[0], s->at[1], loop, outside, side[0], side[3]));
+    return vi_select(kernel_halves_once(side, vm_sign(diagonal)), vi_set(-1), vi_set(0));
+}
+
+/* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. dents: bits of the
+ * quads that may not look convex. */
+SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vi dents, vm rays, int type,
+                                         kernel_curved_crossed *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_curved_count count = {vm_none(), vm_none(), vm_none(), vf_set(0), vf_set(0)};
+    const bool all_convex = !vm_any(vm_and(rays, vm_sign(-dents)));
     kernel_curved_sides sides = {.least = vf_set(INFINITY)};
+    vi faces = vi_set(0);
     vm alone = vm_none();
     for (int n = 0; n < shape->edge_count; n++)
-        sides.negative[n] = kernel_local_edge(s, shape->edges[n][0], shape->edges[n][1], &sides.least);
+        sides.side[n] = kernel_local_edge(s, shape->edges[n][0], shape->edges[n][1], &sides.least);
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
-        vm around[4], once;
+        const int count = shape->faces[face].count;
+        vi around[4], once;
         kernel_face_sides(shape, face, &sides, around);
-        if (shape->faces[face].count == 3) {
-            once = vm_not(vm_or(vm_xor(around[0], around[1]), vm_xor(around[1], around[2])));
-        } else {
-            const vm outside = vm_and(rays, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
-            once = kernel_halves_once(around, kernel_local_edge(s, loop[0], loop[2], &sides.least));
-            alone = vm_or(alone, kernel_curved_bends(s->at[0], s->at[1], loop, outside, around[0], around[3]));
+        once = kernel_sides_agree(around, count);
+        if (count == 4) {
+            const vi diagonal = kernel_local_edge(s, loop[0], loop[2], &sides.least);
+            if (__builtin_expect(!all_convex, 0) && vm_any(vm_sign(dents << (31 - face))))
+                once = kernel_local_quad_sides(s, loop, around, diagonal, rays, &alone);
         }
-        kernel_curved_count_face(&count, face, vm_and(rays, once));
+        faces |= kernel_face_bit(once, face);
     }
     alone = vm_or(alone, vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least)));
-    kernel_curved_count_end(&count, rays, alone, out);
+    kernel_curved_count(faces, rays, alone, out);
 }
 
 /* ---- corners ---- */

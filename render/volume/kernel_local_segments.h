@@ -388,7 +388,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     vi words;
     const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
     kernel_local_see(&b->faces, &rays, type, &seen);
-    kernel_local_find_faces(&seen, all, type, &crossed);
+    kernel_local_find_faces(&seen, vi_from_bits(kernel_local_take(b->faces.dents, rays.lane)), all, type, &crossed);
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
@@ -489,7 +489,7 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
     vf lists[5][8];
     kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, grid_type_vertices(type), lists[4]);
     const unsigned showing = kernel_local_place(t, &b->lanes, type, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes);
-    kernel_local_faces_of(lists, type, &b->faces);
+    kernel_local_faces_of(&t->tile, lists, b->lanes.ends, type, &b->faces);
     kernel_local_nonlinear_of(&b->lanes.cells, type, &b->nonlinear);
     return showing;
 }
