@@ -355,6 +355,19 @@ SIMD_INLINE vf vf_permute(vf v, vi index)
 #endif
 }
 
+/* The first's or the second's: an index of the second is counted from SIMD_WIDTH on. */
+SIMD_INLINE vf vf_permute_pair(vf first, vf second, vi index)
+{
+#if defined(SIMD_AVX512)
+    return (vf)_mm512_permutex2var_ps((__m512)first, (__m512i)index, (__m512)second);
+#else
+    vf out;
+    for (int i = 0; i < SIMD_WIDTH; i++)
+        out[i] = index[i] < SIMD_WIDTH ? first[index[i]] : second[index[i] - SIMD_WIDTH];
+    return out;
+#endif
+}
+
 /* base[index] and base[index + 1]. */
 SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *second)
 {

@@ -169,11 +169,6 @@ SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const ke
         q->y[i] = (kernel_curved_pick(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
         out->f[i] = kernel_curved_pick(h->at[3], count, p->lane, corner);
     }
-    /* Not in doubt, so these have the lines' signs. */
-    q->e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
-    q->e03 = vf_diff_of_products(q->x[0], q->y[3], q->x[3], q->y[0]);
-    q->e12 = vf_diff_of_products(q->x[1], q->y[2], q->x[2], q->y[1]);
-    q->e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
 }
 
 SIMD_INLINE void kernel_curved_quad_place(int type, const kernel_curved_quad *own, const kernel_quad_place *place,
@@ -273,7 +268,7 @@ SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel
         kernel_curved_quad corners[2];
         kernel_quad_place places[2];
         for (int n = 0; n < quads; n++) kernel_curved_quad_take(h, p, type, face[n], &own[n], &corners[n]);
-        kernel_quads_cross(own, quads, once, places);
+        kernel_quads_cross(own, quads, once, true, places); /* not in doubt, so beside all edges */
         for (int n = 0; n < quads; n++) kernel_curved_quad_place(type, &corners[n], &places[n], &out[n]);
     }
     for (int n = 0; n < 2 && type != GRID_HEX; n++) {

@@ -34,6 +34,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 #include "kernel_wide.h"
 #include "simd.h"
@@ -277,8 +278,13 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
 {
     unsigned vanishing = 0;
     for (int half = 0; half < 2; half++) {
-        const kernel_half_mask rays = kernel_half_once(q, wanted, half, out);
-        for (int i = 0; i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
+        const unsigned lanes = ((1u << KERNEL_HALF) - 1) << half * KERNEL_HALF;
+        int64_t rays[KERNEL_HALF], any = 0;
+        if (!(vm_bits(wanted) & lanes)) continue;
+        const kernel_half_mask vanish = kernel_half_once(q, wanted, half, out);
+        memcpy(rays, &vanish, sizeof rays);
+        for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
+        for (int i = 0; any && i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
     }
     if (__builtin_expect(vanishing, 0)) kernel_quad_limit(q, vm_from_bits(vanishing), out);
 }
@@ -368,9 +374,22 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
+/* kernel_quad_once() of rays that are beside all edges. */
+static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+{
+    kernel_quad own = *q;
+    own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
+    own.e03 = vf_diff_of_products(q->x[0], q->y[3], q->x[3], q->y[0]);
+    own.e12 = vf_diff_of_products(q->x[1], q->y[2], q->x[2], q->y[1]);
+    own.e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
+    kernel_quad_once(&own, wanted, out);
+}
+
 /* Finds where rays meet the patches of count quads: once[n] has the rays that meet quad n's triangles once. Quads are
- * taken together because each step of one waits for its step before. */
-SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], kernel_quad_place *out)
+ * taken together because each step of one waits for its step before. are_beside: no ray meets an edge, and the quads'
+ * edge functions are not set. */
+SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_beside,
+                                    kernel_quad_place *out)
 {
     kernel_patch patch[2];
     vf s[2], r[2];
@@ -384,14 +403,18 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     for (int n = 0; n < count; n++) {
         const vm left = vm_andnot(once[n], kernel_patch_arrived(&patch[n], s[n], r[n]));
         out[n] = (kernel_quad_place){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
-        if (__builtin_expect(vm_any(left), 0)) kernel_quad_once(&q[n], left, &out[n]);
+        if (__builtin_expect(!vm_any(left), 1)) continue;
+        if (are_beside)
+            kernel_quad_once_beside(&q[n], left, &out[n]);
+        else
+            kernel_quad_once(&q[n], left, &out[n]);
     }
 }
 
 SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_place *out)
 {
     const vm all[2] = {once, once};
-    kernel_quads_cross(q, count, all, out);
+    kernel_quads_cross(q, count, all, false, out);
 }
 
 /* May rays meet the patch twice? By the signs of its sides alone: none does that meets the triangles once. */

@@ -18,12 +18,16 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
+enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
+
 /* Cells in lanes: places and the field by vertex, and of each face kernel_quad_corners() or kernel_triangle_order(),
- * four bits a corner. */
+ * four bits a corner. For vectors of 16 lanes the same cell by cell: x and y by vertex, z and the field by vertex, and
+ * words by face, 8 numbers each. */
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
     float dents[SIMD_WIDTH]; /* kernel_curved_dents() over the pixels of the cell */
+    float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
 } kernel_local_faces;
 
 /* ---- cells ---- */
@@ -49,6 +53,30 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
     }
     for (int i = 0; i < count; i++)
         for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
+}
+
+/* Transposes a row of the cells. */
+SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count, const float (*second)[SIMD_WIDTH],
+                                     int second_count, int row, kernel_local_faces *out)
+{
+    static const int32_t numbers[KERNEL_LOCAL_ROW] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    vf v[KERNEL_LOCAL_ROW];
+    vi number;
+    memcpy(&number, numbers, sizeof number);
+    for (int i = 0; i < KERNEL_LOCAL_ROW / 2; i++) {
+        v[i] = i < first_count ? vf_load(first[i]) : vf_set(0);
+        v[i + KERNEL_LOCAL_ROW / 2] = i < second_count ? vf_load(second[i]) : vf_set(0);
+    }
+    for (int step = 1; step < KERNEL_LOCAL_ROW; step *= 2) {
+        const vi low = number + (number & step) / step * (SIMD_WIDTH - step), high = low + step;
+        for (int i = 0; i < KERNEL_LOCAL_ROW; i++) {
+            if (i & step) continue;
+            const vf one = v[i], other = v[i + step];
+            v[i] = vf_permute_pair(one, other, low);
+            v[i + step] = vf_permute_pair(one, other, high);
+        }
+    }
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
 }
 
 /* Rays of the tile from the first to the last of columns and rows, lane by lane. */
@@ -83,6 +111,10 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
                                                       : kernel_curved_quad_word(loop, lists[4], &odd);
         vf_store(out->words[face], vf_from_bits(word));
     }
+    if (SIMD_WIDTH < KERNEL_LOCAL_ROW) return;
+    const int count = grid_type_vertices(type);
+    for (int n = 0; n < 2; n++) kernel_local_row_of(out->at[2 * n], count, out->at[2 * n + 1], count, n, out);
+    kernel_local_row_of(out->words, shape->face_count, NULL, 0, 2, out);
 }
 
 /* ---- rays ---- */
@@ -112,117 +144,223 @@ SIMD_INLINE vi kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *l
     return vi_from_bits(e);
 }
 
-/* Rays that cross a quad once, by the sign bit, whatever it looks like, and those that may cross it twice. diagonal is
- * the edge function from the loop's vertex 0 to 2. */
-SIMD_INLINE vi kernel_local_quad_sides(const kernel_local_seen *s, const signed char *loop, const vi around[4],
-                                       vi diagonal, vm rays, vm *alone)
-{
-    const vm side[4] = {vm_sign(around[0]), vm_sign(around[1]), vm_sign(around[2]), vm_sign(around[3])};
-    const vm outside = vm_and(rays, vm_sign((around[0] ^ around[2]) & (around[1] ^ around[3])));
-    *alone = vm_or(*alone, kernel_curved_bends(s->at[0], s->at[1], loop, outside, side[0], side[3]));
-    return vi_select(kernel_halves_once(side, vm_sign(diagonal)), vi_set(-1), vi_set(0));
-}
-
-/* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. dents: bits of the
- * quads that may not look convex. */
-SIMD_INLINE void kernel_local_find_faces(const kernel_local_seen *s, vi dents, vm rays, int type,
-                                         kernel_curved_crossed *out)
+SIMD_INLINE void kernel_local_sides_of(const kernel_local_seen *s, int type, kernel_curved_sides *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    const bool all_convex = !vm_any(vm_and(rays, vm_sign(-dents)));
-    kernel_curved_sides sides = {.least = vf_set(INFINITY)};
-    vi faces = vi_set(0);
-    vm alone = vm_none();
+    out->least = vf_set(INFINITY);
     for (int n = 0; n < shape->edge_count; n++)
-        sides.side[n] = kernel_local_edge(s, shape->edges[n][0], shape->edges[n][1], &sides.least);
+        out->side[n] = kernel_local_edge(s, shape->edges[n][0], shape->edges[n][1], &out->least);
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
-        const int count = shape->faces[face].count;
-        vi around[4], once;
-        kernel_face_sides(shape, face, &sides, around);
-        once = kernel_sides_agree(around, count);
-        if (count == 4) {
-            const vi diagonal = kernel_local_edge(s, loop[0], loop[2], &sides.least);
-            if (__builtin_expect(!all_convex, 0) && vm_any(vm_sign(dents << (31 - face))))
-                once = kernel_local_quad_sides(s, loop, around, diagonal, rays, &alone);
-        }
-        faces |= kernel_face_bit(once, face);
+        if (shape->faces[face].count == 4)
+            out->side[shape->edge_count + face] = kernel_local_edge(s, loop[0], loop[2], &out->least);
     }
-    alone = vm_or(alone, vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least)));
-    kernel_curved_count(faces, rays, alone, out);
+}
+
+/* Bits of the faces on the same side of all of whose edges the rays are. */
+SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    vi faces = vi_set(0);
+    for (int face = 0; face < shape->face_count; face++) {
+        vi around[4];
+        kernel_face_sides(shape, face, sides, around);
+        faces |= kernel_face_bit(kernel_sides_agree(around, shape->faces[face].count), face);
+    }
+    return faces;
+}
+
+/* Rays that cross a quad once, whatever it looks like; alone gets those that may cross it twice. */
+SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kernel_curved_sides *sides,
+                                         const kernel_shape *shape, int face, vm rays, vm *alone)
+{
+    vi around[4];
+    kernel_face_sides(shape, face, sides, around);
+    const vm side[4] = {vm_sign(around[0]), vm_sign(around[1]), vm_sign(around[2]), vm_sign(around[3])};
+    const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
+    const signed char *loop = shape->faces[face].vertices;
+    *alone = vm_or(*alone, kernel_curved_bends(s->at[0], s->at[1], loop, outside, side[0], side[3]));
+    return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
+}
+
+SIMD_INLINE void kernel_local_found(const kernel_curved_sides *sides, vi faces, vm rays, vm alone,
+                                    kernel_curved_crossed *out)
+{
+    const vm unknown = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides->least));
+    kernel_curved_count(faces, rays, vm_or(alone, unknown), out);
+}
+
+/* As below, where some of the cells have quads that may not look convex, whose bits are in dents. */
+SIMD_INLINE void kernel_local_find_dented(const kernel_local_faces *f, const kernel_local_rays *own, vi dents, vm rays,
+                                          kernel_curved_crossed *out, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    kernel_local_seen seen;
+    kernel_curved_sides sides;
+    vm alone = vm_none();
+    kernel_local_see(f, own, type, &seen);
+    kernel_local_sides_of(&seen, type, &sides);
+    vi faces = kernel_local_faces_around(&sides, type);
+    for (int face = 0; face < shape->face_count; face++) {
+        if (!vm_any(vm_and(rays, vm_sign(dents << (31 - face))))) continue;
+        const vm once = kernel_local_quad_crossed(&seen, &sides, shape, face, rays, &alone);
+        faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
+    }
+    kernel_local_found(&sides, faces, rays, alone, out);
+}
+
+static __attribute__((noinline)) void kernel_local_find_in_any(const kernel_local_faces *f,
+                                                               const kernel_local_rays *own, vi dents, vm rays,
+                                                               int type, kernel_curved_crossed *out)
+{
+    KERNEL_OF_TYPE(type, kernel_local_find_dented, f, own, dents, rays, out);
+}
+
+/* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. */
+SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_local_rays *own, vm rays, int type,
+                                         kernel_curved_crossed *out)
+{
+    const vi dents = vi_from_bits(kernel_local_take(f->dents, own->lane));
+    kernel_local_seen seen;
+    kernel_curved_sides sides;
+    if (vm_any(vm_and(rays, vm_sign(-dents)))) {
+        kernel_local_find_in_any(f, own, dents, rays, type, out);
+        return;
+    }
+    kernel_local_see(f, own, type, &seen);
+    kernel_local_sides_of(&seen, type, &sides);
+    kernel_local_found(&sides, kernel_local_faces_around(&sides, type), rays, vm_none(), out);
 }
 
 /* ---- corners ---- */
 
-/* A vertex of each ray's cell: as the ray sees it, and its own coordinates from the middle. */
-typedef struct kernel_local_corner {
-    vf at[4], r[3];
-} kernel_local_corner;
+/* The corners of two faces of each ray's cell, in the order of the faces' words: places in the ray's plane and depth,
+ * and the field. */
+typedef struct kernel_local_corners {
+    vi vertex[4];
+    vf at[4][4];
+} kernel_local_corners;
 
-/* A number of each ray's own vertex of its cell, which has count. */
-SIMD_INLINE vf kernel_local_pick(const vf of[8], int count, const vm bits[3])
+/* Vectors of 16 rays mostly have them in one or two cells, which were listed one after the other. Then a number of each
+ * ray's own vertex is taken out of the two cells' rows at once. */
+typedef struct kernel_local_pair {
+    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* of the two cells */
+    vi second; /* SIMD_WIDTH where the ray's cell is the second */
+} kernel_local_pair;
+
+SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi lane, kernel_local_pair *out)
 {
-    vf four[4], two[2];
-    for (int i = 0; 2 * i < count; i++)
-        four[i] = 2 * i + 1 < count ? vf_select(bits[0], of[2 * i + 1], of[2 * i]) : of[2 * i];
-    for (int i = 0; 4 * i < count; i++)
-        two[i] = 4 * i + 2 < count ? vf_select(bits[1], four[2 * i + 1], four[2 * i]) : four[2 * i];
-    return count > 4 ? vf_select(bits[2], two[1], two[0]) : two[0];
+    const unsigned bits = vm_bits(rays);
+    if (KERNEL_LOCAL_ROW != SIMD_WIDTH || !bits) return false;
+    int32_t lanes[SIMD_WIDTH];
+    memcpy(lanes, &lane, sizeof lanes);
+    const int first = lanes[__builtin_ctz(bits)], last = lanes[31 - __builtin_clz(bits)];
+    const vf own = vf_from_vi(lane);
+    const vm in_first = vf_eq(own, vf_set((float)first)), in_last = vf_eq(own, vf_set((float)last));
+    out->rows[0] = f->rows[first];
+    out->rows[1] = f->rows[last];
+    out->second = vi_select(in_first, vi_set(0), vi_set(SIMD_WIDTH));
+    return !vm_any(vm_andnot(rays, vm_or(in_first, in_last)));
 }
 
-SIMD_INLINE void kernel_local_corner_of(const kernel_local_seen *s, int type, vi vertex, kernel_local_corner *out)
+/* A number of each ray's own vertex of its cell, which has count. Of 16 lanes, permutations of all vertices' are faster
+ * than a gather. */
+SIMD_INLINE vf kernel_local_pick(const float of[8][SIMD_WIDTH], int count, vi lane, vi vertex)
 {
-    const int count = grid_type_vertices(type);
-    const kernel_shape *shape = kernel_cell_shape(type);
-    const vm bits[3] = {vm_sign(vertex << 31), vm_sign(vertex << 30), vm_sign(vertex << 29)};
-    for (int n = 0; n < 4; n++) out->at[n] = kernel_local_pick(s->at[n], count, bits);
-    if (type == GRID_HEX) {
-        const vf low = vf_set(-0.5f), high = vf_set(0.5f);
-        out->r[0] = vf_select(vm_xor(bits[0], bits[1]), high, low);
-        out->r[1] = vf_select(bits[1], high, low);
-        out->r[2] = vf_select(bits[2], high, low);
-        return;
-    }
-    vf own[3];
-    for (int a = 0; a < 3; a++) own[a] = kernel_curved_own(shape, count, a, vertex & 7);
-    for (int a = 0; a < 2; a++) out->r[a] = type == GRID_WEDGE ? own[a] - 1.0f / 3 : own[a] - 0.5f * own[2];
-    out->r[2] = own[2] - (type == GRID_WEDGE ? 0.5f : 0);
+    if (SIMD_WIDTH < 16) return vf_gather(of[0], vertex * SIMD_WIDTH + lane);
+    const vi in_two = lane | (vertex & 1) * SIMD_WIDTH;
+    const vm second = vm_sign(vertex << 30), upper = vm_sign(vertex << 29);
+    vf four[4], two[2];
+    for (int i = 0; 2 * i < count; i++)
+        four[i] = 2 * i + 1 < count ? vf_permute_pair(vf_load(of[2 * i]), vf_load(of[2 * i + 1]), in_two)
+                                    : kernel_local_take(of[2 * i], lane);
+    for (int i = 0; 4 * i < count; i++)
+        two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
+    return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
 }
 
 SIMD_INLINE vi kernel_local_word(const kernel_local_faces *f, int type, vi lane, vi face)
 {
     const vf number = vf_from_vi(face);
     vi word = vi_set(0);
+    if (SIMD_WIDTH < 16) return vi_from_bits(vf_gather(f->words[0], face * SIMD_WIDTH + lane));
     for (int n = 0; n < kernel_cell_shape(type)->face_count; n++)
         word = vi_select(vf_eq(number, vf_set((float)n)), vi_from_bits(kernel_local_take(f->words[n], lane)), word);
     return word;
 }
 
-/* ---- places ---- */
-
-SIMD_INLINE void kernel_local_quad_of(const kernel_local_seen *s, int type, vi word, kernel_quad *q,
-                                      kernel_local_corner corners[4])
+/* pair: NULL where rays have more than two cells. */
+SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
+                                           vi lane, vi face, kernel_local_corners *out)
 {
+    enum { WORDS = 2, HALF = KERNEL_LOCAL_ROW / 2 };
+    const float *const first = pair ? pair->rows[0][0] : NULL, *const last = pair ? pair->rows[1][0] : NULL;
+    const vi word = pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
+                                                        vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
+                         : kernel_local_word(f, type, lane, face);
     for (int i = 0; i < 4; i++) {
-        kernel_local_corner_of(s, type, word >> (4 * i), &corners[i]);
-        q->x[i] = corners[i].at[0];
-        q->y[i] = corners[i].at[1];
-        q->z[i] = corners[i].at[2];
+        out->vertex[i] = word >> (4 * i) & 7;
+        for (int n = 0; n < 4; n++) {
+            const int row = n / 2 * KERNEL_LOCAL_ROW;
+            out->at[i][n] =
+                pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
+                                       (out->vertex[i] | pair->second) + n % 2 * HALF)
+                     : kernel_local_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
+        }
     }
-    q->e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
-    q->e03 = vf_diff_of_products(q->x[0], q->y[3], q->x[3], q->y[0]);
-    q->e12 = vf_diff_of_products(q->x[1], q->y[2], q->x[2], q->y[1]);
-    q->e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
 }
 
-SIMD_INLINE void kernel_local_quad_end(const kernel_local_corner corners[4], const kernel_quad_place *place,
+SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kernel_local_rays *rays, vm active,
+                                         int type, const vi face[2], kernel_local_corners out[2])
+{
+    kernel_local_pair pair;
+    if (__builtin_expect(kernel_local_pair_of(f, active, rays->lane, &pair), 1))
+        for (int n = 0; n < 2; n++) kernel_local_corners_take(f, &pair, type, rays->lane, face[n], &out[n]);
+    else
+        for (int n = 0; n < 2; n++) kernel_local_corners_take(f, NULL, type, rays->lane, face[n], &out[n]);
+    for (int n = 0; n < 2; n++)
+        for (int i = 0; i < 4; i++)
+            for (int a = 0; a < 2; a++)
+                out[n].at[i][a] = (out[n].at[i][a] - rays->origin[a]) - rays->slope[a] * out[n].at[i][2];
+}
+
+/* A vertex's own coordinate on an axis, from the middle. */
+SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
+{
+    static const float own[3][3][KERNEL_LOCAL_ROW] = {{{-0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f},
+                                                       {-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f},
+                                                       {-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f}},
+                                                      {{0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3},
+                                                       {0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3},
+                                                       {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f}},
+                                                      {{-0.5f, 0.5f, 0.5f, -0.5f, 0},
+                                                       {-0.5f, -0.5f, 0.5f, 0.5f, 0},
+                                                       {1, 1, 1, 1, 0}}};
+    const float *of = own[kernel_shape_number(type)][axis];
+    return SIMD_WIDTH < 8 ? vf_gather(of, vertex) : vf_permute(vf_load(of), vertex);
+}
+
+/* ---- places ---- */
+
+SIMD_INLINE void kernel_local_quad_of(const kernel_local_corners *c, kernel_quad *q)
+{
+    for (int i = 0; i < 4; i++) {
+        q->x[i] = c->at[i][0];
+        q->y[i] = c->at[i][1];
+        q->z[i] = c->at[i][2];
+    }
+}
+
+SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, const kernel_quad_place *place,
                                        kernel_local_crossing *out)
 {
-    const vf f[4] = {corners[0].at[3], corners[1].at[3], corners[2].at[3], corners[3].at[3]};
+    const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
     out->v = kernel_bilinear(f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
-        const vf base = corners[0].r[a], along = corners[1].r[a] - base, across = corners[3].r[a] - base;
+        const vf base = kernel_local_own(type, a, c->vertex[0]);
+        const vf along = kernel_local_own(type, a, c->vertex[1]) - base;
+        const vf across = kernel_local_own(type, a, c->vertex[3]) - base;
         out->r[a] = (base + place->s * along) + place->r * across;
     }
 }
@@ -233,17 +371,18 @@ SIMD_INLINE vf kernel_local_weigh(const vf e[3], vf inverse, vf i, vf j, vf k)
 }
 
 /* kernel_triangle_crossing() of triangles whose corners are in the order. */
-SIMD_INLINE void kernel_local_triangle_end(const kernel_local_seen *s, int type, vi word, kernel_local_crossing *out)
+SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int type, kernel_local_crossing *out)
 {
-    kernel_local_corner c[3];
-    for (int i = 0; i < 3; i++) kernel_local_corner_of(s, type, word >> (4 * i), &c[i]);
-    const vf e[3] = {vf_diff_of_products(c[0].at[0], c[1].at[1], c[1].at[0], c[0].at[1]),
-                     vf_diff_of_products(c[1].at[0], c[2].at[1], c[2].at[0], c[1].at[1]),
-                     vf_diff_of_products(c[0].at[0], c[2].at[1], c[2].at[0], c[0].at[1])};
+    const vf *i = c->at[0], *j = c->at[1], *k = c->at[2];
+    const vf e[3] = {vf_diff_of_products(i[0], j[1], j[0], i[1]), vf_diff_of_products(j[0], k[1], k[0], j[1]),
+                     vf_diff_of_products(i[0], k[1], k[0], i[1])};
     const vf inverse = 1.0f / kernel_weight(e[0], e[1], e[2]);
-    out->t = kernel_local_weigh(e, inverse, c[0].at[2], c[1].at[2], c[2].at[2]);
-    out->v = kernel_local_weigh(e, inverse, c[0].at[3], c[1].at[3], c[2].at[3]);
-    for (int a = 0; a < 3; a++) out->r[a] = kernel_local_weigh(e, inverse, c[0].r[a], c[1].r[a], c[2].r[a]);
+    out->t = kernel_local_weigh(e, inverse, i[2], j[2], k[2]);
+    out->v = kernel_local_weigh(e, inverse, i[3], j[3], k[3]);
+    for (int a = 0; a < 3; a++)
+        out->r[a] = kernel_local_weigh(e, inverse, kernel_local_own(type, a, c->vertex[0]),
+                                       kernel_local_own(type, a, c->vertex[1]),
+                                       kernel_local_own(type, a, c->vertex[2]));
 }
 
 SIMD_INLINE void kernel_local_crossing_select(vm m, const kernel_local_crossing *a, const kernel_local_crossing *b,
@@ -255,38 +394,35 @@ SIMD_INLINE void kernel_local_crossing_select(vm m, const kernel_local_crossing 
 }
 
 /* Where rays cross quads, and whatever elsewhere. */
-SIMD_INLINE void kernel_local_cross_quads(const kernel_local_seen *s, int type, const vi words[2], const vm on_quad[2],
+SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2], int type, const vm on_quad[2],
                                           kernel_local_crossing ends[2])
 {
     const int count = type == GRID_PYRAMID ? 1 : 2;
     kernel_quad quads[2];
-    kernel_local_corner corners[2][4];
     kernel_quad_place places[2];
-    for (int n = 0; n < count; n++) kernel_local_quad_of(s, type, words[n], &quads[n], corners[n]);
-    kernel_quads_cross(quads, count, on_quad, places);
-    for (int n = 0; n < count; n++) kernel_local_quad_end(corners[n], &places[n], &ends[n]);
+    for (int n = 0; n < count; n++) kernel_local_quad_of(&corners[n], &quads[n]);
+    kernel_quads_cross(quads, count, on_quad, true, places);
+    for (int n = 0; n < count; n++) kernel_local_quad_end(&corners[n], type, &places[n], &ends[n]);
 }
 
 /* Where rays that cross two faces come in and go out. */
-SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_seen *s, vi lane,
+SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_rays *rays,
                                     const kernel_curved_crossed *crossed, int type, kernel_local_crossing out[2])
 {
     const vi face[2] = {crossed->first, crossed->last};
-    vi words[2];
     vm on_quad[2];
+    kernel_local_corners corners[2];
     kernel_local_crossing ends[2];
-    for (int n = 0; n < 2; n++) {
-        words[n] = kernel_local_word(f, type, lane, face[n]);
-        on_quad[n] = vm_and(crossed->two, kernel_curved_on_quad(type, n, face[n]));
-    }
+    kernel_local_corners_of(f, rays, crossed->two, type, face, corners);
+    for (int n = 0; n < 2; n++) on_quad[n] = vm_and(crossed->two, kernel_curved_on_quad(type, n, face[n]));
     if (type != GRID_HEX) memset(ends, 0, sizeof ends);
     if (type == GRID_HEX || vm_any(vm_or(on_quad[0], on_quad[1])))
-        kernel_local_cross_quads(s, type, words, on_quad, ends);
+        kernel_local_cross_quads(corners, type, on_quad, ends);
     for (int n = 0; n < 2 && type != GRID_HEX; n++) {
         const vm on_triangle = vm_andnot(crossed->two, on_quad[n]);
         kernel_local_crossing end;
         if (!vm_any(on_triangle)) continue;
-        kernel_local_triangle_end(s, type, words[n], &end);
+        kernel_local_triangle_end(&corners[n], type, &end);
         kernel_local_crossing_select(on_triangle, &end, &ends[n], &ends[n]);
     }
     const vm swap = vf_lt(ends[1].t, ends[0].t);

@@ -383,12 +383,10 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
                                              const kernel_local_queue *q, int type, int n)
 {
     kernel_local_rays rays;
-    kernel_local_seen seen;
     kernel_curved_crossed crossed;
     vi words;
     const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
-    kernel_local_see(&b->faces, &rays, type, &seen);
-    kernel_local_find_faces(&seen, vi_from_bits(kernel_local_take(b->faces.dents, rays.lane)), all, type, &crossed);
+    kernel_local_find_faces(&b->faces, &rays, all, type, &crossed);
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
@@ -402,14 +400,12 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
                                              int n)
 {
     kernel_local_pairs p;
-    kernel_local_seen seen;
     vi words;
     vf end, near, far;
     p.active = kernel_local_list_take(list, &t->tile, n, &words, &p.rays);
     const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
                                            words >> (KERNEL_LOCAL_FACES + 3) & 7};
-    kernel_local_see(&b->faces, &p.rays, type, &seen);
-    kernel_local_cross(&b->faces, &seen, p.rays.lane, &crossed, type, p.ends);
+    kernel_local_cross(&b->faces, &p.rays, &crossed, type, p.ends);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
