@@ -55,9 +55,22 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
         for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
 }
 
-/* Transposes a row of the cells. */
-SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count, const float (*second)[SIMD_WIDTH],
-                                     int second_count, int row, kernel_local_faces *out)
+/* A step of a transposition: exchanges numbers of vectors and lanes that are so far apart. */
+SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
+{
+    const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
+    for (int i = 0; i < KERNEL_LOCAL_ROW / 2; i++) {
+        const int n = i / apart * 2 * apart + i % apart;
+        const vf one = v[n], other = v[n + apart];
+        v[n] = vf_permute_pair(one, other, low);
+        v[n + apart] = vf_permute_pair(one, other, high);
+    }
+}
+
+/* A row of each cell: 8 numbers, which the lists have lane by lane, and 8 more. */
+SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count,
+                                     const float (*second)[SIMD_WIDTH], int second_count, int row,
+                                     kernel_local_faces *out)
 {
     static const int32_t numbers[KERNEL_LOCAL_ROW] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     vf v[KERNEL_LOCAL_ROW];
@@ -67,15 +80,10 @@ SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first
         v[i] = i < first_count ? vf_load(first[i]) : vf_set(0);
         v[i + KERNEL_LOCAL_ROW / 2] = i < second_count ? vf_load(second[i]) : vf_set(0);
     }
-    for (int step = 1; step < KERNEL_LOCAL_ROW; step *= 2) {
-        const vi low = number + (number & step) / step * (SIMD_WIDTH - step), high = low + step;
-        for (int i = 0; i < KERNEL_LOCAL_ROW; i++) {
-            if (i & step) continue;
-            const vf one = v[i], other = v[i + step];
-            v[i] = vf_permute_pair(one, other, low);
-            v[i + step] = vf_permute_pair(one, other, high);
-        }
-    }
+    kernel_local_transpose(v, number, 1);
+    kernel_local_transpose(v, number, 2);
+    kernel_local_transpose(v, number, 4);
+    kernel_local_transpose(v, number, 8);
     for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
 }
 
@@ -245,7 +253,7 @@ typedef struct kernel_local_corners {
  * ray's own vertex is taken out of the two cells' rows at once. */
 typedef struct kernel_local_pair {
     const float (*rows[2])[KERNEL_LOCAL_ROW]; /* of the two cells */
-    vi second; /* SIMD_WIDTH where the ray's cell is the second */
+    vi second;                                /* SIMD_WIDTH where the ray's cell is the second */
 } kernel_local_pair;
 
 SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi lane, kernel_local_pair *out)
@@ -302,10 +310,9 @@ SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const ke
         out->vertex[i] = word >> (4 * i) & 7;
         for (int n = 0; n < 4; n++) {
             const int row = n / 2 * KERNEL_LOCAL_ROW;
-            out->at[i][n] =
-                pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
-                                       (out->vertex[i] | pair->second) + n % 2 * HALF)
-                     : kernel_local_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
+            out->at[i][n] = pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
+                                                   (out->vertex[i] | pair->second) + n % 2 * HALF)
+                                 : kernel_local_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
         }
     }
 }
@@ -327,15 +334,14 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
 /* A vertex's own coordinate on an axis, from the middle. */
 SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
 {
-    static const float own[3][3][KERNEL_LOCAL_ROW] = {{{-0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f},
-                                                       {-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f},
-                                                       {-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f}},
-                                                      {{0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3},
-                                                       {0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3},
-                                                       {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f}},
-                                                      {{-0.5f, 0.5f, 0.5f, -0.5f, 0},
-                                                       {-0.5f, -0.5f, 0.5f, 0.5f, 0},
-                                                       {1, 1, 1, 1, 0}}};
+    static const float own[3][3][KERNEL_LOCAL_ROW] = {
+        {{-0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f},
+         {-0.5f, -0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f},
+         {-0.5f, -0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f, 0.5f}},
+        {{0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3},
+         {0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3, 0 - 1.0f / 3, 0 - 1.0f / 3, 1 - 1.0f / 3},
+         {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f}},
+        {{-0.5f, 0.5f, 0.5f, -0.5f, 0}, {-0.5f, -0.5f, 0.5f, 0.5f, 0}, {1, 1, 1, 1, 0}}};
     const float *of = own[kernel_shape_number(type)][axis];
     return SIMD_WIDTH < 8 ? vf_gather(of, vertex) : vf_permute(vf_load(of), vertex);
 }
@@ -380,9 +386,9 @@ SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int ty
     out->t = kernel_local_weigh(e, inverse, i[2], j[2], k[2]);
     out->v = kernel_local_weigh(e, inverse, i[3], j[3], k[3]);
     for (int a = 0; a < 3; a++)
-        out->r[a] = kernel_local_weigh(e, inverse, kernel_local_own(type, a, c->vertex[0]),
-                                       kernel_local_own(type, a, c->vertex[1]),
-                                       kernel_local_own(type, a, c->vertex[2]));
+        out->r[a] =
+            kernel_local_weigh(e, inverse, kernel_local_own(type, a, c->vertex[0]),
+                               kernel_local_own(type, a, c->vertex[1]), kernel_local_own(type, a, c->vertex[2]));
 }
 
 SIMD_INLINE void kernel_local_crossing_select(vm m, const kernel_local_crossing *a, const kernel_local_crossing *b,
