@@ -9,9 +9,14 @@
  * Depth: the last step of Newton's method begins at most KERNEL_CONTRACTION_END from the root, in the cell's
  * coordinates. f's second derivative is no more than some 4 K (its first one is K at the domain's corners, and 0 in the
  * middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which is as much of the cell's extent
- * along the ray; t is rounded to half a unit, twice. */
+ * along the ray; t is rounded to half a unit, twice.
+ *
+ * And quads that are taken to look convex along all rays of a box (kernel_curved_dents()), of the same cells: as each
+ * of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of the
+ * quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
 #include "kernel_bounds_curved.h"
 #include "kernel_contraction.h"
+#include "kernel_quad.h"
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "reference_cell.h"
@@ -113,10 +118,9 @@ static void place_values(batch *b, int lane)
     for (int i = 0; i < count; i++) b->at[3][i][lane] = (float)(v[i] / most);
 }
 
-/* A ray of the beam by a point in the vertices' box, or somewhat beside. */
-static void aim(batch *b, int lane)
+/* A point in the vertices' box, or somewhat beside. */
+static void point_near(const batch *b, int lane, double point[3])
 {
-    double point[3];
     for (int a = 0; a < 3; a++) {
         double low = INFINITY, high = -INFINITY;
         for (int i = 0; i < grid_type_vertices(b->type); i++) {
@@ -125,6 +129,13 @@ static void aim(batch *b, int lane)
         }
         point[a] = low + (high - low) * uniform(-0.1, 1.1);
     }
+}
+
+/* A ray of the beam by such a point. */
+static void aim(batch *b, int lane)
+{
+    double point[3];
+    point_near(b, lane, point);
     b->rays.slope_x[lane] = (float)(uniform(-1, 1) * (double)b->beam.spread);
     b->rays.slope_y[lane] = (float)(uniform(-1, 1) * (double)b->beam.spread);
     b->rays.origin_x[lane] = (float)(point[0] - (double)b->rays.slope_x[lane] * point[2]);
@@ -349,10 +360,158 @@ static void decided_crossings_are_right(void **state)
     assert_true(decided > rays_wanted / 3);
 }
 
+/* ---- quads that look convex ---- */
+
+enum { BOX_RAYS = 12 };
+
+typedef struct looks {
+    int64_t quads, convex, turned, wrong; /* rays too */
+} looks;
+
+/* Slopes along which three neighbouring vertices of a quad are seen nearly in line; false where none are small. */
+static bool graze(const batch *b, int lane, double slope[2])
+{
+    const kernel_shape *shape = kernel_cell_shape(b->type);
+    const int face = (int)uniform(0, shape->face_count), first = (int)uniform(0, 4);
+    const signed char *loop = shape->faces[face].vertices;
+    double edge[2][3], normal[3];
+    if (shape->faces[face].count == 3) return false;
+    for (int i = 0; i < 2; i++)
+        for (int a = 0; a < 3; a++)
+            edge[i][a] = (double)b->at[a][(int)loop[(first + i + 1) & 3]][lane] -
+                         (double)b->at[a][(int)loop[(first + i) & 3]][lane];
+    for (int a = 0; a < 3; a++)
+        normal[a] = edge[0][(a + 1) % 3] * edge[1][(a + 2) % 3] - edge[0][(a + 2) % 3] * edge[1][(a + 1) % 3];
+    const int own = fabs(normal[1]) > fabs(normal[0]), other = !own;
+    slope[other] = uniform(-1, 1);
+    slope[own] = -(normal[2] + slope[other] * normal[other]) / normal[own] + pow(10, uniform(-8, -2)) * uniform(-1, 1);
+    return fabs(slope[own]) < 1;
+}
+
+/* Rays of a box, most of them at its ends. */
+static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
+{
+    double middle[SIMD_WIDTH][2], half[SIMD_WIDTH];
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        const bool grazes = uniform(0, 1) < 0.7 && graze(b, lane, middle[lane]);
+        if (!grazes) middle[lane][0] = middle[lane][1] = 0;
+        half[lane] = !grazes ? (double)b->beam.spread : uniform(0, 1) < 0.7 ? 0 : pow(10, uniform(-8, -2));
+    }
+    for (int a = 0; a < 2; a++)
+        for (int end = 0; end < 2; end++) box->slope[a][end] = box->origin[a][end] = vf_set(end ? -INFINITY : INFINITY);
+    for (int n = 0; n < BOX_RAYS; n++) {
+        vf own[2][2];
+        for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+            double point[3];
+            point_near(b, lane, point);
+            for (int a = 0; a < 2; a++) {
+                const double at = n >= 8 ? uniform(-1, 1) : n >> a & 1 ? 1 : -1;
+                own[0][a][lane] = (float)(middle[lane][a] + at * half[lane]);
+                own[1][a][lane] = (float)(point[a] - (double)own[0][a][lane] * point[2]);
+            }
+        }
+        rays[n] = (kernel_rays){own[1][0], own[1][1], own[0][0], own[0][1]};
+        for (int a = 0; a < 2; a++) {
+            box->slope[a][0] = vf_min(own[0][a], box->slope[a][0]);
+            box->slope[a][1] = vf_max(own[0][a], box->slope[a][1]);
+            box->origin[a][0] = vf_min(own[1][a], box->origin[a][0]);
+            box->origin[a][1] = vf_max(own[1][a], box->origin[a][1]);
+        }
+    }
+}
+
+static bool turns_one_way(const vf x[8], const vf y[8], const signed char *loop, int lane)
+{
+    int left = 0, right = 0;
+    for (int i = 0; i < 4; i++) {
+        const int a = loop[i], b = loop[(i + 1) & 3], c = loop[(i + 2) & 3];
+        const double px = (double)x[b][lane] - (double)x[a][lane], py = (double)y[b][lane] - (double)y[a][lane];
+        const double qx = (double)x[c][lane] - (double)x[b][lane], qy = (double)y[c][lane] - (double)y[b][lane];
+        left += px * qy - py * qx > 0;
+        right += px * qy - py * qx < 0;
+    }
+    return left == 4 || right == 4;
+}
+
+static vi edge_of(const vf x[8], const vf y[8], int a, int b, vf *least)
+{
+    const vf e = vf_diff_of_products(x[a], y[b], x[b], y[a]);
+    *least = vf_min(vf_abs(e), *least);
+    return vi_from_bits(e);
+}
+
+/* The rays, of those that know the signs of a quad's edges, of which these alone say something else than all of it. */
+static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
+{
+    vf least = vf_set(INFINITY);
+    vi around[4];
+    vm side[4];
+    for (int i = 0; i < 4; i++) {
+        around[i] = edge_of(x, y, loop[i], loop[(i + 1) & 3], &least);
+        side[i] = vm_sign(around[i]);
+    }
+    const vm once = kernel_halves_once(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
+    const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
+    const vm outside = vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3]));
+    const vm bends = kernel_curved_bends(x, y, loop, outside, side[0], side[3]);
+    return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
+}
+
+static void judge_quads(const batch *b, const kernel_rays *rays, vi dents, looks *n)
+{
+    const kernel_shape *shape = kernel_cell_shape(b->type);
+    vf x[8], y[8];
+    for (int i = 0; i < grid_type_vertices(b->type); i++) {
+        const vf z = vf_load(b->at[2][i]);
+        x[i] = (vf_load(b->at[0][i]) - rays->origin_x) - rays->slope_x * z;
+        y[i] = (vf_load(b->at[1][i]) - rays->origin_y) - rays->slope_y * z;
+    }
+    for (int face = 0; face < shape->face_count; face++) {
+        const signed char *loop = shape->faces[face].vertices;
+        if (shape->faces[face].count == 3) continue;
+        const unsigned wrong = vm_bits(edges_are_wrong(x, y, loop));
+        for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+            n->quads++;
+            if (dents[lane] >> face & 1) continue;
+            n->convex++;
+            n->turned += !turns_one_way(x, y, loop, lane);
+            n->wrong += wrong >> lane & 1;
+        }
+    }
+}
+
+static void quads_that_look_convex_are(void **state)
+{
+    (void)state;
+    static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
+    for (int k = 0; k < 3; k++)
+        for (shape s = 0; s < SHAPE_COUNT; s++) {
+            looks n = {.quads = 0};
+            while (n.quads < 4 * rays_wanted) {
+                batch b;
+                kernel_rays rays[BOX_RAYS];
+                kernel_ray_box box;
+                vf at[3][8];
+                make_batch(&b, types[k], s);
+                aim_box(&b, rays, &box);
+                for (int a = 0; a < 3; a++)
+                    for (int i = 0; i < 8; i++) at[a][i] = vf_load(b.at[a][i]);
+                const vi dents = kernel_curved_dents(at, &box, types[k]);
+                for (int i = 0; i < BOX_RAYS; i++) judge_quads(&b, &rays[i], dents, &n);
+            }
+            printf("%s: of %lld quads seen %lld look convex, %lld do not, %lld are wrong\n", shape_names[s],
+                   (long long)n.quads, (long long)n.convex, (long long)n.turned, (long long)n.wrong);
+            assert_int_equal(n.turned, 0);
+            assert_int_equal(n.wrong, 0);
+            if (s <= JITTERED) assert_true(n.convex > n.quads / 2);
+        }
+}
+
 /* The argument is the number of rays. */
 int main(int argc, char **argv)
 {
     if (argc > 1) rays_wanted = atoll(argv[1]);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(decided_crossings_are_right)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(decided_crossings_are_right),
+                                       cmocka_unit_test(quads_that_look_convex_are)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -36,6 +36,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "grid.h"
+#include "kernel_shapes.h"
 #include "kernel_wide.h"
 #include "simd.h"
 
@@ -492,6 +494,91 @@ SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kern
     out[1].mask = kernel_quad_twice(q, bends, out);
     out[0].mask = vm_or(out[0].mask, out[1].mask);
     return vm_any(out[1].mask) ? 2 : count;
+}
+
+/* ---- quads that look convex, a cell a lane ----
+ *
+ * Seen along a ray, a quad's corners turn all one way, or it looks folded or dented. Where they do, the ray crosses the
+ * quad once if it is on one side of all four edges, else never: neither the quad's diagonal nor how its patch bends
+ * has to be asked as above. The turn at a corner is p × q of the edges p and q there as projected, which is
+ * N · (u, v, 1) with their normal N = p × q in space and the ray's slopes u and v. Over a box of rays it is off the
+ * middle's by |Nx| half width + |Ny| half height at most, which is no more than |p| |q| (half width + half height).
+ *
+ * Rounding: let l be the longest edge, h the sum of the largest |u| and |v|, and S a bound of places less origins plus
+ * slopes times depth. A projected edge is no longer than k = sqrt(2 + h h) l, as |x| + |y| + h |z|. A vertex projected
+ * in float32 is off by two units (6e-8) of S at most, d = 1.2e-7 S; a turn of such vertices by 2 d on each coordinate
+ * of both edges: 4 d k + 8 d d. What is computed here are products whose sizes add up to k k at most, each rounded 10
+ * times at most: 6e-7 k k. */
+
+/* Rays' slopes and origins across the view, from one end to the other. */
+typedef struct kernel_ray_box {
+    vf slope[2][2], origin[2][2];
+} kernel_ray_box;
+
+/* A cell's edges as the box's middle ray sees them, and the squares of their lengths in space. */
+typedef struct kernel_seen_edges {
+    vf at[12][2], square[12];
+    vf spread; /* half width + half height */
+    vf margin; /* of rounding */
+} kernel_seen_edges;
+
+SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_seen_edges *out)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    vf middle[2], steep[2], reach[2], longest = vf_set(0);
+    out->spread = vf_set(0);
+    for (int a = 0; a < 2; a++) {
+        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
+        out->spread += 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
+        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
+    }
+    for (int n = 0; n < shape->edge_count; n++) {
+        const int i = shape->edges[n][0], j = shape->edges[n][1];
+        const vf x = at[0][j] - at[0][i], y = at[1][j] - at[1][i], z = at[2][j] - at[2][i];
+        out->at[n][0] = x - middle[0] * z;
+        out->at[n][1] = y - middle[1] * z;
+        out->square[n] = (x * x + y * y) + z * z;
+        longest = vf_max(out->square[n], longest);
+    }
+    /* Any vertex is three edges from the first at most. */
+    const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
+    for (int a = 0; a < 2; a++)
+        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
+                   steep[a] * depth;
+    const vf off = 1.25e-7f * vf_max(reach[0], reach[1]), square = (2.0f + slopes * slopes) * longest;
+    out->margin = (1e-6f * square + 4.0f * off * vf_sqrt(square)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
+}
+
+/* Lanes whose quad looks convex along all rays of the box. */
+SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed char (*sides)[2])
+{
+    const int n[4] = {sides[0][0], sides[1][0], sides[2][0], sides[3][0]};
+    const vf along = vf_max(e->square[n[0]], e->square[n[2]]), across = vf_max(e->square[n[1]], e->square[n[3]]);
+    const vf least = vf_sqrt(along * across) * (1.0001f * e->spread) + e->margin;
+    vm left = vm_all_lanes(), right = vm_all_lanes();
+    for (int i = 0; i < 4; i++) {
+        const int next = (i + 1) & 3;
+        const vf *p = e->at[n[i]], *q = e->at[n[next]];
+        const vf turn = sides[i][1] == sides[next][1] ? p[0] * q[1] - p[1] * q[0] : p[1] * q[0] - p[0] * q[1];
+        left = vm_and(left, vf_lt(least, turn));
+        right = vm_and(right, vf_lt(least, -turn));
+    }
+    return vm_or(left, right);
+}
+
+/* Bits of the quads that may look other than convex along some ray of the box. */
+SIMD_INLINE vi kernel_curved_dents(vf (*const at)[8], const kernel_ray_box *box, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    kernel_seen_edges edges;
+    vi dents = vi_set(0);
+    kernel_seen_edges_of(at, box, type, &edges);
+    for (int face = 0; face < shape->face_count; face++) {
+        if (shape->faces[face].count == 3) continue;
+        const vm convex = kernel_quad_is_convex(&edges, shape->faces[face].sides);
+        dents |= vi_select(convex, vi_set(0), vi_set(1 << face));
+    }
+    return dents;
 }
 
 #endif
