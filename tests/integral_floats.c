@@ -18,3 +18,16 @@ void integral_on_floats(const render_transfer *t, double length, double v_in, do
     out[3] = (double)light.transmittance[0];
     render_pieces_free(&pieces);
 }
+
+void integral_swings(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4])
+{
+    kernel_pieces pieces;
+    base_error error = {0};
+    if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
+    for (int i = 0; i < count; i++) {
+        const vf low = vf_set((float)ranges[i][0]), high = vf_set((float)ranges[i][1]);
+        const float *found = &pieces.swings->swing + kernel_swing_entry(&pieces, low, high)[0];
+        for (int n = 0; n < 4; n++) out[i][n] = (double)found[n];
+    }
+    render_pieces_free(&pieces);
+}

@@ -154,6 +154,52 @@ static void oracle(const render_transfer *t, double length, double v_in, double 
     out[3] = expl(-out[4]);
 }
 
+/* What the field does to the light by its value, with b behind: (s (c - b))' of the three channels and s' (alpha's), s
+ * and |s'|. */
+static void brute_slopes(const render_transfer *t, long double x, long double b, long double out[6])
+{
+    const long double step = 1e-6L, a = opacity_near(t, x, x), clear = 1 - a;
+    const long double slope = (opacity_near(t, x, x + step) - a) / step / clear, extinction = -log1pl(-a);
+    for (int c = 0; c < 3; c++) {
+        const long double place = fminl(fmaxl(x, 0), 1) * (t->colour_count - 1);
+        const int i = (int)fminl(place, t->colour_count - 2);
+        const long double rise = (long double)t->colours[3 * i + 3 + c] - (long double)t->colours[3 * i + c];
+        const long double colour_slope = x > 0 && x < 1 ? rise * (t->colour_count - 1) : 0;
+        out[c] = slope * (colour_at(t, x, c) - b) + extinction * colour_slope;
+    }
+    out[3] = slope;
+    out[4] = extinction;
+    out[5] = fabsl(slope);
+}
+
+/* As kernel_swing, from many values of the range and several b. */
+static void brute_swing(const render_transfer *t, double low, double high, double out[4])
+{
+    enum { VALUES = 300, BEHIND = 4 };
+    double swing = 0, cost = 0;
+    out[2] = out[3] = 0;
+    for (int n = 0; n <= BEHIND; n++) {
+        double least[4], most[4];
+        for (int k = 0; k < 4; k++) least[k] = INFINITY, most[k] = -INFINITY;
+        for (int i = 0; i <= VALUES; i++) {
+            long double slopes[6];
+            brute_slopes(t, low + (high - low) * (long double)i / VALUES, (long double)n / BEHIND, slopes);
+            for (int k = 0; k < 4; k++) {
+                least[k] = fmin(least[k], (double)slopes[k]);
+                most[k] = fmax(most[k], (double)slopes[k]);
+            }
+            out[2] = fmax(out[2], (double)slopes[4]);
+            out[3] = fmax(out[3], (double)slopes[5]);
+        }
+        for (int k = 0; k < 4; k++) {
+            swing = fmax(swing, most[k] - least[k]);
+            cost = fmax(cost, fmax(-least[k], most[k]));
+        }
+    }
+    out[0] = swing;
+    out[1] = cost;
+}
+
 /* ---- tests ---- */
 
 typedef void integral(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
@@ -256,6 +302,38 @@ static void opacity_of_one_lets_nothing_through(void **state)
     assert_true(found[3] < 1e-7);
 }
 
+/* No bound is below what values of the range have, nor above what a range has that is wider by two of 128 bins at
+ * either end and by a quarter, but for what interval arithmetic gives away within a bin. What lies beyond all bins
+ * counts to the bin at that end. */
+static void swings_are_bounds(void **state)
+{
+    enum { RANGES = 20 };
+    (void)state;
+    double loosest = 0;
+    for (uint64_t n = 0; n < 60; n++) {
+        random_transfer r;
+        double ranges[RANGES][2], found[RANGES][4];
+        make_transfer(&r, 9000 + n, 0.9);
+        const double first = fmin(0, r.values[0]), last = fmax(1, r.values[r.transfer.opacity_count - 1]);
+        const double bin = (last - first) / 128;
+        for (uint64_t i = 0; i < RANGES; i++) {
+            ranges[i][0] = test_uniform_in(i, 9000 + n, first - 0.1, last + 0.1);
+            ranges[i][1] = ranges[i][0] + pow(10, test_uniform_in(RANGES + i, 9000 + n, -4, 0.2));
+        }
+        integral_swings(&r.transfer, RANGES, (const double(*)[2])ranges, found);
+        for (int i = 0; i < RANGES; i++) {
+            double truth[4], wide[4];
+            const double low = ranges[i][0], high = ranges[i][1], more = 2 * bin + 0.25 * (high - low);
+            brute_swing(&r.transfer, low, high, truth);
+            brute_swing(&r.transfer, fmin(low, last) - 2 * bin, fmax(high, first) + more, wide);
+            for (int k = 0; k < 4; k++) assert_true(found[i][k] >= truth[k] * (1 - 1e-4) - 1e-6);
+            loosest = fmax(loosest, (found[i][0] - wide[0]) / fmax(wide[1], 1e-9));
+        }
+    }
+    fprintf(stderr, "swings above those of wider ranges by at most %.2g of the cost\n", loosest);
+    assert_true(loosest < 0.25);
+}
+
 /* The argument is the number of cases in float a range of opacities. */
 int main(int argc, char **argv)
 {
@@ -265,6 +343,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(integral_is_near_in_float),
         cmocka_unit_test(opaque_points_are_integrated),
         cmocka_unit_test(opacity_of_one_lets_nothing_through),
+        cmocka_unit_test(swings_are_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -527,6 +527,27 @@ SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 #endif
 }
 
+/* SIMD_WIDTH rows of four: a lane of each. */
+SIMD_INLINE void vf_store_rows(float *to, const vf v[4])
+{
+#if defined(SIMD_AVX512)
+    const __m512 a = _mm512_unpacklo_ps((__m512)v[0], (__m512)v[1]), b = _mm512_unpackhi_ps((__m512)v[0], (__m512)v[1]);
+    const __m512 c = _mm512_unpacklo_ps((__m512)v[2], (__m512)v[3]), d = _mm512_unpackhi_ps((__m512)v[2], (__m512)v[3]);
+    const __m512 rows[4] = {
+        (__m512)_mm512_unpacklo_pd((__m512d)a, (__m512d)c), (__m512)_mm512_unpackhi_pd((__m512d)a, (__m512d)c),
+        (__m512)_mm512_unpacklo_pd((__m512d)b, (__m512d)d), (__m512)_mm512_unpackhi_pd((__m512d)b, (__m512d)d)};
+    for (int k = 0; k < 4; k++) {
+        _mm_storeu_ps(to + 4 * k, _mm512_extractf32x4_ps(rows[k], 0));
+        _mm_storeu_ps(to + 16 + 4 * k, _mm512_extractf32x4_ps(rows[k], 1));
+        _mm_storeu_ps(to + 32 + 4 * k, _mm512_extractf32x4_ps(rows[k], 2));
+        _mm_storeu_ps(to + 48 + 4 * k, _mm512_extractf32x4_ps(rows[k], 3));
+    }
+#else
+    for (int i = 0; i < SIMD_WIDTH; i++)
+        for (int k = 0; k < 4; k++) to[4 * i + k] = v[k][i];
+#endif
+}
+
 /* a b - c d to 1.5 units in the last place, zero only where the exact value is, and of the right sign: by Kahan's two
  * fused steps where the hardware has them, else in double, where the products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)

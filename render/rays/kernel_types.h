@@ -31,7 +31,7 @@ typedef float kernel_real;
 #define KERNEL_SHORT 2e-6f
 #endif
 
-enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64 };
+enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_SWING_BINS = 128, KERNEL_SWING_WIDTHS = 29 };
 
 /* Opacity and colour at a value x of the piece: entry[..] + (x - low) * slope. What opacity leaves, 1 - opacity, has
  * entries of its own: near an opacity of 1 the difference would be all rounding. Where a function is constant to either
@@ -62,6 +62,13 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
     float fall, rise; /* the extinction's slope with its sign, the least and the most */
 } kernel_bound;
+
+/* Of a stretch of values, between steps: what a field that is off by d does to the light is at most cost d a unit
+ * distance, and varies by swing d as long as neither the light that gets there changes nor that behind. */
+typedef struct kernel_swing {
+    float swing, cost;
+    float extinction, steepness; /* the most of the extinction, and of its slope times the contrast */
+} kernel_swing;
 
 /* A step of the opacity: its value, and that value rounded, at which pieces end. */
 typedef struct kernel_step {
@@ -104,6 +111,10 @@ typedef struct kernel_pieces {
     /* The bounds' bins begin at bin_low too; below and above the bins the function is constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
+    /* Stretches of values by their widths, in classes, and by the bin of equal width where they begin, from bin_low too
+     * (kernel_swing_entry()): KERNEL_SWING_WIDTHS x KERNEL_SWING_BINS. */
+    float swing_inverse;
+    kernel_swing *swings;
     /* There is a ramp so narrow that its ends' rounding shows: they have rests, and values near it are to have them. */
     bool has_rests;
     int step_count, steep_count;

@@ -59,6 +59,17 @@ SIMD_INLINE vf kernel_exp(vf x)
 {
     return vf_exp2(x * 1.4426950f);
 }
+
+/* Where among `swings` the stretch of the values from low to high is, in floats. */
+SIMD_INLINE vi kernel_swing_entry(const kernel_pieces *t, vf low, vf high)
+{
+    const vf zero = vf_set(0), last = vf_set(KERNEL_SWING_BINS - 1);
+    const vf begin = vf_clamp((low - t->bin_low) * t->swing_inverse, zero, last);
+    const vf end = vf_clamp((high - t->bin_low) * t->swing_inverse, begin, last);
+    /* By quarters of an octave of one more than their number of bins. */
+    const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
+    return (width * KERNEL_SWING_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_swing) / sizeof(float));
+}
 #endif
 
 /* Limits of a step (see above). */

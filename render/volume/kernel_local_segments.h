@@ -16,19 +16,27 @@
  * and segments are its chords, each raised or lowered to the polynomial's mean.
  *
  * What that costs (docs/error_budget.md). Let f be the field, v what segments have instead. Light changes by the
- * integral of g (v - f) along the ray, with g = T ((s c)' - s' b), where b is the light of all that lies behind. On
- * each segment v - f is of mean zero, but for what the polynomial is off, so that of g only what varies along the
- * segment counts: the error is at most half the oscillation of g times the integral of |v - f|. Let D be the segment's
- * depth and R the colours' contrast. Along it T falls by min(D, 1), s' varies by S, b by R D, c by c' times the change
- * of the value, and s c' by 2 s c' at most:
+ * integral of T g (v - f) along the ray, with g = (s c)' - s' b, where b is the light of all that lies behind. On each
+ * segment v - f is of mean zero, but for what the polynomial is off, so that of T g only what varies along the segment
+ * counts: the error is at most half the oscillation of T g times the integral of |v - f|. g changes with the value and
+ * with b. Over a stretch of values it is at most `cost`, and varies by `swing` while b stays; g is linear in b, so both
+ * are known from b's two bounds (kernel_swing). Let D be the segment's depth and R the colours' contrast. Along it T
+ * falls by min(D, 1), and b changes by R min(D, 1):
  *
- *     oscillation of g <= T (R S + 2 s |c'| + |s'| |c'| change + min(D, 1) (R |s'| + s |c'| + R |s'|)).
+ *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
- * No more than twice g's own bound R |s'| + s |c'|. The mean of |v - f| is 0.26 of a parabola's most at the middle,
- * P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at the quarters, 1.09 (0.67 of one chord, which crosses it in the
- * middle; 1.082 at most, times n^2, of n >= 2); and of the quartic's no more than four times
- * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2. What the polynomial itself is off is not of
- * mean zero: 2 E, and what Newton's method leaves, count whole.
+ * The mean of |v - f| is 0.26 of a parabola's most at the middle, P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at
+ * the quarters, 1.09 (0.67 of one chord, which crosses it in the middle; 1.082 at most, times n^2, of n >= 2); and of
+ * the quartic's no more than four times E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2.
+ *
+ * What the polynomial itself is off is not of mean zero: 2 E, as large on average, but no more than E in the ray's mean.
+ * So it costs E, and half the oscillation of T g times 2.6 E, which of one segment the four times E hold; or 2 E where
+ * that is less. What Newton's method leaves counts whole.
+ *
+ * Bounds are those of the cell's values, and where these ask for more than one segment, of the ray's own, which are a
+ * third of them: from the lesser to the greater of those at the faces, on the parabola's side 1.17 P more (the ends of
+ * chords are raised by P / 6), and on both 1.7 A (the cubic has 1.03 A, chords' ends 0.67 A more) and 10 E (1.33 E and
+ * 0.71 E of the quartic, the rest what the polynomial is off).
  *
  * E may vanish where higher orders do not, and of hexes P and A may as well: values at eight vertices can be such that
  * the field is on its chord at all three places. So E is taken to be no less than 0.01 (P + A) N^2 + e N^2 S, where N
@@ -74,12 +82,14 @@ typedef struct kernel_tile_ray_segments {
 
 enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32 };
 
-/* Lane by lane, what a field that is off does to the light over the cell's values. */
+/* Of the error allowed, what Newton's method may leave. */
+#define KERNEL_LOCAL_SLACK 0.4f
+
+/* Lane by lane, what a field that is off does to the light over the cell's values (kernel_swing). */
 typedef struct kernel_local_bounds {
-    float cost[SIMD_WIDTH]; /* R |s'| + s |c'| */
-    float sway[SIMD_WIDTH]; /* R S + 2 s |c'| */
-    float tint[SIMD_WIDTH]; /* |s'| |c'| */
-    float fade[SIMD_WIDTH]; /* 2 R |s'| + s |c'| */
+    float cost[SIMD_WIDTH];
+    float sway[SIMD_WIDTH];
+    float fade[SIMD_WIDTH]; /* cost and R |s'| */
     float extinction[SIMD_WIDTH];
     float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* the bounds hold between these values */
 } kernel_local_bounds;
@@ -149,33 +159,47 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local
 
 /* ---- cells ---- */
 
-/* The lane's bounds; false where its values are for bisection. Chords end beyond the cell's values: one chord by no
+/* Lanes of cells among whose values are steps of the opacity or steep ramps. */
+SIMD_INLINE vm kernel_local_is_steep(const kernel_segment_state *state, vf low, vf high)
+{
+    vm any = kernel_span_is_steep(state, low, high, false);
+    for (int i = 0; i < state->pieces->step_count; i++) {
+        const vf cut = vf_set(state->pieces->steps[i].cut);
+        any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
+    }
+    return any;
+}
+
+/* The lanes' bounds; returns those whose values are for bisection. Chords end beyond the cell's values: one chord by no
  * more than three sixteenths of their range (kernel_local_strays()), several by a sixth of the parabola's most, which
  * is less than that range. */
-SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_local_stretches *b, int type, int n)
+SIMD_INLINE vm kernel_local_bound(kernel_local_stretches *b, int type)
 {
-    const int count = grid_type_vertices(type);
-    const kernel_pieces *t = state->pieces;
+    const kernel_pieces *t = b->state.pieces;
     const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
-    float low = values[0][n], high = low;
-    kernel_span span = {.map = NULL};
-    for (int i = 1; i < count; i++) low = simd_min(values[i][n], low), high = simd_max(values[i][n], high);
-    const float ends[2] = {low - 0.1875f * (high - low), high + 0.1875f * (high - low)};
-    kernel_span_bound(state, ends, 2, &span);
-    if (span.step_count || span.is_steep) return false;
-    const kernel_bound s = kernel_bound_between(t, ends[0], ends[1]);
-    const float steep = t->contrast * s.extinction_slope, tinted = s.extinction_high * s.colour_slope;
-    /* A fifth of what the ray's length alone allows. */
-    const float slack = 0.2f * state->allowance / (state->reach * span.cost * b->nonlinear.sensitivity[n]);
-    b->bounds.cost[n] = span.cost;
-    b->bounds.sway[n] = simd_min(t->contrast * (s.rise - s.fall) + 2 * tinted, 1e30f);
-    b->bounds.tint[n] = simd_min(s.extinction_slope * s.colour_slope, 1e30f);
-    b->bounds.fade[n] = simd_min(2 * steep + tinted, 1e30f);
-    b->bounds.extinction[n] = s.extinction_high;
-    b->bounds.low[n] = ends[0];
-    b->bounds.high[n] = ends[1];
-    b->nonlinear.tolerance[n] = simd_min(simd_max(slack, 2e-5f), b->nonlinear.residual_limit[n]);
-    return true;
+    vf low = vf_load(values[0]), high = low, sway, cost, extinction, steepness;
+    for (int i = 1; i < grid_type_vertices(type); i++) {
+        low = vf_min(vf_load(values[i]), low);
+        high = vf_max(vf_load(values[i]), high);
+    }
+    const vf margin = 0.1875f * (high - low);
+    low -= margin;
+    high += margin;
+    const vi entry = kernel_swing_entry(t, low, high);
+    vf_gather_pair(&t->swings->swing, entry, &sway, &cost);
+    vf_gather_pair(&t->swings->extinction, entry, &extinction, &steepness);
+    vf_store(b->bounds.cost, cost);
+    vf_store(b->bounds.sway, sway);
+    vf_store(b->bounds.fade, cost + steepness);
+    vf_store(b->bounds.extinction, extinction);
+    vf_store(b->bounds.low, low);
+    vf_store(b->bounds.high, high);
+    /* A share of what the ray's length alone allows. */
+    const vf slack =
+        vf_set(KERNEL_LOCAL_SLACK * b->state.allowance / b->state.reach) / (cost * vf_load(b->nonlinear.sensitivity));
+    const vf tolerance = vf_min(vf_max(slack, vf_set(2e-5f)), vf_load(b->nonlinear.residual_limit));
+    vf_store(b->nonlinear.tolerance, tolerance);
+    return kernel_local_is_steep(&b->state, low, high);
 }
 
 /* ---- rays in cells ---- */
@@ -200,11 +224,13 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_stretches *b, const kernel
                  vf_lt(kernel_local_take(b->bounds.high, p->rays.lane), high));
 }
 
-/* What one segment for all of a ray's way through its cell makes wrong of the light. */
+/* What makes one segment for all of a ray's way through its cell wrong. */
 typedef struct kernel_local_wrong {
-    vf made;   /* falls with the square of their number, if there are more */
-    vf rest;   /* does not */
-    vf length; /* unit distances */
+    vf mean;    /* how far it is off in the mean: by that over the square of their number, if there are more */
+    vf quartic; /* E */
+    vf unknown; /* what Newton's method leaves */
+    vf length;  /* unit distances */
+    vf fade;    /* what T and b make g vary by */
 } kernel_local_wrong;
 
 SIMD_INLINE void kernel_local_wrong_of(const kernel_local_stretches *b, const kernel_local_pairs *p,
@@ -215,18 +241,30 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_stretches *b, const ke
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
     const vf bend = kernel_local_take(b->lanes.cells.bend, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, kernel_local_take(b->nonlinear.unseen, lane));
-    const vf quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
-    const vf change = vf_abs(p->ends[1].v - p->ends[0].v) + 3.0f * (parabola + cubic);
-    const vf cost = kernel_local_take(b->bounds.cost, lane);
     const vf depth = vf_min(kernel_local_take(b->bounds.extinction, lane) * length, vf_set(1));
-    const vf sway =
-        vf_muladd(kernel_local_take(b->bounds.tint, lane), change,
-                  vf_muladd(kernel_local_take(b->bounds.fade, lane), depth, kernel_local_take(b->bounds.sway, lane)));
-    const vf mean = 0.26f * parabola + (1.09f * cubic + 4.0f * quartic);
-    out->made = (0.5f * vf_min(sway, 2.0f * cost)) * (mean * length);
-    const vf unknown = kernel_local_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
-    out->rest = cost * length * (2.0f * quartic + unknown);
+    out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
+    out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
+    out->unknown = kernel_local_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
     out->length = length;
+    out->fade = kernel_local_take(b->bounds.fade, lane) * depth;
+}
+
+/* What one segment makes wrong a unit distance: by what varies along it, and by its mean. */
+SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, vf cost)
+{
+    const vf half = vf_min(0.5f * (sway + w->fade), cost);
+    return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
+}
+
+/* The bounds over the ray's own values: of the field and of chords (see above). */
+SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic, vf *sway,
+                                        vf *cost)
+{
+    const vf *d = p->off_chord.field, v0 = p->ends[0].v, v1 = p->ends[1].v, zero = vf_set(0);
+    const vf wide = 0.85f * vf_abs(d[2] - d[0]) + 10.0f * quartic;
+    const vf low = vf_min(v0, v1) + (1.17f * vf_min(d[1], zero) - wide);
+    const vf high = vf_max(v0, v1) + (1.17f * vf_max(d[1], zero) + wide);
+    vf_gather_pair(&t->swings->swing, kernel_swing_entry(t, low, high), sway, cost);
 }
 
 /* Into how many segments, and the rays for which no number will do. */
@@ -236,29 +274,36 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
                                                                 kernel_local_pairs *p)
 {
     const kernel_transfer *transfer = &t->frame->volumes[0];
-    const vf v0 = p->ends[0].v, v1 = p->ends[1].v;
-    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
+    const vf v0 = p->ends[0].v, v1 = p->ends[1].v, one = vf_set(1);
+    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1)), sway, cost;
     for (int i = 0; i < 3; i++) {
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->off_chord.field[i];
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
-    const vf seen = wrong->length * opacities;
-    const vf allowed = state->allowance * (wrong->length * (1 / state->reach) + seen / (1.0f + seen));
-    const vf left = allowed - wrong->rest;
-    const vf wanted = -vf_floor(-vf_sqrt(wrong->made / vf_max(left, vf_set(1e-30f))));
-    p->count = vf_clamp(wanted, least, vf_set(KERNEL_LOCAL_PIECES + 1));
-    return vm_or(vm_not(vf_lt(wrong->rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
+    kernel_local_own_bound(state->pieces, p, wrong->quartic, &sway, &cost);
+    /* A unit distance. */
+    const vf allowed =
+        state->allowance * (vf_set(1 / state->reach) + opacities / vf_muladd(wrong->length, opacities, one));
+    const vm few = vf_le(kernel_local_wrong_by_one(wrong, sway, cost), allowed);
+    const vf half = vf_min(0.5f * (sway + wrong->fade), cost), made = half * wrong->mean;
+    const vf rest = cost * (wrong->quartic + wrong->unknown) + vf_min(2.6f * half, cost) * wrong->quartic;
+    const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
+    p->count = vf_select(few, least, vf_clamp(wanted, vf_set(2), vf_set(KERNEL_LOCAL_PIECES + 1)));
+    const vm fails = vm_or(vm_not(vf_lt(rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
+    return vm_andnot(fails, few);
 }
 
-/* As above, but asks first by the ray's length alone whether one segment is enough. */
+/* As above, but asks first by the ray's length alone, and by the bounds over all of the cell's values, whether one
+ * segment is enough. */
 SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_stretches *b, kernel_local_pairs *p)
 {
     kernel_local_wrong wrong;
     kernel_local_wrong_of(b, p, &wrong);
-    const vf one = vf_set(1), allowed = wrong.length * (b->state.allowance * (1 / b->state.reach));
+    const vf one = vf_set(1), allowed = vf_set(b->state.allowance * (1 / b->state.reach));
+    const vf sway = kernel_local_take(b->bounds.sway, p->rays.lane),
+             cost = kernel_local_take(b->bounds.cost, p->rays.lane);
     const vm strays = kernel_local_strays(b, p);
-    const vm few = vm_and(vf_le(wrong.made, allowed - wrong.rest), vf_lt(wrong.rest, 0.9f * allowed));
-    const vm enough = vm_andnot(few, strays);
+    const vm enough = vm_andnot(vf_le(kernel_local_wrong_by_one(&wrong, sway, cost), allowed), strays);
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
     const vm none = kernel_local_count_by_depth(t, &b->state, &wrong, vf_select(strays, 2.0f * one, one), p);
@@ -295,17 +340,39 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
     return u * odd + p->b * square * (0.125f - 0.25f * square);
 }
 
-/* The rays' segments. */
-SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel_local_pairs *p)
+/* A segment a lane, of rays in their windows. */
+SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays,
+                                      const vf ends[4])
+{
+    kernel_segment all[SIMD_WIDTH];
+    int32_t at[SIMD_WIDTH];
+    memcpy(at, &p->rays.at, sizeof at);
+    vf_store_rows(&all[0].t_in, ends);
+    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        kernel_local_put(b, at[i], &all[i]);
+    }
+}
+
+/* Of rays for which one segment is enough. */
+SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
+{
+    const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t;
+    const vf lift = (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
+    const vf ends[4] = {t0, t1, p->ends[0].v + lift, p->ends[1].v + lift};
+    kernel_local_put_all(b, p, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
+}
+
+/* Of the others. */
+static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
+                                                             const kernel_local_pairs *p, vm rays)
 {
     const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].v, v1 = p->ends[1].v;
     const vf share = 1.0f / p->count, span = t1 - t0, rise = v1 - v0;
     kernel_local_polynomial f = {.a = 4.0f * d[1], .b = (32.0f / 3) * (d[2] - d[0])};
-    int32_t at[SIMD_WIDTH];
     f.c = 16.0f * ((8.0f / 3) * (d[0] + d[2]) - f.a);
-    memcpy(at, &p->rays.at, sizeof at);
     vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(&f, u0);
-    vm open = p->active;
+    vm open = rays;
     for (int n = 1; vm_any(open); n++) {
         const vf number = vf_set((float)n), along = number * share;
         const vm inner = vm_and(open, vf_lt(number, p->count));
@@ -313,17 +380,8 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel
         const vf to = vf_select(inner, t0 + span * along, t1), off1 = kernel_local_deviation(&f, u1);
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
-        float lanes[4][SIMD_WIDTH];
-        vf_store(lanes[0], from);
-        vf_store(lanes[1], to);
-        vf_store(lanes[2], in);
-        vf_store(lanes[3], out);
-        const vm kept = vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to)));
-        for (unsigned bits = vm_bits(kept); bits; bits &= bits - 1) {
-            const int i = __builtin_ctz(bits);
-            const kernel_segment s = {lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]};
-            kernel_local_put(b, at[i], &s);
-        }
+        const vf ends[4] = {from, to, in, out};
+        kernel_local_put_all(b, p, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), ends);
         from = to;
         u0 = u1;
         off0 = off1;
@@ -413,7 +471,9 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     kernel_local_deviations_of(&b->lanes.cells, &b->nonlinear, p.rays.lane, p.active, p.ends, type, &p.off_chord);
     const vm odd = vm_and(p.active, vm_or(vm_or(cut, p.off_chord.has_diverged), kernel_local_count(t, b, &p)));
     p.active = vm_andnot(p.active, odd);
-    kernel_local_emit(b, &p);
+    const vm single = vm_and(p.active, vf_le(p.count, vf_set(1))), more = vm_andnot(p.active, single);
+    kernel_local_emit_one(b, &p, single);
+    if (vm_any(more)) kernel_local_emit_more(b, &p, more);
     if (__builtin_expect(vm_any(odd), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(odd));
 }
 
@@ -496,10 +556,7 @@ static __attribute__((noinline)) unsigned kernel_local_segments_place(const kern
 {
     const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes) & all;
     *lanes &= all;
-    for (unsigned more = *lanes; more; more &= more - 1) {
-        const int n = __builtin_ctz(more);
-        if (!kernel_local_bound(&b->state, b, type, n)) *lanes &= ~(1u << n);
-    }
+    *lanes &= ~vm_bits(KERNEL_OF_TYPE(type, kernel_local_bound, b));
     return showing;
 }
 

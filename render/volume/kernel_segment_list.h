@@ -315,8 +315,6 @@ SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low,
         b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
         b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
         b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
-        b.fall = simd_min(t->bounds[i].fall, b.fall);
-        b.rise = simd_max(t->bounds[i].rise, b.rise);
     }
     return b;
 }

@@ -251,6 +251,97 @@ static void fill_steep(kernel_pieces *out, const render_transfer *t)
     }
 }
 
+/* ---- how bounds vary ----
+ *
+ * A field that is off by d changes the light by T d g a unit distance, g = s' (c - b) + s c' in each channel, with the
+ * light b of all that lies behind, between the least and the most of colours. g is linear in b, so that over a stretch
+ * of values it varies by no more than at one of these two. Of the alpha channel g is s'. */
+enum { SWING_KINDS = 7 };
+
+typedef struct value_swing {
+    double low[SWING_KINDS], high[SWING_KINDS];
+    double extinction;
+} value_swing;
+
+static void widen_swing(value_swing *swing, int kind, double low, double high)
+{
+    swing->low[kind] = fmin(swing->low[kind], fmax(low, -1e30));
+    swing->high[kind] = fmax(swing->high[kind], fmin(high, 1e30));
+}
+
+/* Widens the swing by the piece between two of its values. */
+static void swing_in_piece(value_swing *swing, const kernel_piece *p, double from, double to, const double behind[2])
+{
+    kernel_bound b = {.extinction_low = 1e30f, .fall = 1e30f, .rise = -1e30f};
+    widen(&b, p, from, to);
+    const double fall = (double)b.fall, rise = (double)b.rise;
+    const double least = (double)b.extinction_low, most = (double)b.extinction_high;
+    swing->extinction = fmax(most, swing->extinction);
+    widen_swing(swing, 0, fall, rise);
+    for (int kind = 1; kind < SWING_KINDS; kind++) {
+        const int channel = (kind - 1) / 2;
+        const double slope = (double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + channel];
+        const double first = (double)p->entry[KERNEL_PIECE_COLOUR + channel] - behind[kind % 2];
+        const double c0 = first + (from - (double)p->entry[KERNEL_PIECE_LOW]) * slope, c1 = c0 + (to - from) * slope;
+        const double corners[4] = {fall * c0, fall * c1, rise * c0, rise * c1};
+        const double low = fmin(fmin(corners[0], corners[1]), fmin(corners[2], corners[3]));
+        const double high = fmax(fmax(corners[0], corners[1]), fmax(corners[2], corners[3]));
+        widen_swing(swing, kind, low + fmin(least * slope, most * slope), high + fmax(least * slope, most * slope));
+    }
+}
+
+/* The bin's, a little beyond its ends; what is beyond the first and the last bin is theirs. No piece before the first
+ * reaches the bin; returns the first that reaches the next one. */
+static int swing_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2], value_swing *swing)
+{
+    const double width = 1 / (double)t->swing_inverse, begin = (double)t->bin_low + (bin - 1e-3) * width;
+    const double low = bin > 0 ? begin : -(double)endless;
+    const double high = bin + 1 < KERNEL_SWING_BINS ? begin + 1.002 * width : (double)endless;
+    swing->extinction = 0;
+    for (int kind = 0; kind < SWING_KINDS; kind++) swing->low[kind] = INFINITY, swing->high[kind] = -INFINITY;
+    while (piece + 1 < t->count && (double)t->pieces[piece].entry[KERNEL_PIECE_HIGH] < low) piece++;
+    for (int i = piece; i < t->count && (double)t->pieces[i].entry[KERNEL_PIECE_LOW] <= high; i++) {
+        const double from = fmax(low, (double)t->pieces[i].entry[KERNEL_PIECE_LOW]);
+        const double to = fmin(high, (double)t->pieces[i].entry[KERNEL_PIECE_HIGH]);
+        swing_in_piece(swing, &t->pieces[i], from, to, behind);
+    }
+    return piece;
+}
+
+static void unite_swings(value_swing *a, const value_swing *b)
+{
+    for (int kind = 0; kind < SWING_KINDS; kind++) widen_swing(a, kind, b->low[kind], b->high[kind]);
+    a->extinction = fmax(a->extinction, b->extinction);
+}
+
+static void sum_up_swing(const value_swing *s, double contrast, kernel_swing *out)
+{
+    double swing = 0, cost = 0;
+    for (int kind = 0; kind < SWING_KINDS; kind++) {
+        swing = fmax(swing, s->high[kind] - s->low[kind]);
+        cost = fmax(cost, fmax(-s->low[kind], s->high[kind]));
+    }
+    *out = (kernel_swing){.swing = (float)fmin(swing * (1 + rounding), 1e30),
+                          .cost = (float)fmin(cost * (1 + rounding), 1e30),
+                          .extinction = (float)s->extinction,
+                          .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
+}
+
+/* A stretch of a width's class ends in the wanted bin or before it, wherever in its first bin it begins. */
+static void fill_swings(kernel_pieces *out, const double behind[2])
+{
+    value_swing bins[KERNEL_SWING_BINS];
+    for (int i = 0, piece = 0; i < KERNEL_SWING_BINS; i++) piece = swing_in_bin(out, i, piece, behind, &bins[i]);
+    for (int first = 0; first < KERNEL_SWING_BINS; first++) {
+        value_swing all = bins[first];
+        for (int width = 0, last = first; width < KERNEL_SWING_WIDTHS; width++) {
+            const int wanted = first + (int)ceil(ldexp(1 + 0.25 * (width % 4 + 1), width / 4)) - 1;
+            for (; last < wanted && last + 1 < KERNEL_SWING_BINS; last++) unite_swings(&all, &bins[last + 1]);
+            sum_up_swing(&all, behind[1] - behind[0], &out->swings[width * KERNEL_SWING_BINS + first]);
+        }
+    }
+}
+
 static void fill_bounds(kernel_pieces *out, const render_transfer *t)
 {
     float low = 0, high = 1;
@@ -262,6 +353,7 @@ static void fill_bounds(kernel_pieces *out, const render_transfer *t)
         high = fmaxf(high, t->colours[i]);
     }
     out->contrast = high - low;
+    fill_swings(out, (const double[]){(double)low, (double)high});
 }
 
 static void fill(kernel_pieces *out, const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
@@ -274,6 +366,7 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     out->bin_low = cuts[0];
     out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
     out->bound_inverse = (float)(KERNEL_BOUND_BINS / (double)(cuts[count - 1] - cuts[0]));
+    out->swing_inverse = (float)(KERNEL_SWING_BINS / (double)(cuts[count - 1] - cuts[0]));
     fill_bins(out);
     fill_bounds(out, t);
     fill_steps(out, t);
@@ -287,7 +380,8 @@ insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, 
     kernel_real *cuts = base_calloc(most, sizeof *cuts);
     kept_entry *entries = base_calloc((size_t)t->colour_count, sizeof *entries);
     out->pieces = base_calloc(most + 1, sizeof *out->pieces);
-    const bool has_room = cuts && entries && out->pieces;
+    out->swings = base_calloc(KERNEL_SWING_WIDTHS * KERNEL_SWING_BINS, sizeof *out->swings);
+    const bool has_room = cuts && entries && out->pieces && out->swings;
     if (has_room) fill(out, t, tolerance, cuts, entries);
     base_free(cuts);
     base_free(entries);
@@ -301,6 +395,8 @@ void render_pieces_free(kernel_pieces *pieces)
     if (pieces->preintegral) base_free(pieces->preintegral->entries);
     base_free(pieces->preintegral);
     base_free(pieces->pieces);
+    base_free(pieces->swings);
     pieces->preintegral = NULL;
     pieces->pieces = NULL;
+    pieces->swings = NULL;
 }
