@@ -394,51 +394,60 @@ SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
 #endif
 }
 
+/* Transposes the four by four numbers in each four lanes of four vectors. */
+SIMD_INLINE void vf_transpose(vf v[4])
+{
+#if defined(SIMD_AVX512)
+    const __m512 a = _mm512_unpacklo_ps((__m512)v[0], (__m512)v[1]), b = _mm512_unpackhi_ps((__m512)v[0], (__m512)v[1]);
+    const __m512 c = _mm512_unpacklo_ps((__m512)v[2], (__m512)v[3]), d = _mm512_unpackhi_ps((__m512)v[2], (__m512)v[3]);
+    v[0] = (vf)_mm512_unpacklo_pd((__m512d)a, (__m512d)c);
+    v[1] = (vf)_mm512_unpackhi_pd((__m512d)a, (__m512d)c);
+    v[2] = (vf)_mm512_unpacklo_pd((__m512d)b, (__m512d)d);
+    v[3] = (vf)_mm512_unpackhi_pd((__m512d)b, (__m512d)d);
+#elif defined(SIMD_AVX2)
+    const __m256 a = _mm256_unpacklo_ps((__m256)v[0], (__m256)v[1]), b = _mm256_unpackhi_ps((__m256)v[0], (__m256)v[1]);
+    const __m256 c = _mm256_unpacklo_ps((__m256)v[2], (__m256)v[3]), d = _mm256_unpackhi_ps((__m256)v[2], (__m256)v[3]);
+    v[0] = (vf)_mm256_unpacklo_pd((__m256d)a, (__m256d)c);
+    v[1] = (vf)_mm256_unpackhi_pd((__m256d)a, (__m256d)c);
+    v[2] = (vf)_mm256_unpacklo_pd((__m256d)b, (__m256d)d);
+    v[3] = (vf)_mm256_unpackhi_pd((__m256d)b, (__m256d)d);
+#elif defined(SIMD_SSE42)
+    __m128 row[4];
+    for (int i = 0; i < 4; i++) row[i] = (__m128)v[i];
+    _MM_TRANSPOSE4_PS(row[0], row[1], row[2], row[3]);
+    for (int i = 0; i < 4; i++) v[i] = (vf)row[i];
+#else
+    for (int n = 0; n < 4; n++)
+        for (int i = 0; i < n; i++) {
+            const float above = v[i][n];
+            v[i][n] = v[n][i];
+            v[n][i] = above;
+        }
+#endif
+}
+
+/* base[index], base[index + 1] and the two behind them in the first four lanes; in the next four those of index[4]. */
+SIMD_INLINE vf vf_load_quarters(const float *base, const int32_t *index)
+{
+#if defined(SIMD_AVX512)
+    __m512 row = _mm512_castps128_ps512(_mm_loadu_ps(base + index[0]));
+    row = _mm512_insertf32x4(row, _mm_loadu_ps(base + index[4]), 1);
+    row = _mm512_insertf32x4(row, _mm_loadu_ps(base + index[8]), 2);
+    return (vf)_mm512_insertf32x4(row, _mm_loadu_ps(base + index[12]), 3);
+#elif defined(SIMD_AVX2)
+    const __m256 row = _mm256_castps128_ps256(_mm_loadu_ps(base + index[0]));
+    return (vf)_mm256_insertf128_ps(row, _mm_loadu_ps(base + index[4]), 1);
+#else
+    return vf_load(base + index[0]);
+#endif
+}
+
 /* base[index + n] to out[n], for n from 0 to 3. Rows of four are loaded whole and transposed, which takes fewer
  * instructions than gathering their columns. */
 SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDTH], vf out[4])
 {
-#if defined(SIMD_AVX512)
-    __m512 row[4];
-    for (int i = 0; i < 4; i++) {
-        row[i] = _mm512_castps128_ps512(_mm_loadu_ps(base + index[i]));
-        row[i] = _mm512_insertf32x4(row[i], _mm_loadu_ps(base + index[i + 4]), 1);
-        row[i] = _mm512_insertf32x4(row[i], _mm_loadu_ps(base + index[i + 8]), 2);
-        row[i] = _mm512_insertf32x4(row[i], _mm_loadu_ps(base + index[i + 12]), 3);
-    }
-    const __m512d a = _mm512_castps_pd(_mm512_unpacklo_ps(row[0], row[1]));
-    const __m512d b = _mm512_castps_pd(_mm512_unpackhi_ps(row[0], row[1]));
-    const __m512d c = _mm512_castps_pd(_mm512_unpacklo_ps(row[2], row[3]));
-    const __m512d d = _mm512_castps_pd(_mm512_unpackhi_ps(row[2], row[3]));
-    out[0] = (vf)_mm512_castpd_ps(_mm512_unpacklo_pd(a, c));
-    out[1] = (vf)_mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
-    out[2] = (vf)_mm512_castpd_ps(_mm512_unpacklo_pd(b, d));
-    out[3] = (vf)_mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
-#elif defined(SIMD_AVX2)
-    __m256 row[4];
-    for (int i = 0; i < 4; i++)
-        row[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base + index[i])),
-                                      _mm_loadu_ps(base + index[i + 4]), 1);
-    const __m256d a = _mm256_castps_pd(_mm256_unpacklo_ps(row[0], row[1]));
-    const __m256d b = _mm256_castps_pd(_mm256_unpackhi_ps(row[0], row[1]));
-    const __m256d c = _mm256_castps_pd(_mm256_unpacklo_ps(row[2], row[3]));
-    const __m256d d = _mm256_castps_pd(_mm256_unpackhi_ps(row[2], row[3]));
-    out[0] = (vf)_mm256_castpd_ps(_mm256_unpacklo_pd(a, c));
-    out[1] = (vf)_mm256_castpd_ps(_mm256_unpackhi_pd(a, c));
-    out[2] = (vf)_mm256_castpd_ps(_mm256_unpacklo_pd(b, d));
-    out[3] = (vf)_mm256_castpd_ps(_mm256_unpackhi_pd(b, d));
-#elif defined(SIMD_SSE42)
-    __m128 row[4];
-    for (int i = 0; i < 4; i++) row[i] = _mm_loadu_ps(base + index[i]);
-    _MM_TRANSPOSE4_PS(row[0], row[1], row[2], row[3]);
-    for (int i = 0; i < 4; i++) out[i] = (vf)row[i];
-#else
-    for (int n = 0; n < 4; n++) {
-        float column[SIMD_WIDTH];
-        for (int i = 0; i < SIMD_WIDTH; i++) column[i] = base[index[i] + n];
-        out[n] = vf_load(column);
-    }
-#endif
+    for (int n = 0; n < 4; n++) out[n] = vf_load_quarters(base, index + n);
+    vf_transpose(out);
 }
 
 /* Doubles, a lane for each of a half of a vf's; a whole is two of these. */
@@ -527,25 +536,22 @@ SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 #endif
 }
 
-/* SIMD_WIDTH rows of four: a lane of each. */
+/* Stores SIMD_WIDTH rows of four, a lane of each vector. */
 SIMD_INLINE void vf_store_rows(float *to, const vf v[4])
 {
+    vf rows[4] = {v[0], v[1], v[2], v[3]};
+    vf_transpose(rows);
+    for (int n = 0; n < 4; n++) {
 #if defined(SIMD_AVX512)
-    const __m512 a = _mm512_unpacklo_ps((__m512)v[0], (__m512)v[1]), b = _mm512_unpackhi_ps((__m512)v[0], (__m512)v[1]);
-    const __m512 c = _mm512_unpacklo_ps((__m512)v[2], (__m512)v[3]), d = _mm512_unpackhi_ps((__m512)v[2], (__m512)v[3]);
-    const __m512 rows[4] = {
-        (__m512)_mm512_unpacklo_pd((__m512d)a, (__m512d)c), (__m512)_mm512_unpackhi_pd((__m512d)a, (__m512d)c),
-        (__m512)_mm512_unpacklo_pd((__m512d)b, (__m512d)d), (__m512)_mm512_unpackhi_pd((__m512d)b, (__m512d)d)};
-    for (int k = 0; k < 4; k++) {
-        _mm_storeu_ps(to + 4 * k, _mm512_extractf32x4_ps(rows[k], 0));
-        _mm_storeu_ps(to + 16 + 4 * k, _mm512_extractf32x4_ps(rows[k], 1));
-        _mm_storeu_ps(to + 32 + 4 * k, _mm512_extractf32x4_ps(rows[k], 2));
-        _mm_storeu_ps(to + 48 + 4 * k, _mm512_extractf32x4_ps(rows[k], 3));
-    }
+        _mm_storeu_ps(to + 4 * n, _mm512_extractf32x4_ps((__m512)rows[n], 0));
+        _mm_storeu_ps(to + 4 * n + 16, _mm512_extractf32x4_ps((__m512)rows[n], 1));
+        _mm_storeu_ps(to + 4 * n + 32, _mm512_extractf32x4_ps((__m512)rows[n], 2));
+        _mm_storeu_ps(to + 4 * n + 48, _mm512_extractf32x4_ps((__m512)rows[n], 3));
 #else
-    for (int i = 0; i < SIMD_WIDTH; i++)
-        for (int k = 0; k < 4; k++) to[4 * i + k] = v[k][i];
+        for (int i = 0; i < SIMD_WIDTH; i += 4)
+            memcpy(to + 4 * (n + i), (const float *)&rows[n] + i, 4 * sizeof(float));
 #endif
+    }
 }
 
 /* a b - c d to 1.5 units in the last place, zero only where the exact value is, and of the right sign: by Kahan's two
