@@ -29,9 +29,9 @@
  * the quarters, 1.09 (0.67 of one chord, which crosses it in the middle; 1.082 at most, times n^2, of n >= 2); and of
  * the quartic's no more than four times E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2.
  *
- * What the polynomial itself is off is not of mean zero: 2 E, as large on average, but no more than E in the ray's mean.
- * So it costs E, and half the oscillation of T g times 2.6 E, which of one segment the four times E hold; or 2 E where
- * that is less. What Newton's method leaves counts whole.
+ * What the polynomial itself is off is not of mean zero: 2 E, as large on average, but no more than E in the ray's
+ * mean. So it costs E, and half the oscillation of T g times 2.6 E, which of one segment the four times E hold; or 2 E
+ * where that is less. What Newton's method leaves counts whole.
  *
  * Bounds are those of the cell's values, and where these ask for more than one segment, of the ray's own, which are a
  * third of them: from the lesser to the greater of those at the faces, on the parabola's side 1.17 P more (the ends of
