@@ -19,7 +19,7 @@ static const double steepest = 1e6; /* kernel_integral.h: KERNEL_OPAQUE */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
 /* How close together the ends of a segment may be goes as the square of a bin's width, over the error. For 1e-2 it is
- * 160 KB, which a core's second cache holds beside a tile's rays. */
+ * 196 KB, which a core's second cache holds beside a tile's rays. */
 static int bin_count_for(double max_error)
 {
     int count = LEAST_BINS;
