@@ -277,6 +277,17 @@ static double scene_reach(const render_job *job)
  * opacity of 1 they were off by 3.4e-5 at most. */
 static const double double_error = 2e-4;
 
+/* Tells whether there may be cells whose segments are made in lanes (kernel_local_segments.h). */
+static bool has_curved_cells(const render_job *job)
+{
+    for (int i = 0; i < job->part_count; i++) {
+        const grid *g = job->parts[i].cells;
+        if (g->cell_types || g->cell_type == GRID_HEX || g->cell_type == GRID_WEDGE || g->cell_type == GRID_PYRAMID)
+            return true;
+    }
+    return false;
+}
+
 /* An eighth of max_error goes to the colours' table, and four fifths to the field (docs/error_budget.md): half of these
  * over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half of that for
  * their mixing. */
@@ -303,6 +314,8 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
         if (status == INSITU_OK && error_of_each > 0 && !is_apart)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
     }
+    if (status == INSITU_OK && f->allowance > 0 && !f->is_double && has_curved_cells(job))
+        status = render_swings_build(&f->pieces[0], job->volumes[0].transfer, error);
     return status;
 }
 

@@ -60,7 +60,6 @@ typedef struct kernel_piece {
  * domain. */
 typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
-    float fall, rise; /* the extinction's slope with its sign, the least and the most */
 } kernel_bound;
 
 /* Of a stretch of values, between steps: what a field that is off by d does to the light is at most cost d a unit

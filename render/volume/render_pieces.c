@@ -194,17 +194,23 @@ static double piece_opacity(const kernel_piece *p, double x)
 }
 
 /* Widens the bin's bounds by those of the piece between two of its values. */
-static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
+/* The least and the most of how steeply the extinction rises or falls between two values of a piece. */
+static void steepness_of(const kernel_piece *p, double from, double to, double out[2])
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
-    const double slope = (double)p->entry[KERNEL_PIECE_SLOPE], steepness = fabs(slope);
+    const double steepness = fabs((double)p->entry[KERNEL_PIECE_SLOPE]);
+    out[0] = steepness / fmax(1 - fmin(a0, a1), 1e-30);
+    out[1] = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
+}
+
+static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
+{
+    const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to);
+    double steepness[2];
+    steepness_of(p, from, to, steepness);
     b->extinction_low = fminf(b->extinction_low, (float)extinction_of(fmin(a0, a1)));
-    b->extinction_high = largest(extinction_of(most), b->extinction_high);
-    const double steepest_here = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
-    const double flattest_here = steepness / fmax(1 - fmin(a0, a1), 1e-30);
-    b->extinction_slope = largest(steepest_here, b->extinction_slope);
-    b->fall = fminf(b->fall, (float)(slope < 0 ? -steepest_here : flattest_here));
-    b->rise = largest(slope < 0 ? -flattest_here : steepest_here, b->rise);
+    b->extinction_high = largest(extinction_of(fmax(a0, a1)), b->extinction_high);
+    b->extinction_slope = largest(steepness[1], b->extinction_slope);
     for (int c = 0; c < 3; c++)
         b->colour_slope = largest(fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]), b->colour_slope);
 }
@@ -251,6 +257,16 @@ static void fill_steep(kernel_pieces *out, const render_transfer *t)
     }
 }
 
+/* The least and the most of what light may be. */
+static void range_of_light(const render_transfer *t, float *low, float *high)
+{
+    *low = 0, *high = 1;
+    for (int i = 0; i < 3 * t->colour_count; i++) {
+        *low = fminf(*low, t->colours[i]);
+        *high = fmaxf(*high, t->colours[i]);
+    }
+}
+
 /* ---- how bounds vary ----
  *
  * A field that is off by d changes the light by T d g a unit distance, g = s' (c - b) + s c' in each channel, with the
@@ -269,12 +285,26 @@ static void widen_swing(value_swing *swing, int kind, double low, double high)
     swing->high[kind] = fmax(swing->high[kind], fmin(high, 1e30));
 }
 
+/* Widens a by b. By comparisons, as fmin() and fmax() are calls, of which a frame would have 200,000. */
+static void unite_swings(value_swing *a, const value_swing *b)
+{
+    for (int kind = 0; kind < SWING_KINDS; kind++) {
+        a->low[kind] = b->low[kind] < a->low[kind] ? b->low[kind] : a->low[kind];
+        a->high[kind] = b->high[kind] > a->high[kind] ? b->high[kind] : a->high[kind];
+    }
+    a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
+}
+
 /* Widens the swing by the piece between two of its values. */
 static void swing_in_piece(value_swing *swing, const kernel_piece *p, double from, double to, const double behind[2])
 {
-    kernel_bound b = {.extinction_low = 1e30f, .fall = 1e30f, .rise = -1e30f};
+    kernel_bound b = {.extinction_low = 1e30f};
+    const bool falls = p->entry[KERNEL_PIECE_SLOPE] < 0;
+    double steepness[2];
     widen(&b, p, from, to);
-    const double fall = (double)b.fall, rise = (double)b.rise;
+    steepness_of(p, from, to, steepness);
+    /* The extinction's slope with its sign, the least and the most. */
+    const double fall = falls ? -steepness[1] : steepness[0], rise = falls ? -steepness[0] : steepness[1];
     const double least = (double)b.extinction_low, most = (double)b.extinction_high;
     swing->extinction = fmax(most, swing->extinction);
     widen_swing(swing, 0, fall, rise);
@@ -308,12 +338,6 @@ static int swing_in_bin(const kernel_pieces *t, int bin, int piece, const double
     return piece;
 }
 
-static void unite_swings(value_swing *a, const value_swing *b)
-{
-    for (int kind = 0; kind < SWING_KINDS; kind++) widen_swing(a, kind, b->low[kind], b->high[kind]);
-    a->extinction = fmax(a->extinction, b->extinction);
-}
-
 static void sum_up_swing(const value_swing *s, double contrast, kernel_swing *out)
 {
     double swing = 0, cost = 0;
@@ -344,16 +368,11 @@ static void fill_swings(kernel_pieces *out, const double behind[2])
 
 static void fill_bounds(kernel_pieces *out, const render_transfer *t)
 {
-    float low = 0, high = 1;
-    for (int i = 0; i < KERNEL_BOUND_BINS; i++)
-        out->bounds[i] = (kernel_bound){.extinction_low = 1e30f, .fall = 1e30f, .rise = -1e30f};
+    float low, high;
+    for (int i = 0; i < KERNEL_BOUND_BINS; i++) out->bounds[i] = (kernel_bound){.extinction_low = 1e30f};
     for (int i = 0; i < out->count; i++) bound_piece(out, &out->pieces[i]);
-    for (int i = 0; i < 3 * t->colour_count; i++) {
-        low = fminf(low, t->colours[i]);
-        high = fmaxf(high, t->colours[i]);
-    }
+    range_of_light(t, &low, &high);
     out->contrast = high - low;
-    fill_swings(out, (const double[]){(double)low, (double)high});
 }
 
 static void fill(kernel_pieces *out, const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
@@ -366,7 +385,6 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     out->bin_low = cuts[0];
     out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
     out->bound_inverse = (float)(KERNEL_BOUND_BINS / (double)(cuts[count - 1] - cuts[0]));
-    out->swing_inverse = (float)(KERNEL_SWING_BINS / (double)(cuts[count - 1] - cuts[0]));
     fill_bins(out);
     fill_bounds(out, t);
     fill_steps(out, t);
@@ -380,14 +398,25 @@ insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, 
     kernel_real *cuts = base_calloc(most, sizeof *cuts);
     kept_entry *entries = base_calloc((size_t)t->colour_count, sizeof *entries);
     out->pieces = base_calloc(most + 1, sizeof *out->pieces);
-    out->swings = base_calloc(KERNEL_SWING_WIDTHS * KERNEL_SWING_BINS, sizeof *out->swings);
-    const bool has_room = cuts && entries && out->pieces && out->swings;
+    const bool has_room = cuts && entries && out->pieces;
     if (has_room) fill(out, t, tolerance, cuts, entries);
     base_free(cuts);
     base_free(entries);
     if (has_room) return INSITU_OK;
     render_pieces_free(out);
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for a transfer function of %d colours", t->colour_count);
+}
+
+insitu_status render_swings_build(kernel_pieces *pieces, const render_transfer *t, base_error *error)
+{
+    float low, high;
+    range_of_light(t, &low, &high);
+    pieces->swings = base_calloc(KERNEL_SWING_WIDTHS * KERNEL_SWING_BINS, sizeof *pieces->swings);
+    if (!pieces->swings)
+        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the bounds of a transfer function");
+    pieces->swing_inverse = (float)((double)pieces->bin_inverse * KERNEL_SWING_BINS / KERNEL_PIECE_BINS);
+    fill_swings(pieces, (const double[]){(double)low, (double)high});
+    return INSITU_OK;
 }
 
 void render_pieces_free(kernel_pieces *pieces)
