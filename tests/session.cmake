@@ -211,13 +211,14 @@ add_dependencies(test_writer_end insitu_image)
 add_test(NAME writer_end COMMAND test_writer_end ${CMAKE_CURRENT_BINARY_DIR})
 set_tests_properties(writer_end PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120)
 
-# An empty entry of LD_LIBRARY_PATH is the working directory. By the shared library, and by a program that has its objects.
+# An empty entry of LD_LIBRARY_PATH is the working directory. Files go to a folder of their own, as other runs of test_api
+# may write theirs at the same time. By the shared library, and by a program that has its objects.
 add_library(planted_image MODULE planted_image.c)
 target_link_libraries(planted_image PRIVATE insitu_flags insitu_headers)
 set_target_properties(planted_image PROPERTIES
   PREFIX lib OUTPUT_NAME insitu_image LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
 add_test(NAME image_library_is_not_of_the_working_directory
-  COMMAND test_api ${CMAKE_CURRENT_BINARY_DIR} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
+  COMMAND test_api ${CMAKE_CURRENT_BINARY_DIR}/planted WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
 add_test(NAME image_library_of_programs_is_not_of_the_working_directory
   COMMAND test_image_output ${CMAKE_CURRENT_BINARY_DIR}/planted_output
   WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
