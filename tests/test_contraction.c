@@ -452,8 +452,7 @@ static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
     }
     const vm once = kernel_halves_once(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
     const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
-    const vm outside = vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3]));
-    const vm bends = kernel_curved_bends(x, y, loop, outside, side[0], side[3]);
+    const vm bends = kernel_curved_bends(x, y, loop, vm_all_lanes(), side);
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
 }
 

@@ -389,9 +389,7 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
 {
     memcpy(out, &a, sizeof a);
-#if defined(__GNUC__)
     __asm__("" : "+m"(*(int32_t(*)[SIMD_WIDTH])out));
-#endif
 }
 
 /* Transposes the four by four numbers in each four lanes of four vectors. */
@@ -426,7 +424,8 @@ SIMD_INLINE void vf_transpose(vf v[4])
 #endif
 }
 
-/* base[index], base[index + 1] and the two behind them in the first four lanes; in the next four those of index[4]. */
+/* Loads four numbers from base + index[0] on into the first four lanes, four from base + index[4] on into the next, and
+ * so on. */
 SIMD_INLINE vf vf_load_quarters(const float *base, const int32_t *index)
 {
 #if defined(SIMD_AVX512)

@@ -44,11 +44,6 @@ SIMD_INLINE void kernel_curved_packet_begin(kernel_curved_packet *p, const kerne
     p->v = flat ? p->rays.origin_y : p->rays.slope_y;
 }
 
-SIMD_INLINE vf kernel_curved_take(const float *of, vi lane)
-{
-    return vf_permute(vf_load(of), lane);
-}
-
 SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel_list *from, int i)
 {
     to->pixel[to->count] = from->pixel[i];
@@ -107,17 +102,17 @@ SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel
     kernel_curved_project(h, p, grid_type_vertices(type), x, y);
     const vi turned = vi_from_bits(kernel_curved_take((const float *)(const void *)h->turned, p->lane));
     for (int face = 0; face < shape->face_count; face++) {
-        vi around[4], once;
-        kernel_face_sides(shape, face, &sides, around);
+        vi once;
         if (shape->faces[face].count == 3) {
+            vi around[4];
+            kernel_face_sides(shape, face, &sides, around);
             once = kernel_sides_agree(around, 3);
         } else {
             const vm turn = vm_sign(turned << (31 - face)), diagonal = vm_sign(sides.side[shape->edge_count + face]);
-            const vm side[4] = {vm_sign(around[0]), vm_sign(around[1]), vm_sign(around[2]), vm_sign(around[3])};
-            const vm outside = vm_and(p->active, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
-            const signed char *loop = shape->faces[face].vertices;
+            vm side[4];
+            kernel_quad_around(shape, face, &sides, side);
             once = vi_select(kernel_halves_once_turned(side, turn, diagonal), vi_set(-1), vi_set(0));
-            alone = vm_or(alone, kernel_curved_bends(x, y, loop, outside, side[0], side[3]));
+            alone = vm_or(alone, kernel_curved_bends(x, y, shape->faces[face].vertices, p->active, side));
         }
         faces |= kernel_face_bit(once, face);
     }
@@ -134,22 +129,6 @@ typedef struct kernel_curved_quad {
     vi corner[4];
     vf f[4];
 } kernel_curved_quad;
-
-/* A number of each ray's own vertex of its cell, which has count. Of 16 lanes, selections among all vertices' are
- * faster than a gather, of 8 they are slower. */
-SIMD_INLINE vf kernel_curved_pick(const float of[8][SIMD_WIDTH], int count, vi lane, vi corner)
-{
-    if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
-    vf four[4], two[2];
-    const vm odd = vm_sign(corner << 31), second = vm_sign(corner << 30), upper = vm_sign(corner << 29);
-    for (int i = 0; 2 * i < count; i++) {
-        four[i] = kernel_curved_take(of[2 * i], lane);
-        if (2 * i + 1 < count) four[i] = vf_select(odd, kernel_curved_take(of[2 * i + 1], lane), four[i]);
-    }
-    for (int i = 0; 4 * i < count; i++)
-        two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
-    return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
-}
 
 SIMD_INLINE vi kernel_face_word(const kernel_placed_curved *h, vi lane, vi face)
 {

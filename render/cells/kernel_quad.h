@@ -286,7 +286,8 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
         const kernel_half_mask vanish = kernel_half_once(q, wanted, half, out);
         memcpy(rays, &vanish, sizeof rays);
         for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
-        for (int i = 0; any && i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
+        if (!any) continue;
+        for (int i = 0; i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
     }
     if (__builtin_expect(vanishing, 0)) kernel_quad_limit(q, vm_from_bits(vanishing), out);
 }
@@ -463,16 +464,16 @@ static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const
     return vm_andnot(rays, vf_lt(b1 * b1 - product, -1e-6f * (most * most + vf_abs(product))));
 }
 
-/* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more, among rays on the
- * same sides of its opposite sides. loop has the corners 0 to 3 around; side01 and side30 are the signs of its sides
- * from 0 to 1 and from 3 to 0. */
-SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, vm side01, vm side30)
+/* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more. They are not on the
+ * same side of opposite edges. loop has the corners 0 to 3 around; side the sides of the edges from 0 to 1 and on. */
+SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, const vm side[4])
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
+    const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
     const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
-    const vm bent = vf_le(vf_select(side01, -sum, sum), slack);
-    const vm bends = vm_and(rays, vm_and(bent, vf_le(vf_select(side30, difference, -difference), slack)));
+    const vm bent = vf_le(vf_select(side[0], -sum, sum), slack);
+    const vm bends = vm_and(outside, vm_and(bent, vf_le(vf_select(side[3], difference, -difference), slack)));
     return __builtin_expect(vm_any(bends), 0) ? kernel_curved_bends_yet(x, y, loop, bends, across, other) : bends;
 }
 

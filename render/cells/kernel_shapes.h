@@ -89,6 +89,14 @@ SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const ke
     }
 }
 
+/* The sides of a quad's edges, taken around it. */
+SIMD_INLINE void kernel_quad_around(const kernel_shape *shape, int face, const kernel_curved_sides *s, vm out[4])
+{
+    vi around[4];
+    kernel_face_sides(shape, face, s, around);
+    for (int i = 0; i < 4; i++) out[i] = vm_sign(around[i]);
+}
+
 /* Tells by its sign bit which rays are on the same side of all edges of a face of count. */
 SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
 {

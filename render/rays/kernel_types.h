@@ -81,8 +81,8 @@ typedef struct kernel_steep {
     bool is_narrow;
 } kernel_steep;
 
-/* A bin of the sums (kernel_preintegral.h), in units; read as rows of four floats. sums are the extinction's, and those
- * of the emission in three channels. */
+/* A bin of the sums (kernel_preintegral.h), in units: the extinction's, then the emission's in three channels. It is
+ * read as rows of four floats. */
 typedef struct kernel_pre_entry {
     int32_t before[4]; /* of all bins before it */
     float own[4];

@@ -55,7 +55,7 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
         for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
 }
 
-/* A step of a transposition: exchanges numbers of vectors and lanes that are so far apart. */
+/* A step of a transposition after vf_transpose(): exchanges numbers of vectors and lanes that are 4 or 8 apart. */
 SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
 {
     const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
@@ -80,8 +80,7 @@ SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first
         v[i] = i < first_count ? vf_load(first[i]) : vf_set(0);
         v[i + KERNEL_LOCAL_ROW / 2] = i < second_count ? vf_load(second[i]) : vf_set(0);
     }
-    kernel_local_transpose(v, number, 1);
-    kernel_local_transpose(v, number, 2);
+    for (int i = 0; i < KERNEL_LOCAL_ROW; i += 4) vf_transpose(v + i);
     kernel_local_transpose(v, number, 4);
     kernel_local_transpose(v, number, 8);
     for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
@@ -127,9 +126,9 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 
 /* ---- rays ---- */
 
-/* Vertices in the rays' planes: x, y, z and the field. */
+/* Vertices in the rays' planes. */
 typedef struct kernel_local_seen {
-    vf at[4][8];
+    vf x[8], y[8];
 } kernel_local_seen;
 
 SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_local_rays *rays, int type,
@@ -137,17 +136,15 @@ SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_loca
 {
     for (int i = 0; i < grid_type_vertices(type); i++) {
         const vf z = kernel_local_take(f->at[2][i], rays->lane);
-        for (int a = 0; a < 2; a++)
-            out->at[a][i] = (kernel_local_take(f->at[a][i], rays->lane) - rays->origin[a]) - rays->slope[a] * z;
-        out->at[2][i] = z;
-        out->at[3][i] = kernel_local_take(f->at[3][i], rays->lane);
+        out->x[i] = (kernel_local_take(f->at[0][i], rays->lane) - rays->origin[0]) - rays->slope[0] * z;
+        out->y[i] = (kernel_local_take(f->at[1][i], rays->lane) - rays->origin[1]) - rays->slope[1] * z;
     }
 }
 
 /* An edge function, by its sign bit, and where it is so small that its sign is not known. */
 SIMD_INLINE vi kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *least)
 {
-    const vf e = vf_diff_of_products(s->at[0][a], s->at[1][b], s->at[0][b], s->at[1][a]);
+    const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
     *least = vf_min(vf_abs(e), *least);
     return vi_from_bits(e);
 }
@@ -182,46 +179,36 @@ SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int t
 SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kernel_curved_sides *sides,
                                          const kernel_shape *shape, int face, vm rays, vm *alone)
 {
-    vi around[4];
-    kernel_face_sides(shape, face, sides, around);
-    const vm side[4] = {vm_sign(around[0]), vm_sign(around[1]), vm_sign(around[2]), vm_sign(around[3])};
-    const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
-    const signed char *loop = shape->faces[face].vertices;
-    *alone = vm_or(*alone, kernel_curved_bends(s->at[0], s->at[1], loop, outside, side[0], side[3]));
+    vm side[4];
+    kernel_quad_around(shape, face, sides, side);
+    *alone = vm_or(*alone, kernel_curved_bends(s->x, s->y, shape->faces[face].vertices, rays, side));
     return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
-SIMD_INLINE void kernel_local_found(const kernel_curved_sides *sides, vi faces, vm rays, vm alone,
-                                    kernel_curved_crossed *out)
-{
-    const vm unknown = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides->least));
-    kernel_curved_count(faces, rays, vm_or(alone, unknown), out);
-}
-
-/* As below, where some of the cells have quads that may not look convex, whose bits are in dents. */
-SIMD_INLINE void kernel_local_find_dented(const kernel_local_faces *f, const kernel_local_rays *own, vi dents, vm rays,
-                                          kernel_curved_crossed *out, int type)
+/* dents: bits of the quads that may not look convex, ray by ray; NULL: there are none. */
+SIMD_INLINE void kernel_local_find_given(const kernel_local_faces *f, const kernel_local_rays *own, const vi *dents,
+                                         vm rays, kernel_curved_crossed *out, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_local_seen seen;
     kernel_curved_sides sides;
-    vm alone = vm_none();
     kernel_local_see(f, own, type, &seen);
     kernel_local_sides_of(&seen, type, &sides);
+    vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
     vi faces = kernel_local_faces_around(&sides, type);
-    for (int face = 0; face < shape->face_count; face++) {
-        if (!vm_any(vm_and(rays, vm_sign(dents << (31 - face))))) continue;
+    for (int face = 0; dents && face < shape->face_count; face++) {
+        if (!vm_any(vm_and(rays, vm_sign(*dents << (31 - face))))) continue;
         const vm once = kernel_local_quad_crossed(&seen, &sides, shape, face, rays, &alone);
         faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
     }
-    kernel_local_found(&sides, faces, rays, alone, out);
+    kernel_curved_count(faces, rays, alone, out);
 }
 
-static __attribute__((noinline)) void kernel_local_find_in_any(const kernel_local_faces *f,
-                                                               const kernel_local_rays *own, vi dents, vm rays,
+static __attribute__((noinline)) void kernel_local_find_dented(const kernel_local_faces *f,
+                                                               const kernel_local_rays *own, const vi *dents, vm rays,
                                                                int type, kernel_curved_crossed *out)
 {
-    KERNEL_OF_TYPE(type, kernel_local_find_dented, f, own, dents, rays, out);
+    KERNEL_OF_TYPE(type, kernel_local_find_given, f, own, dents, rays, out);
 }
 
 /* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. */
@@ -229,15 +216,10 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kern
                                          kernel_curved_crossed *out)
 {
     const vi dents = vi_from_bits(kernel_local_take(f->dents, own->lane));
-    kernel_local_seen seen;
-    kernel_curved_sides sides;
-    if (vm_any(vm_and(rays, vm_sign(-dents)))) {
-        kernel_local_find_in_any(f, own, dents, rays, type, out);
-        return;
-    }
-    kernel_local_see(f, own, type, &seen);
-    kernel_local_sides_of(&seen, type, &sides);
-    kernel_local_found(&sides, kernel_local_faces_around(&sides, type), rays, vm_none(), out);
+    if (vm_any(vm_and(rays, vm_sign(-dents))))
+        kernel_local_find_dented(f, own, &dents, rays, type, out);
+    else
+        kernel_local_find_given(f, own, NULL, rays, out, type);
 }
 
 /* ---- corners ---- */
@@ -271,32 +253,6 @@ SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi l
     return !vm_any(vm_andnot(rays, vm_or(in_first, in_last)));
 }
 
-/* A number of each ray's own vertex of its cell, which has count. Of 16 lanes, permutations of all vertices' are faster
- * than a gather. */
-SIMD_INLINE vf kernel_local_pick(const float of[8][SIMD_WIDTH], int count, vi lane, vi vertex)
-{
-    if (SIMD_WIDTH < 16) return vf_gather(of[0], vertex * SIMD_WIDTH + lane);
-    const vi in_two = lane | (vertex & 1) * SIMD_WIDTH;
-    const vm second = vm_sign(vertex << 30), upper = vm_sign(vertex << 29);
-    vf four[4], two[2];
-    for (int i = 0; 2 * i < count; i++)
-        four[i] = 2 * i + 1 < count ? vf_permute_pair(vf_load(of[2 * i]), vf_load(of[2 * i + 1]), in_two)
-                                    : kernel_local_take(of[2 * i], lane);
-    for (int i = 0; 4 * i < count; i++)
-        two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
-    return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
-}
-
-SIMD_INLINE vi kernel_local_word(const kernel_local_faces *f, int type, vi lane, vi face)
-{
-    const vf number = vf_from_vi(face);
-    vi word = vi_set(0);
-    if (SIMD_WIDTH < 16) return vi_from_bits(vf_gather(f->words[0], face * SIMD_WIDTH + lane));
-    for (int n = 0; n < kernel_cell_shape(type)->face_count; n++)
-        word = vi_select(vf_eq(number, vf_set((float)n)), vi_from_bits(kernel_local_take(f->words[n], lane)), word);
-    return word;
-}
-
 /* pair: NULL where rays have more than two cells. */
 SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
                                            vi lane, vi face, kernel_local_corners *out)
@@ -305,14 +261,14 @@ SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const ke
     const float *const first = pair ? pair->rows[0][0] : NULL, *const last = pair ? pair->rows[1][0] : NULL;
     const vi word = pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
                                                         vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
-                         : kernel_local_word(f, type, lane, face);
+                         : vi_from_bits(kernel_curved_pick(f->words, kernel_cell_shape(type)->face_count, lane, face));
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = word >> (4 * i) & 7;
         for (int n = 0; n < 4; n++) {
             const int row = n / 2 * KERNEL_LOCAL_ROW;
             out->at[i][n] = pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
                                                    (out->vertex[i] | pair->second) + n % 2 * HALF)
-                                 : kernel_local_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
+                                 : kernel_curved_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
         }
     }
 }

@@ -162,12 +162,8 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local
 /* Lanes of cells among whose values are steps of the opacity or steep ramps. */
 SIMD_INLINE vm kernel_local_is_steep(const kernel_segment_state *state, vf low, vf high)
 {
-    vm any = kernel_span_is_steep(state, low, high, false);
-    for (int i = 0; i < state->pieces->step_count; i++) {
-        const vf cut = vf_set(state->pieces->steps[i].cut);
-        any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
-    }
-    return any;
+    const kernel_span all = {.step_count = state->pieces->step_count};
+    return vm_or(kernel_span_is_steep(state, low, high, false), kernel_span_steps(state, &all, low, high));
 }
 
 /* The lanes' bounds; returns those whose values are for bisection. Chords end beyond the cell's values: one chord by no
@@ -214,11 +210,17 @@ typedef struct kernel_local_pairs {
     vf count; /* of segments */
 } kernel_local_pairs;
 
+/* By how much one chord is raised to the field's mean. */
+SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
+{
+    const vf *d = p->off_chord.field;
+    return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
+}
+
 /* Rays of which one chord would end among values that have not been looked at. */
 SIMD_INLINE vm kernel_local_strays(const kernel_local_stretches *b, const kernel_local_pairs *p)
 {
-    const vf *d = p->off_chord.field, v0 = p->ends[0].v, v1 = p->ends[1].v;
-    const vf lift = (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
+    const vf v0 = p->ends[0].v, v1 = p->ends[1].v, lift = kernel_local_lift(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
     return vm_or(vf_lt(low, kernel_local_take(b->bounds.low, p->rays.lane)),
                  vf_lt(kernel_local_take(b->bounds.high, p->rays.lane), high));
@@ -357,8 +359,7 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, const ker
 /* Of rays for which one segment is enough. */
 SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
 {
-    const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t;
-    const vf lift = (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
+    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
     const vf ends[4] = {t0, t1, p->ends[0].v + lift, p->ends[1].v + lift};
     kernel_local_put_all(b, p, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }

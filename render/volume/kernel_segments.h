@@ -137,8 +137,8 @@ SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 SIMD_INLINE kernel_blend kernel_blend_begin(void)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    return (kernel_blend){vm_none(),          zero, zero, zero, zero, {zero, zero, zero}, one, zero,
-                          {zero, zero, zero}, one,  zero, one};
+    return (kernel_blend){
+        vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one, zero, one};
 }
 
 #endif

@@ -193,7 +193,6 @@ static double piece_opacity(const kernel_piece *p, double x)
     return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
-/* Widens the bin's bounds by those of the piece between two of its values. */
 /* The least and the most of how steeply the extinction rises or falls between two values of a piece. */
 static void steepness_of(const kernel_piece *p, double from, double to, double out[2])
 {
@@ -203,6 +202,7 @@ static void steepness_of(const kernel_piece *p, double from, double to, double o
     out[1] = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
 }
 
+/* Widens the bin's bounds by those of the piece between two of its values. */
 static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to);
