@@ -42,7 +42,8 @@ enum { KERNEL_DEVIATION_STEPS = 8 };
 /* Lane by lane. */
 typedef struct kernel_local_nonlinear {
     float terms[KERNEL_BENT_TERMS][SIMD_WIDTH]; /* h */
-    float unseen[SIMD_WIDTH];                   /* the least that is taken for E of kernel_local_segments.h */
+    float bend[SIMD_WIDTH];                     /* N^2 */
+    float unseen[SIMD_WIDTH];                   /* the least that is taken for E of kernel_local_budget.h */
     float sensitivity[SIMD_WIDTH];              /* what the field may be off by, over the residual */
     float residual_limit[SIMD_WIDTH];           /* a larger residual says nothing of the field */
     float tolerance[SIMD_WIDTH];                /* a smaller one is small enough */
@@ -62,7 +63,7 @@ SIMD_INLINE float kernel_local_bent_slope(int type, int term)
     return type == GRID_WEDGE ? 0.88f : type == GRID_PYRAMID ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
-/* What no look may see of the field, by the bend's square and the bent terms (kernel_local_segments.h). */
+/* What no look may see of the field, by the bend's square and the bent terms (kernel_local_budget.h). */
 SIMD_INLINE float kernel_local_bent_unseen(int type)
 {
     return type == GRID_HEX ? 0.0011f : type == GRID_WEDGE ? 0.0004f : 0;
@@ -79,6 +80,7 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
         most += vf_abs(own) * kernel_local_bent_slope(type, k);
     }
     const vf bend = vf_sqrt(vf_load(c->bend)), room = 1.0f - 1.082f * bend;
+    vf_store(out->bend, vf_load(c->bend));
     vf_store(out->unseen, kernel_local_bent_unseen(type) * vf_load(c->bend) * most);
     vf_store(out->sensitivity, most / room);
     vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
