@@ -1,4 +1,4 @@
-/* Aims at what max_error takes the field for in strongly bent cells (kernel_local_segments.h): the polynomial through
+/* Aims at what max_error takes the field for in strongly bent cells (kernel_local_budget.h): the polynomial through
  * its values at a ray's ends, quarters and middle. In random cells, values are chosen so that along the picture's
  * middle ray these five say as little as possible of what the field does between them:
  *

@@ -93,6 +93,7 @@ typedef struct kernel_local_chord {
     vf middle[3], span[3];                               /* of the line between r at the faces */
     vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* of the terms' chords */
     vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
+    vf tolerance, residual_limit;
 } kernel_local_chord;
 
 typedef struct kernel_local_iterate {
@@ -131,6 +132,8 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
         out->own[k] = kernel_local_take(nonlinear->terms[k], lane);
         for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
     }
+    out->tolerance = kernel_local_take(nonlinear->tolerance, lane);
+    out->residual_limit = kernel_local_take(nonlinear->residual_limit, lane);
 }
 
 /* Finds the residual at the place u, and how far the field is off its chord. */
@@ -152,6 +155,27 @@ SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
     return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
 }
 
+/* Finds r at count places from guesses; residual: the most that is left. Returns the rays on which all of them are in
+ * the cell or not far outside. */
+SIMD_INLINE vm kernel_local_settle(const kernel_local_chord *c, const float *places, int count, vm rays, int type,
+                                   kernel_local_iterate *at, vf *residual)
+{
+    for (int n = 0;; n++) {
+        *residual = vf_set(0);
+        for (int i = 0; i < count; i++) {
+            kernel_local_iterate_at(c, places[i], type, &at[i]);
+            *residual = vf_max(kernel_local_residual_of(&at[i]), *residual);
+        }
+        const vm open = vm_andnot(rays, vf_le(*residual, c->tolerance));
+        if (n == KERNEL_DEVIATION_STEPS || !vm_any(open)) break;
+        for (int i = 0; i < count; i++)
+            for (int a = 0; a < 3; a++) at[i].r[a] = vf_select(open, at[i].r[a] + at[i].residual[a], at[i].r[a]);
+    }
+    vm is_near = vf_le(*residual, c->residual_limit);
+    for (int i = 0; i < count; i++) is_near = vm_and(is_near, kernel_local_is_near(type, at[i].r));
+    return is_near;
+}
+
 SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
                                             vi lane, vm rays, const kernel_local_crossing ends[2], int type,
                                             kernel_local_deviations *out)
@@ -160,7 +184,6 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     kernel_local_chord chord;
     kernel_local_iterate iterates[3];
     kernel_local_iterate *middle = &iterates[1];
-    const vf tolerance = kernel_local_take(nonlinear->tolerance, lane);
     kernel_local_chord_of(cells, nonlinear, lane, ends, type, &chord);
     memcpy(middle->r, chord.middle, sizeof middle->r);
     for (int n = 0; n < 2; n++) {
@@ -171,24 +194,49 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
         for (int a = 0; a < 3; a++)
             iterates[q].r[a] =
                 vf_muladd(chord.span[a], vf_set(places[q]), 0.25f * chord.middle[a]) + 0.75f * middle->r[a];
-    for (int n = 0;; n++) {
-        out->residual = vf_set(0);
-        for (int i = 0; i < 3; i++) {
-            kernel_local_iterate_at(&chord, places[i], type, &iterates[i]);
-            out->residual = vf_max(kernel_local_residual_of(&iterates[i]), out->residual);
-        }
-        const vm open = vm_andnot(rays, vf_le(out->residual, tolerance));
-        if (n == KERNEL_DEVIATION_STEPS || !vm_any(open)) break;
-        for (int i = 0; i < 3; i++)
-            for (int a = 0; a < 3; a++)
-                iterates[i].r[a] = vf_select(open, iterates[i].r[a] + iterates[i].residual[a], iterates[i].r[a]);
+    out->has_diverged = vm_not(kernel_local_settle(&chord, places, 3, rays, type, iterates, &out->residual));
+    for (int i = 0; i < 3; i++) out->field[i] = iterates[i].deviation;
+}
+
+/* ---- parts ---- */
+
+/* Where one of equal parts of the ray's way ends. */
+typedef struct kernel_local_part {
+    float u;
+    vf r[3], deviation; /* of the field, from the chord of the whole way */
+    vf residual;        /* the most so far */
+} kernel_local_part;
+
+SIMD_INLINE void kernel_local_part_begin(const kernel_local_crossing *first, kernel_local_part *out)
+{
+    *out = (kernel_local_part){.u = -0.5f, .deviation = vf_set(0), .residual = vf_set(0)};
+    memcpy(out->r, first->r, sizeof out->r);
+}
+
+/* Goes on to the end of the next part, whose length is a share of the way, and finds the deviations from the part's own
+ * chord. */
+SIMD_INLINE void kernel_local_part_next(const kernel_local_chord *c, float share, vm rays, int type,
+                                        kernel_local_part *part, kernel_local_deviations *out)
+{
+    const vf before = part->deviation;
+    float places[4];
+    kernel_local_iterate at[4];
+    vf residual;
+    for (int i = 0; i < 4; i++) {
+        const float along = 0.25f * (float)(i + 1) * share;
+        places[i] = part->u + along;
+        for (int a = 0; a < 3; a++) at[i].r[a] = vf_muladd(c->span[a], vf_set(along), part->r[a]);
     }
-    vm is_near = vf_le(out->residual, kernel_local_take(nonlinear->residual_limit, lane));
+    out->has_diverged = vm_not(kernel_local_settle(c, places, 4, rays, type, at, &residual));
+    part->u = places[3];
+    part->deviation = part->u < 0.5f ? at[3].deviation : vf_set(0);
+    part->residual = vf_max(residual, part->residual);
+    memcpy(part->r, at[3].r, sizeof part->r);
+    out->residual = part->residual;
     for (int i = 0; i < 3; i++) {
-        is_near = vm_and(is_near, kernel_local_is_near(type, iterates[i].r));
-        out->field[i] = iterates[i].deviation;
+        const vf chord = vf_muladd(part->deviation - before, vf_set(0.25f * (float)(i + 1)), before);
+        out->field[i] = at[i].deviation - chord;
     }
-    out->has_diverged = vm_not(is_near);
 }
 
 #endif

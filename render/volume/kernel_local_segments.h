@@ -14,7 +14,8 @@
  *     d = (1/4 - u^2) (a + b u + c u^2),   a = 4 d2,   b = 32/3 (d3 - d1),   c = 16 (8/3 (d1 + d3) - a),
  *
  * and segments are its chords, each raised or lowered to the polynomial's mean. How many, kernel_local_budget.h says.
- */
+ * Where it says that no number is enough, because the polynomial itself may be off by too much, the ray's way is
+ * halved, quartered or cut in eighths, and each part has a polynomial through five values of its own. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -76,7 +77,7 @@ typedef struct kernel_local_stretches {
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_local_stretches;
 
-/* Are segments of cells of this type for lanes in this frame? Not where ends are taken in double. */
+/* Are segments of cells of this type for lanes in this frame? */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
     return f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
@@ -89,7 +90,9 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local
 {
     b->packets = packets;
     b->alone = alone;
-    b->budget.state = (kernel_segment_state){NULL, &t->frame->pieces[0], 0, t->frame->allowance, 0, t->frame->reach[0]};
+    b->budget.pieces = &t->frame->pieces[0];
+    b->budget.allowance = t->frame->allowance;
+    b->budget.reach = t->frame->reach[0];
     b->blocks = blocks;
     kernel_local_lanes_begin(&b->lanes, 0, take);
     for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
@@ -118,7 +121,8 @@ SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const
     kernel_segments *list = &r->list;
     const int lane = at % SIMD_WIDTH;
     if (!(s->t_in < list->t_end[lane])) return;
-    if (__builtin_expect(kernel_segments_put(list, lane, s, NULL), 1)) return;
+    const kernel_segment_double precise = {s->t_out - s->t_in, 0, 0, 0};
+    if (__builtin_expect(kernel_segments_put(list, lane, s, &precise), 1)) return;
     const kernel_run run = kernel_run_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
     kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
 }
@@ -188,6 +192,72 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
         open = inner;
     }
 }
+
+SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
+{
+    const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
+    kernel_local_emit_one(b, p, single);
+    if (vm_any(more)) kernel_local_emit_more(b, p, more);
+}
+
+/* ---- parts ---- */
+
+enum { KERNEL_LOCAL_PARTS = 8 };
+
+/* Ways in equal parts, one after the other. */
+typedef struct kernel_local_division {
+    kernel_local_chord chord;
+    kernel_local_part at; /* the end of the last part */
+    kernel_local_pairs parts[KERNEL_LOCAL_PARTS];
+} kernel_local_division;
+
+SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_local_pairs *whole, vm rays, int number,
+                                     int count, int type)
+{
+    const kernel_local_crossing *first = &whole->ends[0], *last = &whole->ends[1];
+    const float share = 1.0f / (float)count;
+    kernel_local_pairs *part = &d->parts[number];
+    *part = *whole;
+    part->active = rays;
+    part->unseen = 2 * (share * share) * (share * share);
+    kernel_local_part_next(&d->chord, share, rays, type, &d->at, &part->off_chord);
+    if (number > 0) part->ends[0] = d->parts[number - 1].ends[1];
+    if (number + 1 < count) {
+        const vf along = vf_set((float)(number + 1) * share);
+        part->ends[1].t = first->t + (last->t - first->t) * along;
+        part->ends[1].v = (first->v + (last->v - first->v) * along) + d->at.deviation;
+    }
+}
+
+/* Segments of rays on which one polynomial does not tell enough: halves, quarters or eighths of their ways have one
+ * each. Returns those of which these do not either. */
+SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_stretches *b,
+                                     const kernel_local_pairs *whole, vm rays, int type)
+{
+    kernel_local_division d;
+    kernel_local_chord_of(&b->lanes.cells, &b->budget.nonlinear, whole->rays.lane, whole->ends, type, &d.chord);
+    for (int count = 2; count <= KERNEL_LOCAL_PARTS && vm_any(rays); count *= 2) {
+        vm good = rays;
+        kernel_local_part_begin(&whole->ends[0], &d.at);
+        for (int i = 0; i < count && vm_any(good); i++) {
+            kernel_local_divide(&d, whole, good, i, count, type);
+            const vm fails = kernel_local_count(t, &b->budget, &d.parts[i]);
+            good = vm_andnot(good, vm_or(fails, d.parts[i].off_chord.has_diverged));
+        }
+        for (int i = 0; i < count && vm_any(good); i++) kernel_local_emit(b, &d.parts[i], good);
+        rays = vm_andnot(rays, good);
+    }
+    return rays;
+}
+
+static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_tile_trace *t,
+                                                                const kernel_local_stretches *b,
+                                                                const kernel_local_pairs *whole, vm rays, int type)
+{
+    return KERNEL_OF_TYPE(type, kernel_local_by_parts, t, b, whole, rays);
+}
+
+/* ---- rays ---- */
 
 /* Rays that are for the cell alone. */
 static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
@@ -259,6 +329,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     kernel_local_pairs p;
     vi words;
     vf end, near, far;
+    p.unseen = 1;
     p.active = kernel_local_list_take(list, &t->tile, n, &words, &p.rays);
     const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
                                            words >> (KERNEL_LOCAL_FACES + 3) & 7};
@@ -269,12 +340,12 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
     kernel_local_deviations_of(&b->lanes.cells, &b->budget.nonlinear, p.rays.lane, p.active, p.ends, type,
                                &p.off_chord);
-    const vm odd = vm_and(p.active, vm_or(vm_or(cut, p.off_chord.has_diverged), kernel_local_count(t, &b->budget, &p)));
-    p.active = vm_andnot(p.active, odd);
-    const vm single = vm_and(p.active, vf_le(p.count, vf_set(1))), more = vm_andnot(p.active, single);
-    kernel_local_emit_one(b, &p, single);
-    if (vm_any(more)) kernel_local_emit_more(b, &p, more);
-    if (__builtin_expect(vm_any(odd), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(odd));
+    vm alone = vm_and(p.active, vm_or(cut, p.off_chord.has_diverged));
+    p.active = vm_andnot(p.active, alone);
+    const vm coarse = vm_and(p.active, kernel_local_count(t, &b->budget, &p));
+    kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
+    if (__builtin_expect(vm_any(coarse), 0)) alone = vm_or(alone, kernel_local_segments_parts(t, b, &p, coarse, type));
+    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
 }
 
 /* Lists those of the rays from n on that may meet their cells in the window. */
@@ -350,6 +421,15 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
     return showing;
 }
 
+/* Lanes of cells among whose values are steps of the opacity or steep ramps. */
+SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
+{
+    const kernel_segment_state state = {.pieces = b->pieces};
+    const kernel_span all = {.step_count = b->pieces->step_count};
+    const vf low = vf_load(b->bounds.low), high = vf_load(b->bounds.high);
+    return vm_or(kernel_span_is_steep(&state, low, high, false), kernel_span_steps(&state, &all, low, high));
+}
+
 static __attribute__((noinline)) unsigned kernel_local_segments_place(const kernel_tile_trace *t,
                                                                       kernel_local_stretches *b, int type, unsigned all,
                                                                       unsigned *lanes)
@@ -357,7 +437,8 @@ static __attribute__((noinline)) unsigned kernel_local_segments_place(const kern
     const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes) & all;
     *lanes &= all;
     const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
-    *lanes &= ~vm_bits(KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values));
+    KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values);
+    *lanes &= ~vm_bits(kernel_local_is_steep(&b->budget));
     return showing;
 }
 
