@@ -44,8 +44,7 @@ static void cell_of(const render_fixture *f, const test_mesh *mesh, reference_ce
     for (int i = 0; i < cell->count; i++)
         for (int a = 0; a < 3; a++) {
             cell->world[i][a] = mesh->coordinates[3 * i + a];
-            for (int b = 0; b < 3; b++)
-                cell->position[i][a] += axes[a][b] * (mesh->coordinates[3 * i + b] - c->eye[b]);
+            for (int b = 0; b < 3; b++) cell->position[i][a] += axes[a][b] * (mesh->coordinates[3 * i + b] - c->eye[b]);
         }
 }
 
@@ -165,9 +164,16 @@ static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doubl
     return is_seen;
 }
 
+/* Hexes that are too bent for lanes, and were off by more than was asked for where packets looked at four places. */
+static const uint64_t hard_seeds[] = {188, 1349};
+
 static void max_error_is_kept_where_looks_say_little(void **state)
 {
     (void)state;
+    double worst_of_hard[3] = {0};
+    for (size_t i = 0; i < sizeof hard_seeds / sizeof hard_seeds[0]; i++)
+        assert_true(judge_cell(TEST_UNIT_HEX, BLIND, hard_seeds[i], worst_of_hard));
+    step_assert_kept(worst_of_hard, "hard cells");
     for (int s = 0; s < SHAPES; s++)
         for (bend_aim aim = 0; aim < AIMS; aim++) {
             double worst[3] = {0};

@@ -382,35 +382,69 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 
+enum { KERNEL_STRETCH_LOOKS = 8 };
+
+/* How far a field is off the line between its values at a stretch's ends, seen at eighths. */
+typedef struct kernel_span_deviation {
+    vf most;
+    vf bend;    /* of a parabola the same, of any field what its second derivative's mean size makes */
+    vf opacity; /* the mean, by the quarters */
+} kernel_span_deviation;
+
+/* Subintervals of length h are off their chords by h^2 / 12 of the second derivative on average, and light by the
+ * integral of that. Second differences over an eighth tell its mean size, and those next to the ends, drawn on, what it
+ * is beyond them. */
+SIMD_INLINE vf kernel_span_bend(const vf off[KERNEL_STRETCH_LOOKS + 1])
+{
+    vf second[KERNEL_STRETCH_LOOKS], sum = vf_set(0);
+    for (int i = 1; i < KERNEL_STRETCH_LOOKS; i++) {
+        second[i] = (off[i + 1] - off[i]) - (off[i] - off[i - 1]);
+        sum += vf_abs(second[i]);
+    }
+    const vf begin = 2.0f * second[1] - second[2];
+    const vf end = 2.0f * second[KERNEL_STRETCH_LOOKS - 1] - second[KERNEL_STRETCH_LOOKS - 2];
+    return sum + 0.5f * (vf_abs(begin) + vf_abs(end));
+}
+
+SIMD_INLINE void kernel_span_deviate(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
+                                     vm rays, const kernel_interval *stretch, kernel_span_deviation *out)
+{
+    const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    vf off[KERNEL_STRETCH_LOOKS + 1];
+    off[0] = off[KERNEL_STRETCH_LOOKS] = out->most = vf_set(0);
+    out->opacity = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
+    for (int i = 1; i < KERNEL_STRETCH_LOOKS; i++) {
+        const float share = (1.0f / KERNEL_STRETCH_LOOKS) * (float)i;
+        const vf v = kernel_value_at(p, span->map, span->interval, rays, t0 + length * share);
+        off[i] = v - (v0 + (v1 - v0) * share);
+        out->most = vf_max(out->most, vf_abs(off[i]));
+        if (i % 2 == 0) out->opacity += 0.25f * kernel_opacity(transfer, v);
+    }
+    out->bend = kernel_span_bend(off);
+}
+
 /* Into how many subintervals, as a real number, to cut the stretch, and how far its field is off the line between the
- * values at its ends. By error: the deviation from the line at a quarter, the half and three
- * quarters, half as much again (the three see 7/8 of a cubic's), goes as the square of a subinterval, and its mean is
- * two thirds of it. A fourth place, at an eighth, tells of fields in hexes that are on the line at the other three.
- * Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
+ * values at its ends. By error: that goes as the square of a subinterval, half as much again is taken, and its mean is
+ * two thirds of it. Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
  * / (1 + depth), with the opacity as the least of the extinction. Where a step of the opacity is among the values no
  * number is enough, nor where a steep ramp is among them and asks for too many, nor where a narrow one is in which the
  * values' rounding alone would take an eighth of what is allowed. */
 SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
                                   const kernel_interval *stretch, vf *deviation)
 {
-    const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
-    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
-    for (int eighth = 1; eighth < 8; eighth += 1 + (eighth > 1)) {
-        const float share = 0.125f * (float)eighth;
-        const vf v = kernel_value_at(p, span->map, span->interval, rays, t0 + length * share);
-        off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
-        if (eighth > 1) opacity += kernel_opacity(transfer, v);
-    }
-    const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
+    const vf length = stretch->t_out - stretch->t_in, v0 = stretch->v_in, v1 = stretch->v_out;
+    kernel_span_deviation off;
+    kernel_span_deviate(p, state, span, rays, stretch, &off);
+    const vf distance = length * state->list->per_t, depth = distance * off.opacity;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = off * span->cost * distance; /* 3/2 of 2/3 */
-    *deviation = off;
+    const vf made = off.bend * span->cost * distance; /* 3/2 of 2/3 */
+    *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
     if (!span->step_count && !span->is_steep) return subdivisions;
     const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
-    const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
+    const vf wide = 1.5f * off.most + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
     vm too_few = kernel_span_steps(state, span, low, high);
     if (span->is_steep) {
