@@ -74,9 +74,9 @@ typedef struct kernel_local_budget {
 
 /* ---- cells ---- */
 
-/* The lanes' bounds by the values at their vertices. Chords end beyond
- * the cell's values: one chord by no more than three sixteenths of their range (kernel_local_strays()), several by a
- * sixth of the parabola's most, which is less than that range. */
+/* The lanes' bounds by the values at their vertices. Chords end beyond the cell's values: one chord by no more than
+ * three sixteenths of their range (kernel_local_strays()), several by a sixth of the parabola's most, which is less than
+ * that range. */
 SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
 {
     const kernel_pieces *t = b->pieces;
