@@ -18,7 +18,7 @@ enum {
     WIDTH = 53,
     HEIGHT = 43,
     NUMBERS = 5 * WIDTH * HEIGHT,
-    SCENES = 4,
+    SCENES = 5,
     FRAMES = TEST_KIND_COUNT * CAMERA_PLANE * SCENES
 };
 
@@ -49,6 +49,10 @@ static void draw_scene(int frame, float *numbers)
     f.surfaces[0].root = scene % 2 ? RENDER_NEUBAUER : RENDER_ROBUST;
     if (scene != 0) fixture_set_volume(&f, 0.3);
     if (scene == 3) set_steps(&f);
+    if (scene == 4) {
+        f.job.integration = RENDER_SEGMENTS;
+        f.job.max_error = 1e-4; /* ways in parts (kernel_local_segments.h) */
+    }
     fixture_draw(&f, &drawn);
     memcpy(numbers, drawn.picture.rgba, 4 * WIDTH * HEIGHT * sizeof *numbers);
     memcpy(numbers + 4 * WIDTH * HEIGHT, drawn.picture.depth, WIDTH * HEIGHT * sizeof *numbers);

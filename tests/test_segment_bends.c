@@ -164,7 +164,8 @@ static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doubl
     return is_seen;
 }
 
-/* Hexes that are too bent for lanes, and were off by more than was asked for where packets looked at four places. */
+/* Hexes that are too bent for lanes, whose fields bend at one end of the way: how far these are off their chord at the
+ * most does not tell how they are off in parts. */
 static const uint64_t hard_seeds[] = {188, 1349};
 
 static void max_error_is_kept_where_looks_say_little(void **state)

@@ -246,40 +246,51 @@ static void random_tets_keep_max_error(void **state)
 }
 
 /* Rays and cells are the same, and segments as well: only the order of those that begin at one place may differ. */
+static void judge_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
+{
+    static const double value = 0.5;
+    render_fixture f;
+    drawn_frame drawn[2];
+    double worst = 0;
+    test_mesh mesh;
+    test_mesh_lattice(kind, side, 0.2, test_wave, &mesh);
+    /* Narrow arrays: tets are placed several at once. */
+    fixture_create(&f, &mesh, 1, (test_layout){.is_interleaved = with_surface}, 2.0 / side, 1,
+                   (const double[]){0, 0, 0});
+    test_mesh_free(&mesh);
+    fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
+    set_segments(&f, 0.02, max_error); /* more parts than a window has room for */
+    if (with_surface) fixture_add_surface(&f, &value, 1, 1);
+    f.job.traversal = RENDER_PACKETS;
+    fixture_draw(&f, &drawn[0]);
+    for (int tiles = 0; tiles < 2; tiles++) {
+        f.job.traversal = tiles ? RENDER_TILES : RENDER_BINNED;
+        fixture_draw(&f, &drawn[1]);
+        for (int i = 0; i < 4 * 61 * 47; i++) {
+            const double off = fabs((double)drawn[0].picture.rgba[i] - (double)drawn[1].picture.rgba[i]);
+            worst = test_worse(worst, off);
+        }
+        drawn_free(&drawn[1]);
+    }
+    fprintf(stderr, "tiles and packets, %s, max_error %g: %.2g\n", test_mesh_kind_name(kind), max_error, worst);
+    assert_true(worst < 5e-7);
+    drawn_free(&drawn[0]);
+    fixture_free(&f);
+}
+
 static void tiles_have_what_packets_have(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (int with_surface = 0; with_surface < 2; with_surface++) {
-            static const double value = 0.5;
-            render_fixture f;
-            drawn_frame drawn[2];
-            double worst = 0;
-            test_mesh mesh;
-            test_mesh_lattice(kind, 9, 0.2, test_wave, &mesh);
-            /* Narrow arrays: tets are placed several at once. */
-            fixture_create(&f, &mesh, 1, (test_layout){.is_interleaved = with_surface}, 2.0 / 9, 1,
-                           (const double[]){0, 0, 0});
-            test_mesh_free(&mesh);
-            fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
-            set_segments(&f, 0.02, 0); /* more parts than a window has room for */
-            if (with_surface) fixture_add_surface(&f, &value, 1, 1);
-            f.job.traversal = RENDER_PACKETS;
-            fixture_draw(&f, &drawn[0]);
-            for (int tiles = 0; tiles < 2; tiles++) {
-                f.job.traversal = tiles ? RENDER_TILES : RENDER_BINNED;
-                fixture_draw(&f, &drawn[1]);
-                for (int i = 0; i < 4 * 61 * 47; i++) {
-                    const double off = fabs((double)drawn[0].picture.rgba[i] - (double)drawn[1].picture.rgba[i]);
-                    worst = test_worse(worst, off);
-                }
-                drawn_free(&drawn[1]);
-            }
-            fprintf(stderr, "tiles and packets, %s: %.2g\n", test_mesh_kind_name(kind), worst);
-            assert_true(worst < 5e-7);
-            drawn_free(&drawn[0]);
-            fixture_free(&f);
-        }
+        for (int with_surface = 0; with_surface < 2; with_surface++) judge_tiles(kind, 9, with_surface, 0);
+}
+
+/* By float32 ends: tiles take tets of few pixels a ray and its tet a lane (kernel_small_tets.h). A ray meets more tets
+ * than a window has room for. */
+static void small_tets_are_the_same_in_lanes(void **state)
+{
+    (void)state;
+    for (int with_surface = 0; with_surface < 2; with_surface++) judge_tiles(TEST_TETS, 20, with_surface, 1e-2);
 }
 
 /* Usually each kind from one of the cameras. */
@@ -462,6 +473,7 @@ int main(void)
     /* Tests that draw by themselves, by each instruction set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(tiles_have_what_packets_have),
+        cmocka_unit_test(small_tets_are_the_same_in_lanes),
         cmocka_unit_test(parts_make_the_whole),
         cmocka_unit_test(values_of_any_size_are_held),
         cmocka_unit_test(overlapping_meshes_are_all_seen),

@@ -60,6 +60,7 @@ static const char *const layers[] = {
     "volume: {field: f}\n    sampling: {method: samples}",
     "volume: {field: f}\n    sampling: {method: segments}",
     "volume: {field: f, opacity: [[0, 0], [0.5, 0], [0.5, 1], [1, 1]]}\n    sampling: {max_error: 0.01}",
+    "volume: {field: f}\n    sampling: {max_error: 0.0001}",
     "volume: {field: f}\n      - volume: {field: f, map: grey}\n      - isosurface: {field: f, values: [0.3]}",
 };
 

@@ -1,5 +1,5 @@
 /* The field along rays between two faces of their hexes, wedges or pyramids, a ray and its cell a lane, from three
- * places between them. A function's type is a constant where it is called from.
+ * places between them, and from three in each part of the way. A function's type is a constant where it is called from.
  *
  * In kernel_local.h's coordinates the field is f0 + g r + (its bent terms), and y = r + n(r) goes in a line along the
  * ray, with the same bent terms b in n = B b. So with r = y - n(r)
@@ -11,7 +11,7 @@
  *
  * r is found from the line between its values at the faces. In the middle of a cell n' is zero, so that a step of
  * Newton's method with the derivatives there adds what is left, and takes |n'| of it into the next. It has a
- * third of the terms of a step with the derivatives at the place, and all three places take theirs side by side.
+ * third of the terms of a step with the derivatives at the place, and all places take theirs side by side.
  *
  * How wrong it is. Let the residual be the sum over the coordinates of what y - (r + n(r)) is off zero by. The
  * derivative of n is no more than N in the cell. r may be somewhat outside (kernel_local_is_near()), where it is no
@@ -51,7 +51,7 @@ typedef struct kernel_local_nonlinear {
 
 typedef struct kernel_local_deviations {
     vf field[3];     /* off its chord, at the quarters and the middle */
-    vf residual;     /* at the one of them where that is most */
+    vf residual;     /* the most at these places; of a part, at all places so far and their parts' ends */
     vm has_diverged; /* rays on which r has not been found */
 } kernel_local_deviations;
 

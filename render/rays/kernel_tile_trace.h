@@ -224,6 +224,12 @@ typedef struct kernel_pixel_list {
     uint8_t pixel[KERNEL_LIST_ROOM], lane[KERNEL_LIST_ROOM];
 } kernel_pixel_list;
 
+SIMD_INLINE int kernel_box_pixels(unsigned box)
+{
+    const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
+    return columns * ((int)(box >> 12) - (int)(box >> 8 & 15) + 1);
+}
+
 /* Lists a ray for each pixel of a box, row by row, for the cell in the lane. */
 SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box, int lane)
 {

@@ -280,7 +280,7 @@ typedef struct kernel_frame {
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
     bool has_segments;  /* volumes are integrated by segments, else sampled; */
-    bool is_double;     /* their ends are taken in double (kernel_double.h) */
+    bool is_double;     /* ends of tets and of halved stretches are taken in double (kernel_double.h) */
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
     float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_segment_list.h */
     bool needs_contact; /* volume fragments end at gaps between this rank's cells, because other ranks may have surfaces

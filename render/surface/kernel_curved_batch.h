@@ -651,12 +651,6 @@ SIMD_INLINE void kernel_curved_batch_turn(kernel_tile_trace *t, kernel_curved_ba
     h->arrays = *arrays;
 }
 
-SIMD_INLINE int kernel_box_pixels(unsigned box)
-{
-    const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
-    return columns * ((int)(box >> 12) - (int)(box >> 8 & 15) + 1);
-}
-
 /* Can hexes, wedges and pyramids of the layer under way be traced in batches? */
 SIMD_INLINE bool kernel_curved_batch_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
 {

@@ -24,7 +24,6 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_colour.h"
 #include "kernel_integral.h"
 #include "kernel_local.h"
 #include "kernel_local_budget.h"
@@ -145,12 +144,11 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
 }
 
 /* A segment a lane, of rays in their windows. */
-SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays,
-                                      const vf ends[4])
+SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
-    memcpy(at, &p->rays.at, sizeof at);
+    memcpy(at, &places, sizeof at);
     vf_store_rows(&all[0].t_in, ends);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
@@ -158,15 +156,15 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, const ker
     }
 }
 
-/* Of rays for which one segment is enough. */
+/* Makes the segments of rays for which one is enough. */
 SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
     const vf ends[4] = {t0, t1, p->ends[0].v + lift, p->ends[1].v + lift};
-    kernel_local_put_all(b, p, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
+    kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
 
-/* Of the others. */
+/* Makes those of the other rays. */
 static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
                                                              const kernel_local_pairs *p, vm rays)
 {
@@ -184,7 +182,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
         const vf ends[4] = {from, to, in, out};
-        kernel_local_put_all(b, p, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), ends);
+        kernel_local_put_all(b, p->rays.at, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), ends);
         from = to;
         u0 = u1;
         off0 = off1;
@@ -204,7 +202,7 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel
 
 enum { KERNEL_LOCAL_PARTS = 8 };
 
-/* Ways in equal parts, one after the other. */
+/* Ways in equal parts, one after the other: of the parts' ends t and v are their own, r the whole way's. */
 typedef struct kernel_local_division {
     kernel_local_chord chord;
     kernel_local_part at; /* the end of the last part */

@@ -387,7 +387,7 @@ enum { KERNEL_STRETCH_LOOKS = 8 };
 /* How far a field is off the line between its values at a stretch's ends, seen at eighths. */
 typedef struct kernel_span_deviation {
     vf most;
-    vf bend;    /* of a parabola the same, of any field what its second derivative's mean size makes */
+    vf bend;    /* what a parabola would be off in the middle whose second derivative has the field's mean size */
     vf opacity; /* the mean, by the quarters */
 } kernel_span_deviation;
 
@@ -425,25 +425,27 @@ SIMD_INLINE void kernel_span_deviate(kernel_packet *p, const kernel_segment_stat
 }
 
 /* Into how many subintervals, as a real number, to cut the stretch, and how far its field is off the line between the
- * values at its ends. By error: that goes as the square of a subinterval, half as much again is taken, and its mean is
- * two thirds of it. Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
- * / (1 + depth), with the opacity as the least of the extinction. Where a step of the opacity is among the values no
- * number is enough, nor where a steep ramp is among them and asks for too many, nor where a narrow one is in which the
- * values' rounding alone would take an eighth of what is allowed. */
+ * values at its ends. By error: a subinterval is off its chord by its square's share of the bend, two thirds of that on
+ * average, and half as much again is taken. Second differences add up what values lose to rounding, which is left out,
+ * but no less is taken than the field is off at its most. Allowed is the stretch's share of the ray's length and of its
+ * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. Where a step of
+ * the opacity is among the values no number is enough, nor where a steep ramp is among them and asks for too many, nor
+ * where a narrow one is in which the values' rounding alone would take an eighth of what is allowed. */
 SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
                                   const kernel_interval *stretch, vf *deviation)
 {
     const vf length = stretch->t_out - stretch->t_in, v0 = stretch->v_in, v1 = stretch->v_out;
     kernel_span_deviation off;
     kernel_span_deviate(p, state, span, rays, stretch, &off);
+    const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
+    const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
     const vf distance = length * state->list->per_t, depth = distance * off.opacity;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = off.bend * span->cost * distance; /* 3/2 of 2/3 */
+    const vf made = bend * span->cost * distance; /* 3/2 of 2/3 */
     *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
     if (!span->step_count && !span->is_steep) return subdivisions;
-    const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
     const vf wide = 1.5f * off.most + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
     vm too_few = kernel_span_steps(state, span, low, high);

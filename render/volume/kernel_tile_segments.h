@@ -16,6 +16,7 @@
 #define RENDER_KERNEL_TILE_SEGMENTS_H
 
 #include <math.h>
+#include <string.h>
 
 #include "grid.h"
 #include "kernel_arrays.h"
@@ -30,6 +31,8 @@
 #include "kernel_samples.h"
 #include "kernel_segment_list.h"
 #include "kernel_segments.h"
+#include "kernel_small_tets.h"
+#include "kernel_tet_rays.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
@@ -96,6 +99,59 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
 {
     (void)unused;
     kernel_tile_volume_trees(t, 0, parts, count, blocks, kernel_tile_segments_leaf);
+}
+
+/* ---- small tets ---- */
+
+/* Ends in double are found a packet at a time. Tets that are few enough to be binned by tile are so large that packets
+ * are as fast. */
+SIMD_INLINE bool kernel_tet_segments_fit(const kernel_frame *f)
+{
+    return !f->is_double && !f->volume_candidates;
+}
+
+/* Rays that end in their tet, or begin there. */
+static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_trace *t, kernel_tile_segments *s,
+                                                                    vi places, vi lanes, unsigned rays)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
+    memcpy(lane, &lanes, sizeof lane);
+    for (; rays; rays &= rays - 1) {
+        const int i = __builtin_ctz(rays), packet = at[i] / SIMD_WIDTH;
+        kernel_placed_cell(&cells->placed, lane[i], &cells->cell);
+        kernel_tet_segments(&t->packets[packet], &s->packets[packet].state, &cells->cell, NULL,
+                            vm_from_bits(1u << at[i] % SIMD_WIDTH));
+    }
+}
+
+/* Makes the segments of those of the tile's pending tets in the given lanes that are small. Returns the others. */
+static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
+{
+    kernel_tile_segments *s = t->thread->tile_segments;
+    kernel_local_stretches *b = &s->stretches;
+    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes, &b->rays);
+    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
+        kernel_tet_rays r;
+        kernel_interval i;
+        vf begin, end, near, far;
+        const vi at = kernel_small_tets_rays(t, &b->rays, n, &r);
+        vf_gather_pair(b->window, 2 * at, &begin, &end);
+        r.active = vm_and(r.active, vf_lt(begin, end));
+        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &t->tile, &r, &i);
+        if (!vm_any(i.mask)) continue;
+        vf_gather_pair(b->reach, 2 * at, &near, &far);
+        const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
+        const vm cut = vm_and(met, vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out)));
+        const vm own = vm_and(vm_andnot(met, cut), vm_and(vf_le(begin, i.t_in), vf_lt(i.t_in, i.t_out)));
+        const vf ends[4] = {i.t_in, i.t_out, i.v_in, i.v_out};
+        if (vm_any(own)) kernel_local_put_all(b, at, own, ends);
+        if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
+    }
+    b->rays.count = 0;
+    kernel_local_segments_shorten(t, b);
+    return others;
 }
 
 /* ---- windows ---- */
@@ -172,7 +228,7 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (!kernel_tile_cells_begin(t, NULL)) return;
+    if (!kernel_tile_cells_begin(t, kernel_tet_segments_fit(t->frame) ? kernel_tet_segments_small : NULL)) return;
     const kernel_placement reach = kernel_tile_reach(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);

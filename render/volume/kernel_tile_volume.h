@@ -1,8 +1,8 @@
 /* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. Hexes, wedges and
- * pyramids are taken many at once, with a sample a lane, and tets of few pixels with a ray and its tet a lane
- * (kernel_local_samples.h). Other cells are fetched, placed and
- * given their lines once a window (kernel_tile_cells.h), and go to the packets of the blocks that they may meet, where
- * they fill the samples that they own. A window is so many samples that most rays have one or two:
+ * pyramids are taken many at once, with a sample a lane (kernel_local_samples.h), and tets of few pixels with a ray and
+ * its tet a lane (kernel_small_tets.h). Other cells are fetched, placed and given their lines once a window
+ * (kernel_tile_cells.h), and go to the packets of the blocks that they may meet, where they fill the samples that they
+ * own. A window is so many samples that most rays have one or two:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
  *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
@@ -27,6 +27,8 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
+#include "kernel_small_tets.h"
+#include "kernel_tet_rays.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_depth.h"
@@ -87,6 +89,85 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
     if (!kernel_arrays_fit(g) || !kernel_local_fits(t->frame, type)) return false;
     kernel_local_wait(t, &t->thread->tile_volume->batch, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
+}
+
+/* ---- small tets: samples by kernel_samples.h's operations, to the same bits ---- */
+
+/* Of tets with larger boxes packets take samples as fast. */
+enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
+
+/* As kernel_local_fits(). */
+SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
+{
+    return !f->surface_count && !f->job->separate_samples;
+}
+
+/* A sample that has an owner before this one. */
+static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_trace *t, kernel_local_batch *b, int at,
+                                                                    float depth, float value)
+{
+    const int packet = at / SIMD_WIDTH;
+    const kernel_interval cell = {0};
+    kernel_volume_state state = {b->lanes.volume, &b->packets[packet].samples};
+    kernel_emit_sample(&t->packets[packet], &state, &cell, vm_from_bits(1u << at % SIMD_WIDTH), vf_set(depth),
+                       vf_set(value));
+}
+
+/* The values of samples of the window, one a lane, go where the window has them. */
+SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch *b, vm own, vi places, vi numbers,
+                                        vf depth, vf value)
+{
+    int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
+    float values[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
+    memcpy(number, &numbers, sizeof number);
+    vf_store(values, value);
+    for (unsigned lanes = vm_bits(own); lanes; lanes &= lanes - 1) {
+        const int i = __builtin_ctz(lanes);
+        float *to = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].samples.value[b->lanes.volume][number[i]];
+        to += at[i] % SIMD_WIDTH;
+        if (__builtin_expect(*to == *to, 0))
+            kernel_tet_sample_apart(t, b, at[i], depth[i], values[i]);
+        else
+            *to = values[i];
+    }
+}
+
+/* kernel_fill() of the rays. */
+SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batch *b, const kernel_interval *i, vi at)
+{
+    vf base, step;
+    vf_gather_pair(b->steps, 2 * at, &base, &step);
+    const vf inverse = 1.0f / step, length = i->t_out - i->t_in;
+    const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
+    const float zero = (float)b->first;
+    vf number = kernel_local_first(b, vf_floor(b->pad - ((i->t_in - base) * inverse - zero)));
+    const vf last = vf_min(vf_floor(((i->t_out - base) * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
+    for (vm more = vm_and(i->mask, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
+        const vi whole = vi_from_vf(number);
+        const vf depth = base + step * vf_from_vi(whole + b->first);
+        const vm own = vm_and(more, vm_andnot(vf_lt(depth, i->t_out), vf_lt(depth, i->t_in)));
+        const vf value = i->v_in + slope * (depth - i->t_in);
+        if (vm_any(own)) kernel_tet_samples_put(t, b, own, at, whole, depth, value);
+        number += 1.0f;
+    }
+}
+
+/* Takes the samples of those of the tile's pending tets in the given lanes that are small. Returns the others. */
+static __attribute__((noinline)) unsigned kernel_tet_samples(kernel_tile_trace *t, kernel_local_batch *b,
+                                                             unsigned lanes)
+{
+    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_SAMPLE_PIXELS, &b->lanes, &b->rays);
+    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
+        kernel_tet_rays r;
+        kernel_interval i;
+        const vi at = kernel_small_tets_rays(t, &b->rays, n, &r);
+        r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
+        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &t->tile, &r, &i);
+        if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
+    }
+    b->rays.count = 0;
+    return others;
 }
 
 static unsigned kernel_samples_take_tets(kernel_tile_trace *t, unsigned lanes)
