@@ -63,7 +63,7 @@ static const image_case cases[] = {
     {"samples, reproducible", TO_THE_BIT, VOLUME, "method: samples, reproducible: true", NULL},
     {"segments, reproducible", TO_THE_BIT, VOLUME, "method: segments, reproducible: true", NULL},
     {"max_error, reproducible", TO_THE_BIT, VOLUME, "max_error: 0.01, reproducible: true", NULL},
-    {"max_error 1e-4, reproducible", TO_THE_BIT, VOLUME, "max_error: 0.0001, reproducible: true", NULL},
+    {"max_error 1e-3, reproducible", TO_THE_BIT, VOLUME, "max_error: 0.001, reproducible: true", NULL},
     {"volume, surfaces, reproducible", TO_THE_BIT, VOLUME CLEAR, "max_error: 0.01, reproducible: true", NULL},
     {"samples, surfaces, reproducible", TO_THE_BIT, VOLUME CLEAR, "method: samples, reproducible: true", NULL},
     {"two volumes, reproducible", TO_THE_BIT, VOLUME OTHER, "method: samples, reproducible: true", NULL},

@@ -34,9 +34,9 @@
  * That is measured. Of random rays in 5,000 random cells with bends up to 0.89, and the fields that have E = 0 or all
  * three places on the chord, and their mean as far off as can be, the polynomial's mean was off by no more than 0.54 E
  * on the whole way, 0.57 E on halves, 0.72 E on quarters and 0.36 E on eighths. The field itself was off by 3.1 E on
- * average at most, but for hexes that are hardly bent (N < 0.05): there 50 E were found, of an E that is all but
- * nothing. What one segment is charged for the mean of |v - f| held there too, and of more the shortfall is as small.
- */
+ * average at most, but for 19 of 133,000 of these fields, 5.8 E, and by 50 E where all of E, P and A were sought to be
+ * nothing in hexes that are hardly bent (N < 0.05). What one segment is charged for the mean of |v - f| held in all of
+ * them; what several are charged for it is too little there. */
 #ifndef RENDER_KERNEL_LOCAL_BUDGET_H
 #define RENDER_KERNEL_LOCAL_BUDGET_H
 
