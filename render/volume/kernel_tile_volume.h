@@ -154,9 +154,9 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
 }
 
 /* Takes the samples of those of the tile's pending tets in the given lanes that are small. Returns the others. */
-static __attribute__((noinline)) unsigned kernel_tet_samples(kernel_tile_trace *t, kernel_local_batch *b,
-                                                             unsigned lanes)
+static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
 {
+    kernel_local_batch *b = &t->thread->tile_volume->batch;
     const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_SAMPLE_PIXELS, &b->lanes, &b->rays);
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
         kernel_tet_rays r;
@@ -168,11 +168,6 @@ static __attribute__((noinline)) unsigned kernel_tet_samples(kernel_tile_trace *
     }
     b->rays.count = 0;
     return others;
-}
-
-static unsigned kernel_samples_take_tets(kernel_tile_trace *t, unsigned lanes)
-{
-    return kernel_tet_samples(t, &t->thread->tile_volume->batch, lanes);
 }
 
 static const kernel_cell_visitor kernel_samples_visitor = {true, kernel_tile_samples, kernel_samples_queue};
@@ -276,7 +271,7 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    if (!kernel_tile_cells_begin(t, kernel_tet_samples_fit(t->frame) ? kernel_samples_take_tets : NULL)) return;
+    if (!kernel_tile_cells_begin(t, kernel_tet_samples_fit(t->frame) ? kernel_tet_samples_small : NULL)) return;
     kernel_placement reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;
     const float cells_near = kernel_tile_cells_near(t);
