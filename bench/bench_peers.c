@@ -15,25 +15,11 @@ static const struct {
 enum { BUILDERS = sizeof builders / sizeof *builders };
 
 typedef struct peers_series {
-    bench_series build[BUILDERS], trace, keeping, kept, embree[3];
+    bench_series build[BUILDERS], trace, embree[3];
     double cost[BUILDERS];
 } peers_series;
 
 static const char *const builder_names[3] = {"low", "medium", "medium wide"};
-
-/* Traces the first of several pictures, and a further one. */
-static void trace_kept(bench_scene *scene, peers_series *series, int number)
-{
-    scene->job.active = render_active_cells_create();
-    const double first_began = bench_begin();
-    bench_scene_frame(scene);
-    bench_end(first_began, number, &series->keeping);
-    const double began = bench_begin();
-    bench_scene_frame(scene);
-    bench_end(began, number, &series->kept);
-    render_active_cells_free(scene->job.active);
-    scene->job.active = NULL;
-}
 
 static void run(bench_scene *scene, bench_routes *routes, peers_series *series, int number)
 {
@@ -47,7 +33,6 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
     const double began = bench_begin();
     bench_scene_frame(scene);
     bench_end(began, number, &series->trace);
-    trace_kept(scene, series, number);
     bench_routes_run(routes, bench_isovalues, 1, number);
     for (int i = 0; routes->embree && i < 3; i++) {
         bench_begin();
@@ -77,8 +62,6 @@ static void print(bench_scene *scene, bench_routes *routes, peers_series *series
         bench_print_number(&scene->subject, measure, "tests/ray", series->cost[i]);
     }
     bench_print_series(&scene->subject, "isosurface trace", &series->trace);
-    bench_print_series(&scene->subject, "isosurface trace keeping", &series->keeping);
-    bench_print_series(&scene->subject, "isosurface trace kept", &series->kept);
     bench_routes_print(routes, "isosurface");
     for (int i = 0; routes->embree && i < 3; i++) {
         char measure[64];

@@ -231,19 +231,6 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 /* Error allowed to mixed segments where no max_error is given. */
 #define RENDER_MIXING_ERROR 1e-4
 
-/* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
- * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions/find.md has the
- * gain). A frame whose job has one fills it with what is not in it yet: parts of tets alone or hexes alone, with
- * float32 coordinates and values at vertices, of opaque surfaces in one colour with the cells' gradients for normals
- * (hexes: robust roots), by RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in
- * all. Pictures are the same to the last bit. For one frame at a time. */
-typedef struct render_active_cells render_active_cells;
-render_active_cells *render_active_cells_create(void); /* NULL: no memory */
-void render_active_cells_free(render_active_cells *active);
-/* Call this before the next frame where a mesh's cells, coordinates or values have changed. */
-void render_active_cells_clear(render_active_cells *active);
-int64_t render_active_cells_bytes(const render_active_cells *active);
-
 typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_SPHERE } render_clip_kind;
 
 /* A half space, box or sphere that cuts layers: what is drawn of them lies within it, or where is_outside without. */
@@ -286,7 +273,6 @@ typedef struct render_job {
     render_waiting *waiting; /* NULL: RENDER_DIFFERENCES are found at once; else its hits are added to the list and make
                                 no fragments, but those of polyhedra. Not with RENDER_VALUES */
     render_traversal traversal;
-    render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;
     int volume_count;
     int clip_count;           /* at most RENDER_MAX_CLIPS */

@@ -13,7 +13,6 @@
 #include "memory.h"
 #include "pixel_set.h"
 #include "render.h"
-#include "render_active_cells.h"
 #include "render_candidates.h"
 #include "render_fold.h"
 #include "render_fragments.h"
@@ -168,9 +167,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (has_memory && frame->is_binned && !render_surfaces_are_small(frame)) {
         const double start = now();
-        render_active_cells_begin(frame, states, threads);
         render_candidates_find(frame, states, threads);
-        if (!frame->candidates) render_active_cells_end(frame); /* tiles ask for the mesh's own cells */
         statistics->surface_ms = 1e3 * (now() - start);
     }
     if (has_memory && frame->bins_volume) {
@@ -186,7 +183,6 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
         trace_tiles(kernels, frame, &states[omp_get_thread_num()], end);
     }
     render_candidates_free(frame);
-    render_active_cells_end(frame);
     has_memory = end_threads(job, states, threads, statistics) && has_memory;
     base_free(states);
     return has_memory;

@@ -52,7 +52,7 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, 
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
     if (arrays->has_lanes && kernel_arrays_type(arrays, candidate->cell) == GRID_TET) {
-        kernel_arrays_fetch(c, arrays, candidate->cell, 4);
+        kernel_arrays_fetch_tet(c, arrays, candidate->cell);
         kernel_tet_place(c, t->frame, &t->tile);
     } else {
         kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
@@ -171,18 +171,10 @@ typedef struct kernel_tile_search {
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
-/* Prefetches what is read first of a cell: its vertices' indices, or its active record. */
 SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_tile_candidate *candidate)
 {
     const int part = (int)(candidate->source / RENDER_MAX_ISOVALUES);
-    const kernel_active *active =
-        kernel_active_of(f, f->isovalues[candidate->source % RENDER_MAX_ISOVALUES].surface, part);
-    if (!active) {
-        kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
-        return;
-    }
-    const float *record = active->records + (int64_t)candidate->cell * active->vertices * KERNEL_ACTIVE_FLOATS;
-    for (int at = 0; at < active->vertices * KERNEL_ACTIVE_FLOATS; at += 16) __builtin_prefetch(record + at);
+    kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
 }
 
 /* Cells whose vertices' indices are being prefetched. */
@@ -200,7 +192,6 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
-        if (kernel_active_of(t->frame, t->layer, part)) continue; /* all of it was asked for */
         if (b->layer == t->layer && b->part == part && kernel_is_for_batch(t, b, w->items[n]))
             continue; /* batches ask for theirs */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
@@ -506,20 +497,7 @@ static void find_candidates(const kernel_frame *f, kernel_thread *thread, const 
     kernel_finder_begin(finder, f, subtree);
     finder->list = list;
     finder->grow = grow;
-    if (subtree->count)
-        kernel_find_active(finder, subtree->first, subtree->count);
-    else
-        kernel_find_candidates(finder, subtree->node);
-}
-
-static void write_active(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
-                         kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer))
-{
-    kernel_finder *finder = thread->finder;
-    kernel_finder_begin(finder, f, subtree);
-    finder->writer = writer;
-    finder->keep = grow;
-    kernel_activate_subtree(finder, subtree->node);
+    kernel_find_candidates(finder, subtree->node);
 }
 
 /* Megabytes, most of which no tile of the frame may touch: only what is read before it is written is set. */
@@ -540,7 +518,12 @@ static void begin(kernel_thread *thread)
     m->segments.depth = 0;
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH,          sizeof(kernel_memory),  begin,
-                                   trace_tile,          find_candidates,        write_active,
-                                   kernel_occlude,      kernel_occlude_by_cell, kernel_sample_waiting,
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH,
+                                   sizeof(kernel_memory),
+                                   begin,
+                                   trace_tile,
+                                   find_candidates,
+                                   kernel_occlude,
+                                   kernel_occlude_by_cell,
+                                   kernel_sample_waiting,
                                    kernel_light_waiting};

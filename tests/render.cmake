@@ -50,8 +50,6 @@ set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)
 insitu_render_program(test_render_batches)
 insitu_add_set_tests(render_batches 120)
 
-insitu_render_program(test_render_active_cells)
-insitu_add_set_tests(render_active_cells 180 split)
 
 insitu_render_program(test_render_isa)
 add_test(NAME render_isa COMMAND test_render_isa)

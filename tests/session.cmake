@@ -153,8 +153,6 @@ insitu_add_mpi_test(session_messages test_session_messages 1 3 TIMEOUT 120 ARGS 
 insitu_session_program(test_session_candidates)
 insitu_add_mpi_test(session_candidates test_session_candidates 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
-insitu_session_program(test_session_active_cells)
-insitu_add_mpi_test(session_active_cells test_session_active_cells 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_changes)
 insitu_add_mpi_test(session_changes test_session_changes 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

@@ -23,9 +23,7 @@ class Bar(NamedTuple):
 LEAST, MOST = True, False
 TRACES = {
     "isosurface trace": Bar(
-        "Isosurface, traced from all cells", "Mrays/s", "Embree tracing extracted triangles", LEAST, 1, 2),
-    "isosurface trace kept": Bar(
-        "Isosurface, traced from kept cells", "Mrays/s", "Embree tracing extracted triangles", LEAST, 1, 2)}
+        "Isosurface, traced from all cells", "Mrays/s", "Embree tracing extracted triangles", LEAST, 1, 2)}
 NEW_VALUES = {
     "isosurface": Bar("One isosurface, new values", "ms", "Embree: extract, build, trace", MOST, 1, 0.5),
     "isosurfaces": Bar("Three isosurfaces, new values", "ms", "Embree: extract, build, trace", MOST, 1, 0.5)}

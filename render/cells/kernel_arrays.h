@@ -85,27 +85,6 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     p->asked[3].stride = p->is_by_cell ? p->asked[0].stride : values.stride;
 }
 
-/* Returns the active records of a surface's cells on a part, or NULL where there are none. */
-SIMD_INLINE const kernel_active *kernel_active_of(const kernel_frame *f, int surface, int part)
-{
-    const kernel_active *active = f->active ? &f->active[surface * f->job->part_count + part] : NULL;
-    return active && active->records ? active : NULL;
-}
-
-/* Sets up a surface's cells on a part: its active records, or else the mesh. */
-static inline void kernel_arrays_surface(kernel_arrays *p, const kernel_frame *f, int surface, int part)
-{
-    const kernel_active *active = kernel_active_of(f, surface, part);
-    kernel_arrays_begin(p, f->job->parts[part].cells, &f->surfaces[surface].layer->field.fields[part]);
-    if (!active) return;
-    p->cells = NULL;
-    p->own = NULL;
-    p->type = active->vertices == 8 ? GRID_HEX : GRID_TET;
-    for (int a = 0; a < 4; a++)
-        *(a < 3 ? &p->coordinates[a] : &p->values) =
-            (kernel_numbers){.data = active->records + a, .stride = KERNEL_ACTIVE_FLOATS};
-}
-
 /* ---- cells ---- */
 
 SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
@@ -157,15 +136,12 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     }
 }
 
-/* The vertices of cells of one type into lanes from the given one on, and what they have on its way from memory. Active
- * records are prefetched whole (kernel_candidate_prefetch()). */
+/* Stores the vertices of cells of one type into lanes from the given one on, and prefetches their coordinates and
+ * values. */
 SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
                                      int32_t (*out)[SIMD_WIDTH], int lane)
 {
-    if (!p->cells) {
-        for (int n = 0; n < count; n++)
-            for (int i = 0; i < vertices; i++) out[i][lane + n] = (int32_t)((int64_t)cells[n] * vertices + i);
-    } else if (vertices == 4) {
+    if (vertices == 4) {
         kernel_arrays_indices(p, cells, count, 4, out, lane);
         kernel_arrays_prefetch(p, count, 4, out, lane);
     } else if (vertices == 8) {

@@ -90,17 +90,17 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
     }
 }
 
-/* A cell with finite values, as kernel_cell_fetch() makes it, and where its vertices are; for the caller to place. */
-SIMD_INLINE void kernel_arrays_fetch(kernel_cell *c, const kernel_arrays *p, uint32_t index, int vertices)
+/* Fetches a tet of finite values, as kernel_cell_fetch() does, for the caller to transform. */
+SIMD_INLINE void kernel_arrays_fetch_tet(kernel_cell *c, const kernel_arrays *p, uint32_t index)
 {
     int32_t own[GRID_MAX_CELL_VERTICES][SIMD_WIDTH];
-    kernel_arrays_cells(p, &index, 1, vertices, own, 0);
+    kernel_arrays_cells(p, &index, 1, 4, own, 0);
     c->index = index;
-    c->type = vertices == 8 ? GRID_HEX : GRID_TET;
-    c->count = vertices;
+    c->type = GRID_TET;
+    c->count = 4;
     c->is_finite = c->is_placed = true;
     c->has_lines = c->has_normal = false;
-    for (int i = 0; i < vertices; i++) {
+    for (int i = 0; i < 4; i++) {
         const int64_t vertex = own[i][0];
         c->vertices[i] = vertex;
         c->values[i] = kernel_numbers_one(&p->values, p->is_by_cell ? (int64_t)index : vertex);

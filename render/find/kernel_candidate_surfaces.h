@@ -187,18 +187,6 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_t
     return size;
 }
 
-/* Fetches a cell of odd numbers, from the mesh or from its active record; a record's number is not the mesh's. */
-static void kernel_odd_fetch(const kernel_finder *s, uint32_t cell, kernel_cell *c)
-{
-    if (s->arrays.cells) {
-        kernel_cell_fetch(c, s->arrays.cells, &s->field->fields[s->part], cell);
-        return;
-    }
-    kernel_arrays_fetch(c, &s->arrays, cell, grid_type_vertices(s->arrays.type));
-    for (int i = 0; i < c->count; i++)
-        kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-}
-
 /* Adds the cells of the lanes that are crossed and of usual numbers. Values too large, too small or NaN for lanes are
  * handled one by one. */
 SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm usual, unsigned crossed,
@@ -208,7 +196,7 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
     kernel_add_lanes(s, e, kernel_arrays_drawn(&s->arrays, c->cell, good), c->cell, s->source + (uint32_t)value);
     for (unsigned odd = crossed & ~vm_bits(usual); odd; odd &= odd - 1) {
         kernel_cell own;
-        kernel_odd_fetch(s, c->cell[__builtin_ctz(odd)], &own);
+        kernel_cell_fetch(&own, s->arrays.cells, &s->field->fields[s->part], c->cell[__builtin_ctz(odd)]);
         kernel_find_alone(s, &own, value);
     }
 }

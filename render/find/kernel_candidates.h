@@ -16,7 +16,6 @@
 #define RENDER_KERNEL_CANDIDATES_H
 
 #include "grid.h"
-#include "kernel_active_cells.h"
 #include "kernel_arrays.h"
 #include "kernel_candidate_surfaces.h"
 #include "kernel_candidate_volumes.h"
@@ -34,9 +33,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
     kernel_cells_fill(c);
-    if (s->writer)
-        kernel_activate_pending(s, c);
-    else if (!s->surface)
+    if (!s->surface)
         kernel_find_volumes(s, c);
     else if (c->type == GRID_TET)
         kernel_find_tets(s, c);
@@ -171,8 +168,8 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
     const mmbvh_ranges *ranges = &s->field->ranges[s->part];
     int64_t stack[KERNEL_FRONT_ROOM + 2 * KERNEL_FRONT];
     int top = 0;
-    stack[top++] = 2 * root + (s->writer != NULL);
-    while (top && !(s->writer ? s->writer->is_refused : s->list->is_full)) {
+    stack[top++] = 2 * root;
+    while (top && !s->list->is_full) {
         kernel_front front, leaves, children;
         const int most = top < KERNEL_FRONT_ROOM - MMBVH_MAX_DEPTH ? KERNEL_FRONT : 1;
         const int count = top < most ? top : most;
@@ -189,27 +186,6 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
             stack[top++] = left + 2;
             stack[top++] = left;
         }
-    }
-    kernel_find_rest(s);
-}
-
-/* Makes records of the subtree's active cells, if its mesh allows it. */
-static void kernel_activate_subtree(kernel_finder *s, int64_t root)
-{
-    kernel_active_writer *k = s->writer;
-    const kernel_arrays *p = &s->arrays;
-    const bool is_one_type = p->type == GRID_TET || p->type == GRID_HEX;
-    k->vertices = grid_type_vertices(p->type);
-    k->is_refused = k->is_refused || !(p->has_lanes && p->is_narrow && is_one_type && !p->own && !p->is_by_cell);
-    if (!k->is_refused) kernel_find_candidates(s, root);
-}
-
-/* Finds the candidates among count active records, from the first on. */
-static void kernel_find_active(kernel_finder *s, int64_t first, int64_t count)
-{
-    for (int64_t at = first, end = first + count; at < end && !s->list->is_full; at++) {
-        if (s->queued_count == SIMD_WIDTH) kernel_find_queued(s);
-        s->queued[s->queued_count++] = (uint32_t)at;
     }
     kernel_find_rest(s);
 }

@@ -81,9 +81,6 @@ typedef struct kernel_finder {
     kernel_cells pending[KERNEL_FOUND_TYPES]; /* those whose vertices are, by kernel_found_number() */
     kernel_crossed crossed[KERNEL_FOUND_TETS];
     kernel_arrays arrays;
-    /* The other end: what is crossed is kept, and the picture is not asked. */
-    kernel_active_writer *writer; /* NULL: none */
-    bool (*keep)(kernel_active_writer *writer);
 } kernel_finder;
 
 static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
@@ -112,11 +109,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         *c = (kernel_cells){.type = types[i], .vertices = grid_type_vertices(types[i])};
         if (types[i] != GRID_TET) s->crossed[kernel_found_number(types[i])] = (kernel_crossed){.cells = *c};
     }
-    s->writer = NULL;
-    if (s->surface)
-        kernel_arrays_surface(&s->arrays, f, subtree->surface, s->part);
-    else
-        kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
+    kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);

@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "mmbvh.h"
 
-enum { SUBTREES = 128, LEAST_PIECE = 1024 /* records */ };
+enum { SUBTREES = 128 };
 
 bool render_subtrees_begin(render_subtrees *list, int64_t trees)
 {
@@ -14,9 +14,9 @@ bool render_subtrees_begin(render_subtrees *list, int64_t trees)
     return list->items;
 }
 
-/* Cuts the tree below its top into some SUBTREES subtrees. */
-static void add_tree(render_subtrees *list, const mmbvh *tree, int surface, int part)
+void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part)
 {
+    const mmbvh *tree = frame->job->parts[part].tree;
     const int64_t first = list->count;
     list->items[list->count++] = (kernel_subtree){.surface = surface, .part = part};
     for (int64_t next = first; next < list->count && list->count - first < SUBTREES;) {
@@ -30,22 +30,4 @@ static void add_tree(render_subtrees *list, const mmbvh *tree, int surface, int 
         list->items[list->count - 1] = (kernel_subtree){.surface = surface, .part = part, .node = left};
         list->items[list->count++] = (kernel_subtree){.surface = surface, .part = part, .node = left + 1};
     }
-}
-
-static void add_records(render_subtrees *list, int64_t count, int surface, int part)
-{
-    const int64_t even = (count + SUBTREES - 1) / SUBTREES, piece = even > LEAST_PIECE ? even : LEAST_PIECE;
-    for (int64_t first = 0; first < count; first += piece)
-        list->items[list->count++] = (kernel_subtree){
-            .surface = surface, .part = part, .first = first, .count = count - first < piece ? count - first : piece};
-}
-
-void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part)
-{
-    const kernel_active *active =
-        surface >= 0 && frame->active ? &frame->active[surface * frame->job->part_count + part] : NULL;
-    if (active && active->records)
-        add_records(list, active->count, surface, part);
-    else
-        add_tree(list, frame->job->parts[part].tree, surface, part);
 }

@@ -11,7 +11,7 @@ typedef struct render_subtrees {
 
 /* Begins a list with room for so many trees. Returns false where there is no memory. */
 bool render_subtrees_begin(render_subtrees *list, int64_t trees);
-/* Adds the subtrees of a part's tree for a surface (-1: the volume), or pieces of its active records. */
+/* Cuts a part's tree below its top into some 128 subtrees and adds them, for a surface (-1: the volume). */
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part);
 
 #endif

@@ -14,8 +14,7 @@ enum {
     KERNEL_TILE_RUN = 4, /* so many tiles, row by row, are drawn by one thread after each other */
     KERNEL_BLOCK = 4,    /* pixels along its side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
-    KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS,
-    KERNEL_ACTIVE_FLOATS = 4 /* of a vertex */
+    KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS
 };
 
 /* A transfer function as pieces on which opacity and colour are linear (render_pieces.c), and bounds of its slopes. */
@@ -221,31 +220,11 @@ typedef struct kernel_candidate_list {
     int64_t *bound; /* how many more all lists together may have room for */
 } kernel_candidate_list;
 
-/* A piece of the search for candidates: a subtree, or count active records from first on. */
+/* A piece of the search for candidates. */
 typedef struct kernel_subtree {
-    int surface, part;          /* surface -1: cells of the first volume */
-    int64_t node, first, count; /* count 0: the node's subtree */
+    int surface, part; /* surface -1: cells of the first volume */
+    int64_t node;      /* the subtree's root */
 } kernel_subtree;
-
-/* The cells of a part that a layer's isovalues cross, side by side: of each its vertices in their order, of each vertex
- * x, y, z and the value (render_active_cells.h). Tets or hexes. */
-typedef struct kernel_active {
-    const float *records;
-    int64_t count;
-    int vertices; /* of a cell */
-} kernel_active;
-
-/* Bounds of an active cell's values, and of its coordinates and the eye's times the space's scale. */
-#define KERNEL_ACTIVE_VALUE 4e29f
-#define KERNEL_ACTIVE_PLACE 4e14f
-
-/* One thread's share of the records while they are written. */
-typedef struct kernel_active_writer {
-    float *at, *end;        /* of its room */
-    int vertices;           /* of a cell */
-    bool is_refused;        /* nothing is kept: another mesh, unusual numbers, or too many cells */
-    struct kernel_room *of; /* render_active_cells.c */
-} kernel_active_writer;
 
 typedef struct kernel_isovalue {
     int surface, value;
@@ -257,7 +236,6 @@ typedef struct kernel_frame {
     kernel_surface *surfaces; /* opaque ones first */
     int opaque_count;
     kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
-    const kernel_active *active; /* surface by surface, part by part: records NULL where none are; NULL: nowhere */
     kernel_tile_candidate
         *candidates; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
     uint32_t *candidate_starts;
@@ -331,9 +309,6 @@ typedef struct kernel_table {
     /* Adds the subtree's candidates to the list; grow() makes room for more, or the list full. */
     void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
-    /* Keep what the surface's isovalues cross of the subtree, whether or not it shows in the picture. */
-    void (*write_active)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
-                         kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer));
     /* Closes the rays that an opaque surface blocks for certain, and notes cells that others are to be asked of. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
                     struct kernel_straights *rays);

@@ -234,7 +234,8 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     b->layer = layer;
     b->part = part;
     b->is_of_faces = t->surface->layer->is_of_faces;
-    kernel_arrays_surface(&b->arrays, t->frame, layer, part);
+    kernel_arrays_begin(&b->arrays, t->frame->job->parts[part].cells,
+                        &t->frame->surfaces[layer].layer->field.fields[part]);
     b->takes_batches = b->arrays.has_lanes && !t->surface->layer->colour_map && kernel_tile_layer_batches(t);
 }
 

@@ -61,7 +61,6 @@ static render_job opaque_job(const render_job *job, render_surface_layer *surfac
     out.volume_count = out.frame = 0;
     out.camera.offset[0] = out.camera.offset[1] = 0;
     out.pixels = NULL;
-    out.active = NULL;
     return out;
 }
 

@@ -158,7 +158,6 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .parent = layers->part_count > 1 ? d->parent : NULL,
                         .surfaces = layers->surfaces,
                         .surface_count = layers->surface_count,
-                        .active = view->clip_count ? NULL : layers->active,
                         .clip_count = view->clip_count,
                         .clips = view->clips,
                         .volume_clips = image->volume_count ? image->volumes[0].clips : 0,
@@ -345,60 +344,6 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
     return is_told_later ? INSITU_OK : session_agree(d->team->comm, error);
 }
 
-/* ---- active cells --------------------------------------------------------------------------------------------
- *
- * Isosurfaces are compared as the scene writes them. One that is the same in other words ("0" of a field of one
- * component) is drawn as if it were another, which only costs time. The renderer decides whether a mesh's arrays can be
- * stored, at no cost. */
-
-/* Filling costs up to a third of a frame, and each later frame may save less than that (docs/decisions/find.md). */
-enum { LEAST_FRAMES = 3 };
-
-/* Tells whether the renderer can store active cells for the layer, by its rule (render.h). */
-static bool can_be_stored(const scene_isosurface *layer)
-{
-    return layer->opacity >= 1 && !layer->has_colour_by && layer->normals == SCENE_GRADIENT;
-}
-
-static bool are_same_meshes(const scene_field *a, const scene_field *b)
-{
-    bool is_same = a->mesh_count == b->mesh_count;
-    for (int i = 0; i < a->mesh_count && is_same; i++) is_same = strcmp(a->meshes[i], b->meshes[i]) == 0;
-    return is_same;
-}
-
-static bool is_same(const scene_isosurface *a, const scene_isosurface *b)
-{
-    return are_same_meshes(&a->field, &b->field) && strcmp(a->field.name, b->field.name) == 0 &&
-           a->field.component == b->field.component && a->value_count == b->value_count &&
-           memcmp(a->values, b->values, (size_t)a->value_count * sizeof *a->values) == 0;
-}
-
-static bool has_same(const scene_image *image, const scene_isosurface *layer)
-{
-    for (int i = 0; i < image->isosurface_count; i++)
-        if (can_be_stored(&image->isosurfaces[i]) && is_same(&image->isosurfaces[i], layer)) return true;
-    return false;
-}
-
-/* Counts the frames of all pixels; others do not use stored cells. */
-static int whole_frames(const scene_image *image)
-{
-    return has_edges_alone(image) ? 1 : image->frames;
-}
-
-bool session_active_cells_pay(const session_plan *plan, const scene_image *image)
-{
-    for (int i = 0; i < image->isosurface_count; i++) {
-        int64_t frames = 0;
-        if (!can_be_stored(&image->isosurfaces[i])) continue;
-        for (int n = 0; n < plan->image_count; n++)
-            if (has_same(plan->images[n], &image->isosurfaces[i])) frames += whole_frames(plan->images[n]);
-        if (frames >= LEAST_FRAMES) return true;
-    }
-    return false;
-}
-
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
 /* Collective where the outline is of meshes or ranks; what fails on rank 0 alone is for the next agreement. */
@@ -420,9 +365,8 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
 }
 
 /* An error of one rank alone, such as lack of memory, goes in *error to the next agreement: that of the layers or of
- * the first frame. active is NULL, or filled by the image's first frame and used by the others. */
-static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
-                                base_error *error)
+ * the first frame. */
+static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {
     session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report, NULL, image};
     session_view view;
@@ -433,7 +377,6 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (status) return status;
     if (!error->status) canvas_create(d, image, &canvas, error);
     status = session_make_layers(&basis, image, &layers, error);
-    layers.active = active;
     if (!status) status = decorate(d, image, &view, &layers, &canvas, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
@@ -444,15 +387,6 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     session_layers_free(&layers);
     canvas_free(&canvas, d->writer);
     return status;
-}
-
-/* The step's active cells, made for the first image that shares them; without memory they are not stored. */
-static render_active_cells *active_cells_for(const session_plan *plan, const scene_image *image,
-                                             render_active_cells **active)
-{
-    if (!session_active_cells_pay(plan, image)) return NULL;
-    if (!*active) *active = render_active_cells_create();
-    return *active;
 }
 
 /* Writes the tables of databases on rank 0, with the lines of all pictures of the step. Collective. */
@@ -479,15 +413,13 @@ static void write_tables(const session_drawing *d, base_error *first)
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error)
 {
     base_error first = plan->refusal;
-    render_active_cells *active = NULL;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
-        draw_image(d, &placed, active_cells_for(plan, plan->images[i], &active), &reason);
+        draw_image(d, &placed, &reason);
         if (first.status == INSITU_OK) first = reason;
     }
-    render_active_cells_free(active);
     write_tables(d, &first);
     if (first.status) *error = first;
     return error->status;

@@ -31,11 +31,6 @@ typedef struct session_drawing {
     bool writes_behind; /* pictures are written when the step is over */
 } session_drawing;
 
-/* Tells whether an isosurface of the image is drawn so often in this step, in frames of this image and of others of the
- * plan, that storing its active cells pays (render.h: render_active_cells). Depends on the scene alone, and so is the
- * same on every rank. */
-bool session_active_cells_pay(const session_plan *plan, const scene_image *image);
-
 /* Draw the plan's images and give them to the writer. One that fails is left out. The plan's refusal, if there is one,
  * else the first failure, is the error. Collective. */
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error);

@@ -23,7 +23,6 @@ typedef struct session_layers {
     render_vertex_gradients *gradients; /* part_count an isosurface */
     double **gathered;                  /* as the fields: values at outer faces; NULL where they are not such */
     mmbvh_ranges *ranges;               /* as the fields */
-    render_active_cells *active;        /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
 } session_layers;
 
 /* Input that layers are made from. */
