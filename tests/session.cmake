@@ -39,6 +39,9 @@ add_test(NAME homes COMMAND test_homes)
 add_executable(test_session_lanes test_session_lanes.c)
 target_link_libraries(test_session_lanes PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_lanes COMMAND test_session_lanes)
+add_executable(test_cell_volumes test_cell_volumes.c)
+target_link_libraries(test_cell_volumes PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
+add_test(NAME cell_volumes COMMAND test_cell_volumes)
 
 # Ranks are not bound, so that all may run on all cores.
 add_executable(test_session_cores test_session_cores.c)

@@ -78,8 +78,8 @@ static bool is_near(double a, double b)
 }
 
 /* A linear field over the cube from -1 to 1: its mean is the middle's value, its ends are at corners. Polyhedra are
- * cubes here: those of the lattice are not star-shaped, and their volume is that of tets which overlap. In mixed
- * lattices pyramids are not in pairs, whose vertices' means are not their middles. */
+ * cubes here, whose vertices' means are their middles. In mixed lattices pyramids are not in pairs, whose vertices'
+ * means are not their middles. */
 static void numbers_of_linear_fields_are_closed_forms(void **state)
 {
     (void)state;
@@ -97,6 +97,28 @@ static void numbers_of_linear_fields_are_closed_forms(void **state)
                                      (kind == TEST_MIXED || is_near(number_at(text, MEAN), 0.1))));
         input_free(&in);
     }
+}
+
+/* Cells with bent faces, and concave ones, leave no gap and do not overlap: together they are the cube. Bent hexes and
+ * wedges also as polyhedra with bilinear faces. */
+static void bent_and_concave_cells_fill_their_cube(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int way = 0; way < 2; way++) {
+            session_input in = {0};
+            make_part(kind, 0.15, false, &in); /* no tet is turned inside out */
+            if (way == 1 && kind == TEST_POLYHEDRA) test_mesh_turn(&in.part, 9);
+            if (way == 1 && kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&in.part, 0.5);
+            input_describe(&in);
+            in.mesh.keep_polyhedra = way;
+            if (own_rank == 0) unlink("bent.csv");
+            run_steps(NEVER "statistics: [{field: f, path: bent.csv}]\n", &in, 0, 1);
+            read_file("bent.csv", MOST, text);
+            everywhere(own_rank != 0 || is_near(number_at(text, VOLUME), 8));
+            input_free(&in);
+        }
 }
 
 /* Cubes of one size, whose values are known: sums by hand. Bins from -2 to 6, so that some cells are in none. */
@@ -252,6 +274,7 @@ static int run(void)
 {
     if (!enter_folder(work_folder, "statistics")) return 1;
     const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_linear_fields_are_closed_forms),
+                                       cmocka_unit_test(bent_and_concave_cells_fill_their_cube),
                                        cmocka_unit_test(numbers_of_cells_are_sums),
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),

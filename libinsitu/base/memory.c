@@ -88,6 +88,13 @@ void base_free(void *block)
     free((char *)block - header_bytes);
 }
 
+void *base_carve(base_carving *from, size_t bytes)
+{
+    void *p = from->begin ? from->begin + from->used : NULL;
+    from->used += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
 char *base_strdup(const char *text)
 {
     const size_t bytes = strlen(text) + 1;

@@ -25,6 +25,14 @@ void *base_realloc(void *block, size_t bytes);
 /* block may be NULL. */
 void base_free(void *block);
 
+/* A block that is given out piece by piece, each 64-byte aligned; begin NULL: the pieces are only counted. */
+typedef struct base_carving {
+    char *begin;
+    size_t used;
+} base_carving;
+
+void *base_carve(base_carving *from, size_t bytes);
+
 /* A copy of a C string, or NULL. */
 char *base_strdup(const char *text);
 

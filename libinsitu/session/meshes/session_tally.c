@@ -195,19 +195,6 @@ bool tally_is_flat(const grid *g, int64_t cell)
     return one.flat > 0;
 }
 
-double tally_cell_volume(const grid *g, int64_t cell)
-{
-    bool is_flat_cell;
-    double points[GRID_MAX_CELL_VERTICES][3];
-    const int type = grid_cell_type(g, cell);
-    if (grid_is_shell_type(type)) return 0;
-    if (type == GRID_POLYHEDRON) return fabs(session_polyhedron_volume(g, cell, &is_flat_cell));
-    grid_walk walk = grid_walk_cell(g, cell);
-    int64_t vertex;
-    for (int i = 0; grid_walk_next(&walk, &vertex); i++) grid_vertex(g, vertex, points[i]);
-    return fabs(signed_volume(type, points));
-}
-
 /* ---- runs ---------------------------------------------------------------------------------------------------- */
 
 MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int count)

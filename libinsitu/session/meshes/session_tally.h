@@ -21,12 +21,9 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
  * their quads cross themselves, which takes their volume. */
 void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed);
 
-/* The volume of a cell of the four types, by its vertices' places; negative where it is left-handed. */
+/* The mean of the volumes at the corners of a cell of the four types, by its vertices' places; negative where it is
+ * left-handed. */
 double tally_signed_volume(int type, double points[][3]);
-
-/* The volume of a good cell: exact where its edges are parallel, and of tets and star-shaped polyhedra; else a mean.
- */
-double tally_cell_volume(const grid *g, int64_t cell);
 
 /* Tells whether a good cell has no volume but what rounding leaves, as shells have none. A ghost never counts. */
 bool tally_is_flat(const grid *g, int64_t cell);

@@ -4,12 +4,13 @@
 #include "session_statistics.h"
 
 #include <math.h>
+#include <omp.h>
 #include <string.h>
 
 #include "memory.h"
 #include "session_agree.h"
 #include "session_scalars.h"
-#include "session_tally.h"
+#include "session_volume.h"
 
 /* ---- one cell ------------------------------------------------------------------------------------------------ */
 
@@ -18,22 +19,20 @@ typedef struct cell_value {
     double least, most, mean, volume;
 } cell_value;
 
-static cell_value value_of(const grid *g, const grid_field *field, int64_t cell)
+static cell_value value_of(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
 {
     cell_value out = {grid_is_drawn(g, cell), INFINITY, -INFINITY, 0, 0};
     if (!out.is_there) return out;
-    grid_walk walk = grid_walk_cell(g, cell);
-    int64_t place = cell, count = 0;
-    while (field->is_cell_centred ? count == 0 : grid_walk_next(&walk, &place)) {
-        const double value = grid_field_value(field, place);
+    out.volume = session_cell_volume(g, cell, room);
+    const int count = field->is_cell_centred ? 1 : room->vertex_count;
+    for (int i = 0; i < count; i++) {
+        const double value = grid_field_value(field, field->is_cell_centred ? cell : room->vertices[i]);
         out.is_there = out.is_there && isfinite(value);
         out.least = fmin(out.least, value);
         out.most = fmax(out.most, value);
         out.mean += value;
-        count++;
     }
-    out.mean /= (double)(count ? count : 1);
-    out.volume = tally_cell_volume(g, cell);
+    out.mean /= count;
     out.is_there = out.is_there && count > 0 && isfinite(out.mean) && isfinite(out.volume);
     return out;
 }
@@ -91,22 +90,31 @@ static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
     if (bin >= 0) add_share(sums + BINS + 2 * bin, volume);
 }
 
-static void add_cells(const grid *g, const grid_field *field, const sum_basis *b, int threads, int64_t *sums, int count)
+/* A pass over one mesh. */
+typedef struct statistics_pass {
+    const grid *g;
+    grid_field field;
+    const session_team *team;
+    volume_room *rooms; /* of threads */
+} statistics_pass;
+
+static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
 {
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : sums[:count])
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        const cell_value value = value_of(g, field, cell);
+#pragma omp parallel for num_threads(p->team->threads) schedule(static) reduction(+ : sums[:count])
+    for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
+        const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
         if (value.is_there) add_cell(b, &value, sums);
     }
 }
 
 /* Entries of the reduction by minimum: least, -most, -largest volume. */
-static void find_ends(const grid *g, const grid_field *field, int threads, double ends[3])
+static void find_ends(const statistics_pass *p, double ends[3])
 {
+    const int threads = p->team->threads;
     double least = ends[0], most = -ends[1], largest = -ends[2];
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most, largest)
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        const cell_value value = value_of(g, field, cell);
+    for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
+        const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
         if (!value.is_there) continue;
         least = fmin(least, value.least);
         most = fmax(most, value.most);
@@ -124,15 +132,27 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_wish *wishes;
     int count;
-    double *ends;  /* three a wish */
-    int64_t *sums; /* MAX_SUMS a wish, then two */
+    double *ends;       /* three a wish, then -1 where a rank's memory ran out, else 0 */
+    int64_t *sums;      /* MAX_SUMS a wish, then two */
+    volume_room *rooms; /* of threads; large enough after the first pass, since a thread's cells stay the same */
 } statistics_work;
 
-/* The wish's field on a mesh of this rank. */
-static bool find_values(const statistics_work *w, int wish, int mesh, grid_field *field)
+/* The pass over the wish's field on a mesh of this rank; false where it has none. */
+static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
-    return of->is_given && session_find_values(of, w->wishes[wish].field, field);
+    *pass = (statistics_pass){.g = &of->cells, .team = w->team, .rooms = w->rooms};
+    return of->is_given && session_find_values(of, w->wishes[wish].field, &pass->field);
+}
+
+/* Whether a room could not be made on any rank. */
+static insitu_status check_rooms(const statistics_work *w, base_error *error)
+{
+    if (w->ends[3 * w->count] == 0) return INSITU_OK;
+    for (int thread = 0; thread < w->team->threads; thread++)
+        if (w->rooms[thread].is_out_of_memory)
+            session_no_memory(error, (int64_t)w->rooms[thread].wanted, "a polyhedron");
+    return session_agree(w->team->comm, error);
 }
 
 static insitu_status reduce_ends(const statistics_work *w, base_error *error)
@@ -142,12 +162,17 @@ static insitu_status reduce_ends(const statistics_work *w, base_error *error)
         ends[0] = ends[1] = INFINITY;
         ends[2] = 0;
         for (int m = 0; m < w->meshes->count; m++) {
-            grid_field field;
-            if (find_values(w, i, m, &field)) find_ends(&w->meshes->items[m]->cells, &field, w->team->threads, ends);
+            statistics_pass pass;
+            if (find_pass(w, i, m, &pass)) find_ends(&pass, ends);
         }
     }
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, w->ends, 3 * w->count, MPI_DOUBLE, MPI_MIN, w->team->comm),
-                       "MPI_Allreduce");
+    w->ends[3 * w->count] = 0;
+    for (int thread = 0; thread < w->team->threads; thread++)
+        if (w->rooms[thread].is_out_of_memory) w->ends[3 * w->count] = -1;
+    const insitu_status status =
+        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, w->ends, 3 * w->count + 1, MPI_DOUBLE, MPI_MIN, w->team->comm),
+                    "MPI_Allreduce");
+    return status ? status : check_rooms(w, error);
 }
 
 static insitu_status reduce_sums(const statistics_work *w, const session_statistics *known, bool is_second,
@@ -160,9 +185,8 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
         const double about = is_second && range > 0 ? share_of_range(known[i].mean, known[i].least, known[i].most) : 0;
         const sum_basis basis = {&known[i], -w->ends[3 * i + 2], about, is_second};
         for (int m = 0; m < w->meshes->count; m++) {
-            grid_field field;
-            if (find_values(w, i, m, &field))
-                add_cells(&w->meshes->items[m]->cells, &field, &basis, w->team->threads, w->sums + size * i, size);
+            statistics_pass pass;
+            if (find_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
         }
     }
     return session_mpi(error,
@@ -210,15 +234,18 @@ insitu_status session_find_statistics(const session_meshes *meshes, const sessio
                                       const session_statistics_wish *wishes, int count, session_statistics *out,
                                       base_error *error)
 {
-    statistics_work work = {meshes, team, wishes, count, NULL, NULL};
+    statistics_work work = {.meshes = meshes, .team = team, .wishes = wishes, .count = count};
     if (count == 0) return INSITU_OK;
-    work.ends = base_alloc((size_t)count * 3 * sizeof *work.ends);
+    work.ends = base_alloc(((size_t)count * 3 + 1) * sizeof *work.ends);
     work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);
-    if (!work.ends || !work.sums)
+    work.rooms = base_calloc((size_t)team->threads, sizeof *work.rooms);
+    if (!work.ends || !work.sums || !work.rooms)
         session_no_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = find_all(&work, out, error);
+    for (int thread = 0; work.rooms && thread < team->threads; thread++) session_volume_free(&work.rooms[thread]);
     base_free(work.ends);
     base_free(work.sums);
+    base_free(work.rooms);
     return status;
 }

@@ -1,0 +1,134 @@
+/* Volumes are exact, but for rounding, by closed forms.
+ *
+ * A cell is what its faces enclose, so cells of the same faces have the same volume. A wedge or pyramid is a hex some
+ * of whose corners are in one place. The integral of a trilinear map's determinant is a sum of three determinants of
+ * the corners' differences (Grandy, 1997).
+ *
+ * A polyhedron is the sum of cones from any point over its faces, turned outward. The two triangulations of a quad
+ * enclose a tet, which its bilinear patch halves, so that the cone over a patch is the mean of those over both.
+ */
+#include "session_volume.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "closed_faces.h"
+#include "memory.h"
+
+static double determinant(const double u[3], const double v[3], const double w[3])
+{
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
+
+static void difference(const double a[3], const double b[3], double out[3])
+{
+    for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
+}
+
+static double tet_volume(double (*p)[3])
+{
+    double u[3], v[3], w[3];
+    difference(p[1], p[0], u);
+    difference(p[2], p[0], v);
+    difference(p[3], p[0], w);
+    return determinant(u, v, w) / 6;
+}
+
+/* The corners that stand for a hex's. */
+static const signed char *corners_as_hex(int type)
+{
+    static const signed char hex[8] = {0, 1, 2, 3, 4, 5, 6, 7}, wedge[8] = {0, 1, 2, 2, 3, 4, 5, 5},
+                             pyramid[8] = {0, 1, 2, 3, 4, 4, 4, 4};
+    return type == GRID_HEX ? hex : type == GRID_WEDGE ? wedge : pyramid;
+}
+
+static double hex_volume(double (*p)[3], const signed char *corner)
+{
+    static const signed char ends[6][2] = {{6, 1}, {7, 0}, {6, 3}, {2, 0}, {5, 0}, {6, 4}};
+    double d[6][3], sums[3][3];
+    for (int i = 0; i < 6; i++) difference(p[corner[ends[i][0]]], p[corner[ends[i][1]]], d[i]);
+    for (int axis = 0; axis < 3; axis++) {
+        sums[0][axis] = d[0][axis] + d[1][axis];
+        sums[1][axis] = d[2][axis] + d[4][axis];
+        sums[2][axis] = d[5][axis] + d[3][axis];
+    }
+    return (determinant(sums[0], d[2], d[3]) + determinant(d[1], sums[1], d[5]) + determinant(d[0], d[4], sums[2])) /
+           12;
+}
+
+/* ---- polyhedra ------------------------------------------------------------------------------------------------ */
+
+void session_volume_free(volume_room *room)
+{
+    base_free(room->bytes);
+    *room = (volume_room){0};
+}
+
+static bool make_room(volume_room *room, size_t size)
+{
+    if (size <= room->size) return true;
+    base_free(room->bytes);
+    room->wanted = size + size / 2;
+    room->bytes = base_alloc(room->wanted);
+    room->size = room->bytes ? room->wanted : 0;
+    room->is_out_of_memory = room->is_out_of_memory || !room->bytes;
+    return room->bytes;
+}
+
+/* Places relative to the first vertex, so that volumes do not cancel far from the origin. */
+static void take_positions(const grid *g, const closed_faces *c, double (*positions)[3])
+{
+    double origin[3];
+    grid_vertex(g, c->vertices[0], origin);
+    for (int i = 0; i < c->vertex_count; i++) {
+        grid_vertex(g, c->vertices[i], positions[i]);
+        for (int axis = 0; axis < 3; axis++) positions[i][axis] -= origin[axis];
+    }
+}
+
+/* Six times the cone over the patch, from the origin. */
+static double patch_cone(const double (*p)[3], const int v[4])
+{
+    const double *a = p[v[0]], *b = p[v[1]], *c = p[v[2]], *d = p[v[3]];
+    return (determinant(a, b, c) + determinant(a, c, d) + determinant(a, b, d) + determinant(b, c, d)) / 2;
+}
+
+static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
+{
+    static const double origin[3] = {0, 0, 0};
+    closed_faces c = {0};
+    if (!closed_faces_count(&c, g, cell)) return NAN;
+    const size_t places = 3 * (size_t)c.entry_count * sizeof(double);
+    if (!make_room(room, closed_faces_lay_out(&c, NULL) + places)) return NAN;
+    double(*positions)[3] = (double(*)[3])(void *)(room->bytes + closed_faces_lay_out(&c, room->bytes));
+    closed_faces_read(&c, g, cell);
+    room->vertices = c.vertices;
+    room->vertex_count = c.vertex_count;
+    if (!c.vertex_count) return 0;
+    take_positions(g, &c, positions);
+    closed_faces_turn(&c);
+    closed_faces_cut(&c);
+    closed_faces_turn_outward(&c, (const double(*)[3])positions, origin);
+    double volume = 0;
+    for (int i = 0; i < c.triangle_count; i++) {
+        const int face = c.triangles[i].face;
+        if (c.first[face + 1] - c.first[face] != 4) volume += c.triangles[i].volume;
+    }
+    for (int face = 0; face < c.face_count; face++)
+        if (c.first[face + 1] - c.first[face] == 4)
+            volume += c.turn[face] * patch_cone((const double(*)[3])positions, c.entry + c.first[face]);
+    return fabs(volume) / 6;
+}
+
+double session_cell_volume(const grid *g, int64_t cell, volume_room *room)
+{
+    double points[GRID_MAX_CELL_VERTICES][3];
+    const int type = grid_cell_type(g, cell);
+    room->vertex_count = 0;
+    if (grid_is_shell_type(type)) return 0;
+    if (type == GRID_POLYHEDRON) return polyhedron_volume(g, cell, room);
+    room->vertices = room->corners;
+    room->vertex_count = grid_cell_vertices(g, cell, room->corners);
+    for (int i = 0; i < room->vertex_count; i++) grid_vertex(g, room->corners[i], points[i]);
+    return fabs(type == GRID_TET ? tet_volume(points) : hex_volume(points, corners_as_hex(type)));
+}
