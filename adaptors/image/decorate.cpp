@@ -161,8 +161,9 @@ void write_text(sheet &s, const std::string &text, double x, double baseline, in
     const int top = static_cast<int>(std::lround(baseline)) - letters.baseline;
     for (int row = std::max(0, -top); row < letters.height && top + row < s.image.height; row++)
         for (int column = std::max(0, -left); column < letters.width && left + column < s.image.width; column++) {
-            const float covered = letters.covered[static_cast<std::size_t>(row) * static_cast<std::size_t>(letters.width) +
-                                                  static_cast<std::size_t>(column)];
+            const float covered =
+                letters.covered[static_cast<std::size_t>(row) * static_cast<std::size_t>(letters.width) +
+                                static_cast<std::size_t>(column)];
             if (covered > 0)
                 blend(pixel_at(s, left + column, top + row), s.what.colour, static_cast<double>(covered), false);
         }
@@ -408,11 +409,13 @@ area place_block(const insitu_image &image, const spot &where, double width, dou
     const area first = block_at(image, where, width, height, margin);
     area block = first;
     const double gap = 0.5 * margin;
-    for (std::size_t i = 0; i < taken.size(); i++) {
-        if (are_apart(block, taken[i], gap)) continue;
-        const double y = is_at_bottom(where.at) ? taken[i].y0 - gap - height : taken[i].y1 + gap;
+    const auto is_in_way = [&](const area &a) { return !are_apart(block, a, 0.999 * gap); };
+    /* Each area moves the block at most once, to where it is apart but for rounding. */
+    for (std::size_t moves = 0; moves < taken.size(); moves++) {
+        const auto other = std::find_if(taken.begin(), taken.end(), is_in_way);
+        if (other == taken.end()) break;
+        const double y = is_at_bottom(where.at) ? other->y0 - gap - height : other->y1 + gap;
         block = {block.x0, y, block.x1, y + height};
-        i = static_cast<std::size_t>(-1); /* the new place may be another's */
     }
     if (block.y0 < 0 || block.y1 > image.height) block = first;
     taken.push_back(block);

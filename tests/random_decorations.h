@@ -1,0 +1,113 @@
+/* Decorations of a picture at random: all anchors, any number of bars, words from none to long ones, big and small. */
+#ifndef TEST_RANDOM_DECORATIONS_H
+#define TEST_RANDOM_DECORATIONS_H
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "insitu/image_output.h"
+
+class random_decorations
+{
+  public:
+    explicit random_decorations(unsigned seed) : random_(seed) {}
+
+    /* In [low, high]. */
+    int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
+    double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+
+    /* Valid until the next call. */
+    const insitu_decorations &make(int width, int height)
+    {
+        texts_.clear();
+        texts_.reserve(64);
+        what_ = insitu_decorations{};
+        what_.background[3] = static_cast<float>(whole(0, 1));
+        what_.colour[0] = 1;
+        what_.size = whole(0, 3) ? 0.03 : std::exp(real(std::log(0.005), std::log(0.2)));
+        make_words();
+        make_bars();
+        make_labels(width, height);
+        if (whole(0, 2) == 0) make_scale_bar(width);
+        what_.has_axes = whole(0, 1);
+        for (auto &axis : what_.axes) axis[whole(0, 2)] = whole(0, 1) ? 1 : -1;
+        return what_;
+    }
+
+  private:
+    const char *text(int most)
+    {
+        static const char *const parts[] = {"a", "Stress", " ", "/", "MPa", "\u00b5m", "=", "1.5e-7", "\u2212", "W"};
+        std::string out;
+        for (int n = whole(0, most); n > 0; n--) out += parts[whole(0, 9)];
+        texts_.push_back(out);
+        return texts_.back().c_str();
+    }
+
+    void make_words()
+    {
+        what_.words_count = whole(0, 1) ? whole(0, 3) : whole(0, 17);
+        for (int i = 0; i < what_.words_count; i++)
+            words_[i] = {text(whole(0, 4) ? 8 : 60), static_cast<insitu_anchor>(whole(0, 7)), whole(0, 3) ? 1 : 1.4F};
+        what_.words = words_.data();
+    }
+
+    void make_bars()
+    {
+        static const float colours[] = {0, 0, 0, 1, 0, 0, 1, 1, 1};
+        what_.bar_count = whole(0, 1) ? whole(0, 4) : whole(0, 20);
+        for (int i = 0; i < what_.bar_count; i++) {
+            const int ticks = whole(0, 12);
+            for (int k = 0; k < ticks; k++) {
+                ticks_[i][k].place = (k + 0.5) / ticks;
+                std::snprintf(ticks_[i][k].text, sizeof ticks_[i][k].text, "%.*f", whole(0, 6), real(-1e4, 1e4));
+            }
+            bars_[i] = insitu_colour_bar{};
+            bars_[i].label = text(whole(0, 4) ? 6 : 60);
+            bars_[i].colours = colours;
+            bars_[i].colour_count = 3;
+            bars_[i].is_banded = whole(0, 3) == 0;
+            bars_[i].below = whole(0, 1) ? colours : nullptr;
+            bars_[i].above = whole(0, 1) ? colours : nullptr;
+            bars_[i].at = whole(0, 3) ? INSITU_RIGHT : INSITU_LEFT;
+            bars_[i].tick_count = ticks;
+            bars_[i].ticks = ticks_[i].data();
+        }
+        what_.bars = bars_.data();
+    }
+
+    void make_labels(int width, int height)
+    {
+        what_.label_count = whole(0, 1) ? 0 : whole(0, 39);
+        for (int i = 0; i < what_.label_count; i++) {
+            const double angle = real(0, 6.3);
+            labels_[i] = {{real(-0.1, 1.1) * width, real(-0.1, 1.1) * height},
+                          {std::cos(angle), std::sin(angle)},
+                          whole(0, 3) ? 0.55 : 2.4,
+                          ""};
+            std::snprintf(labels_[i].text, sizeof labels_[i].text, "%.3g", real(-1e4, 1e4));
+        }
+        what_.labels = labels_.data();
+    }
+
+    void make_scale_bar(int width)
+    {
+        what_.scale_bar.length = real(0.05, 0.3) * width;
+        what_.scale_bar.at = static_cast<insitu_anchor>(whole(0, 7));
+        std::snprintf(what_.scale_bar.text, sizeof what_.scale_bar.text, "%s", text(8));
+    }
+
+    std::mt19937 random_;
+    insitu_decorations what_{};
+    std::vector<std::string> texts_;
+    std::array<insitu_words, 17> words_{};
+    std::array<insitu_colour_bar, 20> bars_{};
+    std::array<std::array<insitu_tick, 12>, 20> ticks_{};
+    std::array<insitu_label, 39> labels_{};
+};
+
+#endif
