@@ -21,7 +21,7 @@
 #include <vtkHDFReader.h>
 #endif
 #ifdef INSITU_VTK_EXODUS
-#include <vtkExodusIIReader.h>
+#include "exodus_reader.h"
 #endif
 #ifdef INSITU_VTK_CGNS
 #include <vtkCGNSReader.h>
@@ -72,18 +72,6 @@ reader make_amr(const std::string &path)
     r->SetMaximumLevelsToReadByDefault(0); // all
     return r;
 }
-
-#ifdef INSITU_VTK_EXODUS
-reader make_exodus(const std::string &path)
-{
-    auto r = vtkSmartPointer<vtkExodusIIReader>::New();
-    r->SetFileName(path.c_str());
-    r->UpdateInformation();
-    r->SetAllArrayStatus(vtkExodusIIReader::NODAL, 1);
-    r->SetAllArrayStatus(vtkExodusIIReader::ELEM_BLOCK, 1);
-    return r;
-}
-#endif
 
 #ifdef INSITU_VTK_CGNS
 /* VTK's reader ends the program where a file cannot be opened, so it is opened here first. */

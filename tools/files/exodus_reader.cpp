@@ -1,0 +1,275 @@
+/* VTK 9.1 takes the type of a block's cells from the first letters of its element type and from a short list of numbers
+ * of nodes. For a number that is not in the list it takes the linear type, but goes through the connectivity by that
+ * type's number of nodes: a HEX9's second cell begins at the first one's ninth node.
+ *
+ * Corners come first in every element type. So the cells of a block whose elements have another number of nodes than
+ * its cells are made anew, from the corners in the file's own connectivity. VTK's reader keeps only the points of the
+ * cells that it made, so where a number of nodes is unusual it is told to keep all points, and each block's are picked
+ * here. */
+#include "exodus_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkExodusIIReader.h>
+#include <vtkIdTypeArray.h>
+#include <vtkInformation.h>
+#include <vtkInformationVector.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkObjectFactory.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtk_exodusII.h>
+
+#include "cell_extract.h"
+#include "grids_of.h"
+
+namespace render_tool
+{
+
+namespace
+{
+
+struct element_block {
+    std::string type;
+    int64_t elements = 0;
+    int64_t nodes = 0; // of each element; 0: they differ (nsided, nfaced)
+};
+
+struct shape {
+    int cell_type = VTK_EMPTY_CELL; // of the cell between the corners; empty for those that are not made anew
+    int64_t corners = 0;            // 0: the type is not known
+};
+
+std::string upper(std::string text)
+{
+    for (char &c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    return text;
+}
+
+/* By the first three letters, as VTK does. A shell of three corners is called SHELL3, SHELL6 or TRISHELL. */
+shape shape_of(const element_block &b)
+{
+    static const std::map<std::string, shape> shapes = {
+        {"TRI", {VTK_TRIANGLE, 3}},   {"QUA", {VTK_QUAD, 4}},       {"SHE", {VTK_QUAD, 4}},
+        {"TET", {VTK_TETRA, 4}},      {"PYR", {VTK_PYRAMID, 5}},    {"WED", {VTK_WEDGE, 6}},
+        {"HEX", {VTK_HEXAHEDRON, 8}}, {"BAR", {VTK_EMPTY_CELL, 2}}, {"BEA", {VTK_EMPTY_CELL, 2}},
+        {"TRU", {VTK_EMPTY_CELL, 2}}, {"ROD", {VTK_EMPTY_CELL, 2}}, {"EDG", {VTK_EMPTY_CELL, 2}},
+        {"STR", {VTK_EMPTY_CELL, 2}}, {"CIR", {VTK_EMPTY_CELL, 1}}, {"SPH", {VTK_EMPTY_CELL, 1}},
+        {"SUP", {VTK_EMPTY_CELL, 1}}, {"POI", {VTK_EMPTY_CELL, 1}}, {"NOD", {VTK_EMPTY_CELL, 1}}};
+    const std::string name = upper(b.type).substr(0, 3);
+    if (name == "SHE" && (b.nodes == 3 || b.nodes == 6 || b.nodes == 7)) return shapes.at("TRI");
+    const auto found = shapes.find(name);
+    return found == shapes.end() ? shape{} : found->second;
+}
+
+/* Tells whether VTK has a cell type of so many nodes, as far as is known. */
+bool is_usual(const element_block &b)
+{
+    static const std::map<int, std::vector<int64_t>> usual = {
+        {VTK_TRIANGLE, {3, 6}}, {VTK_QUAD, {4, 8}},           {VTK_TETRA, {4, 10, 15}},
+        {VTK_PYRAMID, {5, 13}}, {VTK_WEDGE, {6, 15, 18, 21}}, {VTK_HEXAHEDRON, {8, 20, 27}}};
+    const auto found = usual.find(shape_of(b).cell_type);
+    return found == usual.end() || std::count(found->second.begin(), found->second.end(), b.nodes) > 0;
+}
+
+std::string describe(int64_t id, const element_block &b)
+{
+    return "element block " + std::to_string(id) + ": elements of type \"" + b.type + "\" with " +
+           std::to_string(b.nodes) + " nodes";
+}
+
+/* Throws std::runtime_error where VTK's reader would read beyond the connectivity, or says less. */
+void check_elements(const std::string &path, int64_t id, const element_block &b)
+{
+    const int64_t corners = shape_of(b).corners;
+    if (b.elements == 0 || b.nodes == 0 || (corners > 0 && b.nodes >= corners)) return;
+    throw std::runtime_error(
+        path + ": cannot be read: " + describe(id, b) +
+        (corners > 0 ? ", fewer than its " + std::to_string(corners) + " corners" : ", a type that is not known"));
+}
+
+/* An open Exodus file, whose numbers come in 64 bits. */
+class exodus_file
+{
+  public:
+    explicit exodus_file(const std::string &path)
+    {
+        int word_bytes = 8, file_word_bytes = 0;
+        float version = 0;
+        id_ = ex_open(path.c_str(), EX_READ | EX_ALL_INT64_API, &word_bytes, &file_word_bytes, &version);
+    }
+    ~exodus_file()
+    {
+        if (is_open()) ex_close(id_);
+    }
+    exodus_file(const exodus_file &) = delete;
+    exodus_file &operator=(const exodus_file &) = delete;
+
+    bool is_open() const { return id_ >= 0; }
+
+    /* By their ids; empty where they cannot be read. */
+    std::map<int64_t, element_block> blocks() const
+    {
+        std::map<int64_t, element_block> all;
+        const int64_t count = ex_inquire_int(id_, EX_INQ_ELEM_BLK);
+        std::vector<int64_t> ids(static_cast<size_t>(std::max<int64_t>(count, 0)));
+        if (ids.empty() || ex_get_ids(id_, EX_ELEM_BLOCK, ids.data()) < 0) return all;
+        for (const int64_t id : ids) {
+            std::array<char, MAX_STR_LENGTH + 1> type{};
+            element_block b;
+            int64_t edges = 0, faces = 0, attributes = 0;
+            if (ex_get_block(id_, EX_ELEM_BLOCK, id, type.data(), &b.elements, &b.nodes, &edges, &faces, &attributes) <
+                0)
+                continue;
+            b.type = type.data();
+            const std::string kind = upper(b.type);
+            if (kind == "NSIDED" || kind == "NFACED") b.nodes = 0;
+            all[id] = b;
+        }
+        return all;
+    }
+
+    /* The nodes of all elements of a block, from 1; empty where they cannot be read. */
+    std::vector<int64_t> connectivity(int64_t block, const element_block &b) const
+    {
+        std::vector<int64_t> nodes(static_cast<size_t>(b.elements * b.nodes));
+        if (ex_get_conn(id_, EX_ELEM_BLOCK, block, nodes.data(), nullptr, nullptr) < 0) nodes.clear();
+        return nodes;
+    }
+
+  private:
+    int id_ = -1;
+};
+
+/* Puts cells between the corners into grid in place of its own. Returns what is wrong, or "". */
+std::string set_cells(vtkUnstructuredGrid *grid, const element_block &b, const std::vector<int64_t> &nodes)
+{
+    const shape s = shape_of(b);
+    const vtkIdType points = grid->GetNumberOfPoints();
+    if (nodes.empty()) return "have a connectivity that cannot be read";
+    vtkNew<vtkIdTypeArray> offsets, corners;
+    offsets->SetNumberOfValues(b.elements + 1);
+    corners->SetNumberOfValues(b.elements * s.corners);
+    for (int64_t e = 0; e <= b.elements; e++) offsets->SetValue(e, e * s.corners);
+    for (int64_t e = 0; e < b.elements; e++)
+        for (int64_t k = 0; k < s.corners; k++) {
+            const int64_t node = nodes[static_cast<size_t>(e * b.nodes + k)];
+            if (node < 1 || node > points)
+                return "name a node " + std::to_string(node) + ", of " + std::to_string(points) + " nodes";
+            corners->SetValue(e * s.corners + k, node - 1);
+        }
+    vtkNew<vtkCellArray> cells;
+    cells->SetData(offsets, corners);
+    grid->SetCells(s.cell_type, cells);
+    return "";
+}
+
+vtkMultiBlockDataSet *element_blocks_of(vtkMultiBlockDataSet *output)
+{
+    for (unsigned i = 0; output && i < output->GetNumberOfBlocks(); i++) {
+        const char *name = output->HasMetaData(i) ? output->GetMetaData(i)->Get(vtkCompositeDataSet::NAME()) : nullptr;
+        if (name && std::string(name) == "Element Blocks")
+            return vtkMultiBlockDataSet::SafeDownCast(output->GetBlock(i));
+    }
+    return nullptr;
+}
+
+class reader : public vtkExodusIIReader
+{
+  public:
+    static reader *New();
+    vtkTypeMacro(reader, vtkExodusIIReader);
+
+    void set_blocks(std::map<int64_t, element_block> blocks) { blocks_ = std::move(blocks); }
+
+  protected:
+    int RequestData(vtkInformation *request, vtkInformationVector **in, vtkInformationVector *out) override
+    {
+        if (!Superclass::RequestData(request, in, out)) return 0;
+        const std::string wrong = set_right(element_blocks_of(vtkMultiBlockDataSet::GetData(out)));
+        if (wrong.empty()) return 1;
+        vtkErrorMacro(<< wrong);
+        return 0;
+    }
+
+  private:
+    std::map<int64_t, element_block> blocks_;
+
+    /* The block that a grid was made from; null where that is not known or the grid has no cells. */
+    const element_block *block_of(vtkUnstructuredGrid *grid, int64_t &id) const
+    {
+        vtkDataArray *ids = grid ? grid->GetCellData()->GetArray(GetObjectIdArrayName()) : nullptr;
+        if (!ids || ids->GetNumberOfTuples() == 0 || grid->GetNumberOfCells() == 0) return nullptr;
+        id = static_cast<int64_t>(ids->GetComponent(0, 0));
+        const auto found = blocks_.find(id);
+        return found == blocks_.end() ? nullptr : &found->second;
+    }
+
+    /* Tells whether the cells of a block's grid have another number of points than the block's elements. */
+    static bool has_other_cells(vtkUnstructuredGrid *grid, const element_block &b)
+    {
+        return b.nodes > 0 && (grid->GetCells()->GetCellSize(0) != b.nodes || grid->GetCellType(0) == VTK_EMPTY_CELL);
+    }
+
+    /* Makes wrong cells anew, and leaves each block the points that it uses. Returns what is wrong, or "". */
+    std::string set_right(vtkMultiBlockDataSet *all)
+    {
+        for (unsigned i = 0; all && i < all->GetNumberOfBlocks(); i++) {
+            auto *grid = vtkUnstructuredGrid::SafeDownCast(all->GetBlock(i));
+            if (!grid) continue;
+            int64_t id = 0;
+            const element_block *b = block_of(grid, id);
+            if (b && has_other_cells(grid, *b)) {
+                const std::string wrong = set_cells_anew(grid, id, *b);
+                if (!wrong.empty()) return describe(id, *b) + " " + wrong;
+            }
+            if (GetSqueezePoints()) continue;
+            const std::string bad = find_bad_cell(grid);
+            if (!bad.empty()) return "element block " + std::to_string(id) + ": " + bad;
+            std::vector<vtkIdType> cells(static_cast<size_t>(grid->GetNumberOfCells()));
+            std::iota(cells.begin(), cells.end(), vtkIdType{0});
+            all->SetBlock(i, extract_cells(grid, cells));
+        }
+        return "";
+    }
+
+    std::string set_cells_anew(vtkUnstructuredGrid *grid, int64_t id, const element_block &b)
+    {
+        if (GetSqueezePoints() || shape_of(b).cell_type == VTK_EMPTY_CELL) return "are of no type that is read";
+        const exodus_file file(GetFileName());
+        return set_cells(grid, b, file.is_open() ? file.connectivity(id, b) : std::vector<int64_t>{});
+    }
+};
+
+vtkStandardNewMacro(reader)
+
+} // namespace
+
+vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path)
+{
+    auto r = vtkSmartPointer<reader>::New();
+    const exodus_file file(path);
+    if (file.is_open()) {
+        const auto blocks = file.blocks();
+        for (const auto &[id, b] : blocks) check_elements(path, id, b);
+        r->SetSqueezePoints(std::all_of(blocks.begin(), blocks.end(), [](auto &b) { return is_usual(b.second); }));
+        r->set_blocks(blocks);
+    }
+    r->SetFileName(path.c_str());
+    r->UpdateInformation();
+    r->SetAllArrayStatus(vtkExodusIIReader::NODAL, 1);
+    r->SetAllArrayStatus(vtkExodusIIReader::ELEM_BLOCK, 1);
+    return r;
+}
+
+} // namespace render_tool
