@@ -90,6 +90,13 @@ foreach(name owner owner_faults patches patch_faults)
 endforeach()
 insitu_add_mpi_test(session_patches test_session_patches 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+# Meshes in all forms, wrong ones.
+foreach(name zero_counts strides)
+  insitu_session_program(test_session_${name})
+  target_sources(test_session_${name} PRIVATE test_mesh_forms.c test_owned_faces.c)
+  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endforeach()
+
 insitu_session_program(test_session_statistics)
 insitu_add_mpi_test(session_statistics test_session_statistics 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -209,7 +209,11 @@ static const spoilt_case cases[] = {
     {"unknown centring", centring_unknown, INSITU_ERROR_ARGUMENT, true, {"field \"f\": unknown centring 5"}},
     {"other centring", centring_other, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " cells"}},
     {"no components", no_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
-    {"odd components", component_stride_odd, INSITU_ERROR_FIELD, true, {"component stride of 3 bytes"}},
+    {"odd components",
+     component_stride_odd,
+     INSITU_ERROR_FIELD,
+     true,
+     {"components of values have a stride of 3 bytes"}},
 };
 
 static void spoilt_input_is_told_to_all(void **context)

@@ -30,8 +30,7 @@ static void find_quads(void)
     const int64_t *face = part->face_connectivity;
     for (int64_t f = 0; f < part->face_count; f++) {
         int count = 0;
-        for (int64_t i = 0; i < part->connectivity_count; i++)
-            count += part->connectivity[i] == f;
+        for (int64_t i = 0; i < part->connectivity_count; i++) count += part->connectivity[i] == f;
         memcpy(count == 2 ? inner_quad : outer_quad, face + part->face_offsets[f], sizeof inner_quad);
     }
     memcpy(twice, outer_quad, sizeof outer_quad);
@@ -247,7 +246,7 @@ static const fault faults[] = {
     {no_values, INSITU_ERROR_FIELD, true, {"patch 0: values are not given"}},
     {bytes_for_values, INSITU_ERROR_ARGUMENT, true, {"patch 0: values are of element type 5, not float32, float64"}},
     {narrow_stride, INSITU_ERROR_FIELD, true, {"patch 0: values have a stride of 12 bytes"}},
-    {component_stride, INSITU_ERROR_FIELD, true, {"patch 0: has a component stride of 3 bytes"}},
+    {component_stride, INSITU_ERROR_FIELD, true, {"patch 0: components of values have a stride of 3 bytes"}},
     {negative_count, INSITU_ERROR_ARGUMENT, true, {"patch 0: has -1 faces"}},
     {no_table, INSITU_ERROR_ARGUMENT, true, {"patch_count is 2, and patches are not given"}},
     {negative_table, INSITU_ERROR_ARGUMENT, true, {"patch_count is -2"}},

@@ -50,7 +50,9 @@ typedef enum insitu_type {
 typedef struct insitu_array {
     const void *data;     /* first element; NULL: the array is not given. Aligned to its element type. */
     insitu_type type;     /* of one element */
-    int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. Any multiple of the size. */
+    int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. Any multiple of the size;
+                             a negative one reads backwards from data. A stride by which the elements would span more
+                             than 2^48 bytes is an error. */
 } insitu_array;
 
 /* Cell types by VTK's ids, vertices in VTK's order, unless the mesh's vertex_order says otherwise. */
@@ -205,7 +207,7 @@ typedef struct insitu_patch {
                              needed where all faces have the same number of vertices, connectivity_count / count. */
     insitu_array values;  /* float32, float64, int32 or int64, count tuples of the field's component_count. stride_bytes
                              is from tuple to tuple; 0: component_count elements */
-    int64_t component_stride_bytes; /* from one component to the next; 0: packed, interleaved */
+    int64_t component_stride_bytes; /* from one component to the next, as stride_bytes; 0: packed, interleaved */
 } insitu_patch;
 
 struct insitu_field;
@@ -226,7 +228,7 @@ typedef struct insitu_field {
     int64_t count;                  /* tuples: the mesh's vertex_count or cell_count, or the number of its cells'
                                        corners; any number where index is given */
     int component_count;            /* >= 1; 1 by default. The scene picks one, or the magnitude. */
-    int64_t component_stride_bytes; /* from one component to the next; 0: packed, interleaved */
+    int64_t component_stride_bytes; /* from one component to the next, as stride_bytes; 0: packed, interleaved */
     insitu_array values;            /* float32, float64, int32 or int64. stride_bytes is from tuple to tuple; 0:
                                        component_count elements */
     unsigned changed;               /* INSITU_CHANGED_VALUES or NOTHING; ALL by default */

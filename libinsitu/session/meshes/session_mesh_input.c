@@ -51,9 +51,9 @@ static bool is_allowed(insitu_type type, int allowed)
     return false;
 }
 
-static const char *allowed_words(int allowed)
+static const char *allowed_words(int kind)
 {
-    switch (allowed) {
+    switch (kind & (SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS | SESSION_ALLOW_BYTES)) {
     case SESSION_ALLOW_FLOATS: return "float32 or float64";
     case SESSION_ALLOW_INTEGERS: return "int32 or int64";
     case SESSION_ALLOW_BYTES: return "uint8";
@@ -62,23 +62,54 @@ static const char *allowed_words(int allowed)
     }
 }
 
+/* The bytes that the memory of one process may span. No pointer is farther from another on any machine that runs this
+ * code, and the product of a place in an array with its stride stays far from overflow. */
+static const uint64_t most_bytes = (uint64_t)1 << 48;
+
+/* A stride may be negative: then the elements lie before the first one. 0 bytes: packed. */
+static insitu_status check_stride(const void *data, const char *name, int64_t count, int64_t stride, int64_t size,
+                                  insitu_status bad, base_error *error)
+{
+    if (stride % size != 0)
+        return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", name,
+                         (long long)stride, (long long)size);
+    const uint64_t step = stride < 0 ? 0 - (uint64_t)stride : (uint64_t)stride;
+    const uint64_t steps = count > 1 ? (uint64_t)count - 1 : 1; /* from the first element to the last */
+    const bool fits = count == 0 || step <= most_bytes / steps;
+    if (!fits || (stride < 0 && count && step * steps > (uintptr_t)data))
+        return base_fail(error, bad, "%s have a stride of %lld bytes: %lld of them lie outside of memory", name,
+                         (long long)stride, (long long)count);
+    return INSITU_OK;
+}
+
+static insitu_status check_place(const void *data, const char *name, int64_t size, insitu_status bad, base_error *error)
+{
+    if ((uintptr_t)data % (uintptr_t)size == 0) return INSITU_OK;
+    return base_fail(error, bad, "%s are not aligned to their %lld bytes", name, (long long)size);
+}
+
 insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                   base_error *error)
 {
     if (!array->data) {
-        if (rule->is_optional || rule->count == 0) return INSITU_OK;
+        if (rule->count == 0 || rule->kind & SESSION_IS_OPTIONAL) return INSITU_OK;
         return base_fail(error, bad, "%s are not given", rule->name);
     }
-    if (!is_allowed(array->type, rule->allowed))
+    if (!is_allowed(array->type, rule->kind))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
-                         (int)array->type, allowed_words(rule->allowed));
-    const int64_t size = session_type_size(array->type);
-    if (array->stride_bytes % size != 0)
-        return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", rule->name,
-                         (long long)array->stride_bytes, (long long)size);
-    if ((uintptr_t)array->data % (uintptr_t)size != 0)
-        return base_fail(error, bad, "%s are not aligned to their %lld bytes", rule->name, (long long)size);
-    return INSITU_OK;
+                         (int)array->type, allowed_words(rule->kind));
+    const int64_t size = session_type_size(array->type), count = rule->count + (rule->kind & SESSION_HAS_END ? 1 : 0);
+    const insitu_status status = check_place(array->data, rule->name, size, bad, error);
+    if (status) return status;
+    const int64_t stride = array->stride_bytes ? array->stride_bytes : size * rule->per_tuple;
+    return check_stride(array->data, rule->name, count, stride, size, bad, error);
+}
+
+insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, const char *name,
+                                       base_error *error)
+{
+    if (!data->data) return INSITU_OK;
+    return check_stride(data->data, name, count, stride, session_type_size(data->type), INSITU_ERROR_FIELD, error);
 }
 
 static insitu_status check_count(const char *name, int64_t count, int64_t most, base_error *error)
@@ -109,20 +140,22 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         &mesh->owner,          &mesh->neighbour,      &mesh->face_connectivity};
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
     const bool has_lists = mesh->face_lists.data != NULL;
+    const int floats = SESSION_ALLOW_FLOATS, integers = SESSION_ALLOW_INTEGERS, bytes = SESSION_ALLOW_BYTES;
+    const int optional = SESSION_IS_OPTIONAL, end = SESSION_HAS_END;
     const session_array_rule rules[] = {
-        {"x coordinates", vertices, SESSION_ALLOW_FLOATS, false},
-        {"y coordinates", vertices, SESSION_ALLOW_FLOATS, false},
-        {"z coordinates", vertices, SESSION_ALLOW_FLOATS, false},
-        {"vertex ids", vertices, SESSION_ALLOW_INTEGERS, true},
-        {"cell types", cells, SESSION_ALLOW_INTEGERS | SESSION_ALLOW_BYTES, true},
-        {"connectivity indices", mesh->connectivity_count, SESSION_ALLOW_INTEGERS, false},
-        {"offsets", cells, SESSION_ALLOW_INTEGERS, true},
-        {"ghost flags", cells, SESSION_ALLOW_BYTES, true},
-        {"face offsets", faces, SESSION_ALLOW_INTEGERS, has_lists},
-        {"face sizes", faces, SESSION_ALLOW_INTEGERS, !has_lists},
-        {"owners of faces", faces, SESSION_ALLOW_INTEGERS, true},
-        {"neighbours of faces", mesh->neighbour_count, SESSION_ALLOW_INTEGERS, false},
-        {"face vertex indices", mesh->face_connectivity_count, SESSION_ALLOW_INTEGERS, false},
+        {"x coordinates", vertices, floats, 1},
+        {"y coordinates", vertices, floats, 1},
+        {"z coordinates", vertices, floats, 1},
+        {"vertex ids", vertices, integers | optional, 1},
+        {"cell types", cells, integers | bytes | optional, 1},
+        {"connectivity indices", mesh->connectivity_count, integers, 1},
+        {"offsets", cells, integers | optional | end, 1},
+        {"ghost flags", cells, bytes | optional, 1},
+        {"face offsets", faces, integers | end | (has_lists ? optional : 0), 1},
+        {"face sizes", faces, integers | (has_lists ? 0 : optional), 1},
+        {"owners of faces", faces, integers | optional, 1},
+        {"neighbours of faces", mesh->neighbour_count, integers, 1},
+        {"face vertex indices", mesh->face_connectivity_count, integers, 1},
     };
     for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
         const insitu_status status = session_check_array(arrays[i], &rules[i], INSITU_ERROR_MESH, error);
@@ -146,14 +179,11 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
     if (!is_allowed(lists->type, SESSION_ALLOW_INTEGERS))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "face lists are of element type %d, not int32 or int64",
                          (int)lists->type);
-    const long long size = sizeof(void *);
-    if (lists->stride_bytes % size != 0)
-        return base_fail(error, INSITU_ERROR_MESH,
-                         "face lists have a stride of %lld bytes, no multiple of a pointer's %lld",
-                         (long long)lists->stride_bytes, size);
-    if ((uintptr_t)lists->data % (uintptr_t)size != 0)
-        return base_fail(error, INSITU_ERROR_MESH, "face lists are not aligned to a pointer's %lld bytes", size);
-    return INSITU_OK;
+    const int64_t size = sizeof(void *);
+    const insitu_status status = check_place(lists->data, "face lists", size, INSITU_ERROR_MESH, error);
+    if (status) return status;
+    return check_stride(lists->data, "face lists", mesh->face_count, lists->stride_bytes ? lists->stride_bytes : size,
+                        size, INSITU_ERROR_MESH, error);
 }
 
 /* Cells that have their faces by owner and neighbour have them by nothing else. */

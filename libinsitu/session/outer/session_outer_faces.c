@@ -168,10 +168,11 @@ static void keep_single_faces(face_search *s)
     s->count = kept;
 }
 
-/* Finds no faces where this rank has no part of the mesh. */
+/* Finds no faces where this rank has no part of the mesh, or one without cells: that may lack the ids that all cells'
+ * vertices have. */
 static insitu_status search_own(face_search *s, const session_outer *outer, bool by_id, base_error *error)
 {
-    if (!s->mesh) return INSITU_OK;
+    if (!s->mesh || s->mesh->cells.cell_count == 0) return INSITU_OK;
     if (outer->threshold.is_given) {
         s->is_hidden = session_hidden_cells(s->mesh, &outer->threshold, s->threads);
         if (!s->is_hidden) return session_no_memory(error, s->mesh->cells.cell_count, "cells of a threshold");

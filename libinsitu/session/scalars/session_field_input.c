@@ -58,11 +58,13 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
                          (long long)places, place_words(field->centring), has_rows ? ", rows' rests counted" : "");
     const session_array_rule values = {"values", has_index && !places ? 0 : field->count,
-                                       SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS, false};
-    const session_array_rule index = {"entries of index", places, SESSION_ALLOW_INTEGERS, true};
+                                       SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS, field->component_count};
+    const session_array_rule index = {"entries of index", places, SESSION_ALLOW_INTEGERS | SESSION_IS_OPTIONAL, 1};
     insitu_status status = session_check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
     if (!status) status = session_check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
-    return status;
+    if (status) return status;
+    return session_check_components(&field->values, field->component_count, field->component_stride_bytes,
+                                    "components of values", error);
 }
 
 /* Mixed cells are looked at when they are torn. */
@@ -83,20 +85,21 @@ static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *
         return base_fail(error, INSITU_ERROR_FIELD,
                          "corner_row is %lld and the mesh has offsets: rows are of cells of one type without offsets",
                          row);
-    if (row < vertices || row > INT64_MAX / 32 / mesh->cell_count)
+    if (row < vertices)
         return base_fail(error, INSITU_ERROR_FIELD, "corner_row is %lld, a cell has %lld vertices", row, vertices);
+    if (row > INT64_MAX / 32 / mesh->cell_count)
+        return base_fail(error, INSITU_ERROR_FIELD, "corner_row is %lld: rows of %lld cells do not fit into memory",
+                         row, (long long)mesh->cell_count);
     return INSITU_OK;
 }
 
-/* Checks how the patch names its faces, and its values. */
-static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, base_error *error)
+static insitu_status check_patch_arrays(const insitu_patch *patch, int components, base_error *error)
 {
-    const bool has_vertices = patch->connectivity.data != NULL;
-    const session_array_rule values = {"values", patch->count, SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS, false};
-    const session_array_rule faces = {"faces", patch->count, SESSION_ALLOW_INTEGERS, true};
-    const session_array_rule vertices = {"connectivity indices", patch->connectivity_count, SESSION_ALLOW_INTEGERS,
-                                         false};
-    const session_array_rule offsets = {"offsets", patch->count, SESSION_ALLOW_INTEGERS, true};
+    const int integers = SESSION_ALLOW_INTEGERS, optional = SESSION_IS_OPTIONAL;
+    const session_array_rule values = {"values", patch->count, SESSION_ALLOW_FLOATS | integers, components};
+    const session_array_rule faces = {"faces", patch->count, integers | optional, 1};
+    const session_array_rule vertices = {"connectivity indices", patch->connectivity_count, integers, 1};
+    const session_array_rule offsets = {"offsets", patch->count, integers | optional | SESSION_HAS_END, 1};
     if (patch->count < 0 || patch->connectivity_count < 0)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "has %lld faces of %lld connectivity indices",
                          (long long)patch->count, (long long)patch->connectivity_count);
@@ -104,11 +107,20 @@ static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *p
     if (!status) status = session_check_array(&patch->faces, &faces, INSITU_ERROR_FIELD, error);
     if (!status) status = session_check_array(&patch->connectivity, &vertices, INSITU_ERROR_FIELD, error);
     if (!status) status = session_check_array(&patch->offsets, &offsets, INSITU_ERROR_FIELD, error);
+    if (status) return status;
+    return session_check_components(&patch->values, components, patch->component_stride_bytes, "components of values",
+                                    error);
+}
+
+/* Checks how the patch names its faces, and its values. */
+static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, int components, base_error *error)
+{
+    const bool has_vertices = patch->connectivity.data != NULL;
+    const insitu_status status = check_patch_arrays(patch, components, error);
     if (status || !patch->count) return status;
-    const int64_t size = session_type_size(patch->values.type);
-    if (patch->component_stride_bytes % size != 0)
-        return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
-                         (long long)patch->component_stride_bytes, (long long)size);
+    if (!mesh->given.cell_count)
+        return base_fail(error, INSITU_ERROR_FIELD, "has %lld faces, and the mesh has no cells",
+                         (long long)patch->count);
     if (has_vertices && patch->faces.data)
         return base_fail(error, INSITU_ERROR_FIELD, "faces and connectivity are given: name faces by one of them");
     if (patch->offsets.data && !has_vertices)
@@ -139,7 +151,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
                          (int)field->centring, (int)INSITU_CELL);
     for (int i = 0; i < field->patch_count; i++) {
         base_error what = {0};
-        if (check_patch(mesh, &field->patches[i], &what))
+        if (check_patch(mesh, &field->patches[i], field->component_count, &what))
             return base_fail(error, what.status, "patch %d: %s", i, what.message);
     }
     return INSITU_OK;
@@ -166,12 +178,7 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
     if (!status && field->fill) return check_fill(field, error);
     if (!status) status = check_field_arrays(mesh, field, error);
     if (!status) status = check_patches(mesh, field, error);
-    if (status) return status;
-    const int64_t size = session_type_size(field->values.type);
-    if (field->values.data && field->component_stride_bytes % size != 0)
-        return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
-                         (long long)field->component_stride_bytes, (long long)size);
-    return INSITU_OK;
+    return status;
 }
 
 static void spoil_scalars(session_mesh *mesh, int field)
@@ -292,8 +299,8 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, const 
         base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_field: no mesh, no field, or a field without a name");
     else if (!mesh)
         base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field->name, name);
-    else if (!mesh->is_given)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", field->name, name);
+    else if (!mesh->is_given) /* the mesh's own error is what the next step has to return */
+        return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", field->name, name);
     else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
         return error->status;
     meshes->pending = *error;

@@ -1,0 +1,122 @@
+/* Each count of a mesh is 0 or not by itself, in each form of mesh, for all layers, on the last rank or on all, and its
+ * arrays are given or not: an error on all ranks or a picture, and never the end of the run. A mesh without cells is
+ * right, whatever else it has. */
+#include <stdio.h>
+#include <string.h>
+
+#include "test_effort.h"
+#include "test_mesh_forms.h"
+
+enum { SIDE = 3, COUNTS = 6 };
+
+static void counts_of(insitu_mesh *mesh, int64_t *counts[COUNTS])
+{
+    int64_t *const all[COUNTS] = {&mesh->vertex_count,
+                                  &mesh->cell_count,
+                                  &mesh->connectivity_count,
+                                  &mesh->face_count,
+                                  &mesh->face_connectivity_count,
+                                  &mesh->neighbour_count};
+    memcpy(counts, all, sizeof all);
+}
+
+/* Takes away the arrays that have as many elements as the counts of the mask, or one more. */
+static void drop_arrays(insitu_mesh *mesh, unsigned mask)
+{
+    insitu_array *const of_counts[COUNTS][5] = {
+        {&mesh->coordinates[0], &mesh->coordinates[1], &mesh->coordinates[2], &mesh->vertex_ids},
+        {&mesh->cell_types, &mesh->offsets, &mesh->ghosts},
+        {&mesh->connectivity},
+        {&mesh->face_offsets, &mesh->face_sizes, &mesh->face_lists, &mesh->owner},
+        {&mesh->face_connectivity},
+        {&mesh->neighbour}};
+    for (int c = 0; c < COUNTS; c++)
+        for (int i = 0; i < 5 && of_counts[c][i] && mask >> c & 1; i++) of_counts[c][i]->data = NULL;
+}
+
+/* Tells whether the mesh is right because it has no cells and nothing contradicts that. */
+static bool is_empty_and_right(const insitu_mesh *mesh)
+{
+    return mesh->cell_count == 0 && mesh->neighbour_count <= mesh->face_count &&
+           !(mesh->face_sizes.data && !mesh->face_lists.data) && !(mesh->neighbour.data && !mesh->owner.data) &&
+           !(mesh->owner.data && mesh->face_count) &&
+           (mesh->face_count == 0 || mesh->face_offsets.data || mesh->face_lists.data);
+}
+
+static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_torn, unsigned mask, bool with_arrays,
+                            bool is_mine)
+{
+    const insitu_mesh right = m->mesh;
+    const insitu_field right_fields[FORMED_FIELDS] = {m->fields[0], m->fields[1], m->fields[2], m->fields[3]};
+    int64_t *counts[COUNTS];
+    counts_of(&m->mesh, counts);
+    for (int c = 0; c < COUNTS && is_mine; c++)
+        if (mask >> c & 1) *counts[c] = 0;
+    if (is_mine && !with_arrays) drop_arrays(&m->mesh, mask);
+    formed_fit_fields(m);
+    const bool is_right = !is_mine || is_empty_and_right(&m->mesh);
+    forget_pictures();
+    const insitu_status set = formed_hand_over(session, m, is_torn);
+    const insitu_status status = insitu_step(session, 1, 0);
+    if ((set && !status) || (is_right && status))
+        fprintf(stderr, "%s mask %u %s: %s\n", mesh_form_name(m->form), mask, with_arrays ? "arrays" : "none",
+                insitu_error(session));
+    int all_right = is_right;
+    MPI_Allreduce(MPI_IN_PLACE, &all_right, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    everywhere(!all_right || status == INSITU_OK);
+    everywhere(!set || status);
+    told_everywhere(session, status, status, status ? "mesh \"m\"" : "");
+    m->mesh = right;
+    memcpy(m->fields, right_fields, sizeof right_fields);
+}
+
+static void check_form(mesh_form form, bool is_torn)
+{
+    formed_mesh m;
+    formed_create(form, SIDE, own_rank, rank_count, &m);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_torn_scene : formed_scene));
+    int64_t *counts[COUNTS];
+    counts_of(&m.mesh, counts);
+    unsigned given = 0;
+    for (int c = 0; c < COUNTS; c++) given |= (unsigned)(*counts[c] > 0) << c;
+    MPI_Allreduce(MPI_IN_PLACE, &given, 1, MPI_UNSIGNED, MPI_BOR, MPI_COMM_WORLD);
+    for (unsigned mask = 1; mask < 1u << COUNTS; mask++) {
+        if (mask & ~given) continue;
+        for (int way = 0; way < 4; way++)
+            draw_with_zeros(session, &m, is_torn, mask, way & 1, way & 2 || own_rank == rank_count - 1);
+    }
+    forget_pictures();
+    everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
+    const insitu_status status = insitu_step(session, 2, 0);
+    told_everywhere(session, status, INSITU_OK, "");
+    everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES));
+    insitu_destroy(&session);
+    formed_free(&m);
+}
+
+static void any_counts_are_an_error_or_a_picture(void **state)
+{
+    (void)state;
+    for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) check_form(form, false);
+}
+
+static void and_for_torn_meshes(void **state)
+{
+    (void)state;
+    for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
+        if (formed_has_corners(form)) check_form(form, true);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(any_counts_are_an_error_or_a_picture),
+        cmocka_unit_test(and_for_torn_meshes),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
