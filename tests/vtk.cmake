@@ -26,13 +26,20 @@ target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_file
 add_test(NAME vtk_files COMMAND test_vtk_files)
 insitu_add_long_test(vtk_files_cut_often test_vtk_files 2000)
 
-# Element types of Exodus files, where this VTK reads them.
-find_package(VTK 9.1 QUIET OPTIONAL_COMPONENTS exodusII)
+# Element types of Exodus files, and VTK's HDF files, where this VTK reads them.
+find_package(VTK 9.1 QUIET OPTIONAL_COMPONENTS exodusII hdf5)
 if(TARGET VTK::exodusII)
   add_executable(test_vtk_exodus test_vtk_exodus.cpp test_vtk_run.cpp)
   target_link_libraries(test_vtk_exodus PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA VTK::exodusII)
   add_test(NAME vtk_exodus COMMAND test_vtk_exodus)
   set_tests_properties(vtk_exodus PROPERTIES TIMEOUT 60)
+endif()
+
+if(TARGET VTK::hdf5)
+  add_executable(test_vtk_hdf test_vtk_hdf.cpp test_vtk_run.cpp)
+  target_link_libraries(test_vtk_hdf PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA VTK::hdf5)
+  add_test(NAME vtk_hdf COMMAND test_vtk_hdf)
+  set_tests_properties(vtk_hdf PROPERTIES TIMEOUT 60)
 endif()
 
 add_executable(test_vtk_formats test_vtk_formats.cpp)

@@ -22,6 +22,9 @@
 
 #include "file_kinds.h"
 #include "file_length.h"
+#ifdef INSITU_VTK_HDF
+#include "hdf_file.h"
+#endif
 #include "piece_files.h"
 #include "vtk_messages.h"
 
@@ -145,6 +148,10 @@ std::unique_ptr<data_file> open_data_file(const std::string &path)
     if (ending == ".pvtu") return open_pvtu(path);
     if (ending == ".pvd") return open_pvd(path);
     if (ending == ".series") return open_series(path);
+#ifdef INSITU_VTK_HDF
+    if (ending == ".vtkhdf")
+        if (auto grids = open_hdf(path)) return grids;
+#endif
     if (ending == ".vtu" && is_empty_vtu(path)) return std::make_unique<empty_file>(path);
     return std::make_unique<vtk_file>(path, kind);
 }

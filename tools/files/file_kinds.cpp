@@ -149,7 +149,7 @@ const std::vector<file_kind> &file_kinds()
         {".pvd", nullptr, yes, no, nullptr},
         {".series", nullptr, yes, no, nullptr},
 #ifdef INSITU_VTK_HDF
-        {".vtkhdf", make_plain<vtkHDFReader>, no, no, nullptr},
+        {".vtkhdf", make_plain<vtkHDFReader>, yes, no, nullptr},
 #endif
 #ifdef INSITU_VTK_EXODUS
         {".ex2", make_exodus, yes, no, nullptr},

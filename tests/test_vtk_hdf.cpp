@@ -1,0 +1,323 @@
+/* VTK's HDF files: steps of unstructured grids come out as they were written, one by one; what is not read is refused
+ * by its type. The test writes the files by the HDF5 library. Each part is a row of unit cubes along x. */
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkDataArray.h>
+#include <vtkPointData.h>
+#include <vtkSmartPointer.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtk_hdf5.h>
+
+#include "data_file.h"
+#include "grids_of.h"
+#include "test_vtk_run.h"
+#include "vtk_messages.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+using namespace render_tool;
+
+namespace
+{
+
+std::string folder;
+
+using numbers = std::vector<long long>;
+
+/* All parts' arrays, one after the other. */
+struct lists {
+    numbers point_counts, cell_counts, id_counts, ids, offsets, types;
+    std::vector<double> points, f; // f at the points
+    std::vector<double> c;         // in the cells
+};
+
+/* Cubes first .. first + count - 1 of a row, at height z. f = x + 100 step, c = cube + 100 step. */
+void add_part(lists &all, int first, int count, double z, int step)
+{
+    const double corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                  {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    all.offsets.push_back(0);
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 8; k++) {
+            all.points.insert(all.points.end(), {corners[k][0] + first + i, corners[k][1], corners[k][2] + z});
+            all.f.push_back(corners[k][0] + first + i + 100 * step);
+            all.ids.push_back(8 * i + k);
+        }
+        all.offsets.push_back(8 * (i + 1));
+        all.types.push_back(VTK_HEXAHEDRON);
+        all.c.push_back(first + i + 100 * step);
+    }
+    all.point_counts.push_back(8 * count);
+    all.cell_counts.push_back(count);
+    all.id_counts.push_back(8 * count);
+}
+
+class writer
+{
+  public:
+    writer(const std::string &name, const std::string &type)
+        : file_(H5Fcreate((folder + "/" + name).c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT))
+    {
+        group("/VTKHDF");
+        const long long version[2] = {2, 0};
+        H5LTset_attribute_long_long(file_, "/VTKHDF", "Version", version, 2);
+        H5LTset_attribute_string(file_, "/VTKHDF", "Type", type.c_str());
+    }
+    ~writer() { H5Fclose(file_); }
+    writer(const writer &) = delete;
+    writer &operator=(const writer &) = delete;
+
+    void group(const std::string &name)
+    {
+        H5Gclose(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    }
+    void put(const std::string &name, const numbers &values)
+    {
+        const hsize_t size = values.size();
+        H5LTmake_dataset(file_, ("/VTKHDF/" + name).c_str(), 1, &size, H5T_NATIVE_LLONG, values.data());
+    }
+    void put(const std::string &name, const std::vector<double> &values, hsize_t components = 1)
+    {
+        const hsize_t size[2] = {values.size() / components, components};
+        H5LTmake_dataset(file_, ("/VTKHDF/" + name).c_str(), components > 1 ? 2 : 1, size, H5T_NATIVE_DOUBLE,
+                         values.data());
+    }
+    void put(const lists &all)
+    {
+        put("NumberOfPoints", all.point_counts);
+        put("NumberOfCells", all.cell_counts);
+        put("NumberOfConnectivityIds", all.id_counts);
+        put("Points", all.points, 3);
+        put("Connectivity", all.ids);
+        put("Offsets", all.offsets);
+        const std::vector<unsigned char> types(all.types.begin(), all.types.end());
+        const hsize_t size = types.size();
+        H5LTmake_dataset(file_, "/VTKHDF/Types", 1, &size, H5T_NATIVE_UCHAR, types.data());
+        group("/VTKHDF/PointData");
+        group("/VTKHDF/CellData");
+        put("PointData/f", all.f);
+        put("CellData/c", all.c);
+    }
+    void put_steps(const std::vector<double> &times)
+    {
+        group("/VTKHDF/Steps");
+        const int count = static_cast<int>(times.size());
+        H5LTset_attribute_int(file_, "/VTKHDF/Steps", "NSteps", &count, 1);
+        put("Steps/Values", times);
+    }
+
+  private:
+    hid_t file_;
+};
+
+std::string describe(const std::string &path, size_t step)
+{
+    const auto file = open_data_file(path);
+    const auto data = grids_of(file->read(step, 0, 1), path);
+    std::string text;
+    const auto add = [&](vtkUnstructuredGrid *grid) {
+        if (!grid) return;
+        const double *b = grid->GetBounds();
+        double f[2], c[2];
+        grid->GetPointData()->GetArray("f")->GetRange(f);
+        grid->GetCellData()->GetArray("c")->GetRange(c);
+        char line[200];
+        std::snprintf(line, sizeof line, "%d cells x %g..%g z %g..%g f %g..%g c %g..%g; ",
+                      static_cast<int>(grid->GetNumberOfCells()), b[0], b[1], b[4], b[5], f[0], f[1], c[0], c[1]);
+        text += line;
+    };
+    auto *composite = vtkCompositeDataSet::SafeDownCast(data);
+    if (!composite) {
+        add(vtkUnstructuredGrid::SafeDownCast(data));
+        return text;
+    }
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+        add(vtkUnstructuredGrid::SafeDownCast(it->GetCurrentDataObject()));
+    return text;
+}
+
+void expect(const std::string &name, size_t step, const std::string &expected)
+{
+    const std::string found = describe(folder + "/" + name, step);
+    if (found == expected) return;
+    print_error("%s step %zu: %s\nexpected %s\n", name.c_str(), step, found.c_str(), expected.c_str());
+    assert_true(false);
+}
+
+void expect_refusal(const std::string &name, const std::string &why)
+{
+    try {
+        (void)describe(folder + "/" + name, 0);
+    } catch (const std::exception &e) {
+        const std::string what = e.what();
+        if (what.find(name) != std::string::npos && what.find(why) != std::string::npos) return;
+        print_error("%s\n", e.what());
+    }
+    print_error("%s: not refused by \"%s\"\n", name.c_str(), why.c_str());
+    assert_true(false);
+}
+
+/* Two parts, the second of which has no cells, and then one of three. */
+void parts_of_one_step_are_all_read(void **)
+{
+    {
+        writer w("parts.vtkhdf", "UnstructuredGrid");
+        lists all;
+        add_part(all, 0, 2, 0, 0);
+        add_part(all, 0, 0, 0, 0);
+        add_part(all, 2, 3, 0, 0);
+        w.put(all);
+    }
+    const auto file = open_data_file(folder + "/parts.vtkhdf");
+    assert_int_equal(file->times().size(), 0);
+    assert_int_equal(file->pieces(0), 3);
+    const std::string found = describe(folder + "/parts.vtkhdf", 0);
+    assert_true(found.find("2 cells x 0..2 z 0..1 f 0..2 c 0..1; ") == 0);
+    assert_true(found.find("3 cells x 2..5 z 0..1 f 2..5 c 2..4; ") != std::string::npos);
+}
+
+/* Everything changes from step to step, the number of parts too; the second step begins with a part without cells. */
+void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
+{
+    {
+        writer w("changing.vtkhdf", "UnstructuredGrid");
+        lists all;
+        add_part(all, 0, 2, 0, 0);
+        add_part(all, 0, 0, 1, 1);
+        add_part(all, 1, 4, 1, 1);
+        add_part(all, 7, 1, 2, 2);
+        w.put(all);
+        w.put_steps({0.5, 0.75, 1.5});
+        w.put("Steps/PartOffsets", numbers{0, 1, 3});
+        w.put("Steps/NumberOfParts", numbers{1, 2, 1});
+        w.put("Steps/PointOffsets", numbers{0, 16, 48});
+        w.put("Steps/CellOffsets", numbers{0, 2, 6});
+        w.put("Steps/ConnectivityIdOffsets", numbers{0, 16, 48});
+    }
+    const auto file = open_data_file(folder + "/changing.vtkhdf");
+    assert_int_equal(file->times().size(), 3);
+    assert_true(file->times()[1] == 0.75);
+    assert_int_equal(file->pieces(1), 2);
+    assert_true(may_hold_steps(folder + "/changing.vtkhdf"));
+    expect("changing.vtkhdf", 0, "2 cells x 0..2 z 0..1 f 0..2 c 0..1; ");
+    assert_true(describe(folder + "/changing.vtkhdf", 1).find("4 cells x 1..5 z 1..2 f 101..105 c 101..104; ") !=
+                std::string::npos);
+    expect("changing.vtkhdf", 2, "1 cells x 7..8 z 2..3 f 207..208 c 207..207; ");
+}
+
+/* One mesh for all steps, of which only the values change, each of the fields in a place of its own. */
+void steps_of_values_share_their_mesh(void **)
+{
+    {
+        writer w("values.vtkhdf", "UnstructuredGrid");
+        lists all, later;
+        add_part(all, 0, 3, 0, 0);
+        add_part(later, 0, 3, 0, 1);
+        all.f.insert(all.f.end(), later.f.begin(), later.f.end());
+        all.c.insert(all.c.end(), later.c.begin(), later.c.end());
+        w.put(all);
+        w.put_steps({0, 1});
+        for (const char *name : {"PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"})
+            w.put(std::string("Steps/") + name, numbers{0, 0});
+        w.group("/VTKHDF/Steps/PointDataOffsets");
+        w.group("/VTKHDF/Steps/CellDataOffsets");
+        w.put("Steps/PointDataOffsets/f", numbers{0, 24});
+        w.put("Steps/CellDataOffsets/c", numbers{3, 0});
+    }
+    expect("values.vtkhdf", 0, "3 cells x 0..3 z 0..1 f 0..3 c 100..102; ");
+    expect("values.vtkhdf", 1, "3 cells x 0..3 z 0..1 f 100..103 c 0..2; ");
+}
+
+/* The points move; the cells are those of the first step, though each step has a part of its own. */
+void points_that_move_keep_their_cells(void **)
+{
+    {
+        writer w("moving.vtkhdf", "UnstructuredGrid");
+        lists all, later;
+        add_part(all, 0, 3, 0, 0);
+        add_part(later, 5, 3, 1, 1);
+        all.points.insert(all.points.end(), later.points.begin(), later.points.end());
+        all.f.insert(all.f.end(), later.f.begin(), later.f.end());
+        all.point_counts.push_back(24);
+        all.cell_counts.push_back(3);
+        all.id_counts.push_back(24);
+        w.put(all);
+        w.put_steps({0, 1});
+        w.put("Steps/PartOffsets", numbers{0, 1});
+        w.put("Steps/PointOffsets", numbers{0, 24});
+        w.put("Steps/CellOffsets", numbers{0, 0});
+        w.put("Steps/ConnectivityIdOffsets", numbers{0, 0});
+    }
+    expect("moving.vtkhdf", 1, "3 cells x 5..8 z 1..2 f 105..108 c 0..2; ");
+}
+
+void what_is_not_read_is_refused_by_its_type(void **)
+{
+    for (const char *type :
+         {"PolyData", "PartitionedDataSetCollection", "MultiBlockDataSet", "OverlappingAMR", "HyperTreeGrid"}) {
+        {
+            const writer w("other.vtkhdf", type);
+        }
+        expect_refusal("other.vtkhdf", std::string("Type ") + type);
+    }
+    {
+        writer w("images.vtkhdf", "ImageData");
+        w.put_steps({0, 1});
+    }
+    expect_refusal("images.vtkhdf", "images with steps");
+    {
+        writer w("short.vtkhdf", "UnstructuredGrid");
+        lists all;
+        add_part(all, 0, 2, 0, 0);
+        all.points.resize(24);
+        w.put(all);
+    }
+    expect_refusal("short.vtkhdf", "/VTKHDF/Points has 8 entries, expected 16 from 0 on");
+    {
+        writer w("unfit.vtkhdf", "UnstructuredGrid");
+        lists all;
+        add_part(all, 0, 2, 0, 0);
+        all.offsets.back()--;
+        w.put(all);
+    }
+    expect_refusal("unfit.vtkhdf", "Offsets of part 0 do not fit");
+    write_file(folder + "/none.vtkhdf", "no HDF file");
+    expect_refusal("none.vtkhdf", "is no HDF file");
+}
+
+int begin(void **)
+{
+    folder = fresh_folder("vtk_hdf");
+    catch_vtk_messages();
+    return 0;
+}
+
+} // namespace
+
+int main()
+{
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(parts_of_one_step_are_all_read),
+        cmocka_unit_test(steps_of_a_mesh_that_changes_are_read_one_by_one),
+        cmocka_unit_test(steps_of_values_share_their_mesh),
+        cmocka_unit_test(points_that_move_keep_their_cells),
+        cmocka_unit_test(what_is_not_read_is_refused_by_its_type),
+    };
+    return cmocka_run_group_tests(tests, begin, nullptr);
+}

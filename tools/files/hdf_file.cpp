@@ -1,0 +1,393 @@
+/* A file of unstructured grids, by VTK's description of the format, version 2. A part is a grid of its own, and a step
+ * has one or several. Arrays of all parts and steps stand one after the other:
+ *
+ *     /VTKHDF                     attribute Type
+ *       NumberOfPoints, NumberOfCells, NumberOfConnectivityIds    one entry a part
+ *       Points, Types, Connectivity, Offsets (number of cells + 1 a part)
+ *       PointData/NAME, CellData/NAME
+ *       Steps                     attribute NSteps; each of these has one entry a step
+ *         Values                  the times
+ *         PartOffsets, NumberOfParts
+ *         PointOffsets, CellOffsets, ConnectivityIdOffsets        where the first part's begin
+ *         PointDataOffsets/NAME, CellDataOffsets/NAME             the same of fields; as the points, cells if missing
+ */
+#include "hdf_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkDataArray.h>
+#include <vtkIdTypeArray.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtk_hdf5.h>
+
+#include "vtk_messages.h"
+
+namespace render_tool
+{
+
+namespace
+{
+
+using array_pointer = vtkSmartPointer<vtkDataArray>;
+
+/* A handle of the HDF5 library's, closed at the end. */
+class handle
+{
+  public:
+    handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+    ~handle()
+    {
+        if (id_ >= 0) close_(id_);
+    }
+    handle(const handle &) = delete;
+    handle &operator=(const handle &) = delete;
+
+    operator hid_t() const { return id_; }
+    bool is_open() const { return id_ >= 0; }
+
+  private:
+    hid_t id_;
+    herr_t (*close_)(hid_t);
+};
+
+/* VTK's type for numbers in a file; VTK_VOID for all else. */
+int vtk_type(hid_t type)
+{
+    const size_t size = H5Tget_size(type);
+    if (H5Tget_class(type) == H5T_FLOAT) return size == 4 ? VTK_FLOAT : size == 8 ? VTK_DOUBLE : VTK_VOID;
+    if (H5Tget_class(type) != H5T_INTEGER) return VTK_VOID;
+    const bool has_sign = H5Tget_sign(type) == H5T_SGN_2;
+    switch (size) {
+    case 1: return has_sign ? VTK_SIGNED_CHAR : VTK_UNSIGNED_CHAR;
+    case 2: return has_sign ? VTK_SHORT : VTK_UNSIGNED_SHORT;
+    case 4: return has_sign ? VTK_INT : VTK_UNSIGNED_INT;
+    case 8: return has_sign ? VTK_LONG_LONG : VTK_UNSIGNED_LONG_LONG;
+    default: return VTK_VOID;
+    }
+}
+
+hid_t memory_type(int type)
+{
+    switch (type) {
+    case VTK_FLOAT: return H5T_NATIVE_FLOAT;
+    case VTK_DOUBLE: return H5T_NATIVE_DOUBLE;
+    case VTK_SIGNED_CHAR: return H5T_NATIVE_SCHAR;
+    case VTK_UNSIGNED_CHAR: return H5T_NATIVE_UCHAR;
+    case VTK_SHORT: return H5T_NATIVE_SHORT;
+    case VTK_UNSIGNED_SHORT: return H5T_NATIVE_USHORT;
+    case VTK_INT: return H5T_NATIVE_INT;
+    case VTK_UNSIGNED_INT: return H5T_NATIVE_UINT;
+    case VTK_LONG_LONG: return H5T_NATIVE_LLONG;
+    case VTK_UNSIGNED_LONG_LONG: return H5T_NATIVE_ULLONG;
+    default: return H5T_NATIVE_INT64; /* vtkIdType */
+    }
+}
+
+class hdf
+{
+  public:
+    explicit hdf(const std::string &path)
+        : path_(path), file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose)
+    {
+        if (!file_.is_open()) refuse("is no HDF file, or is cut short");
+        if (!has("/VTKHDF")) refuse("has no group VTKHDF");
+    }
+
+    [[noreturn]] void refuse(const std::string &why) const
+    {
+        throw std::runtime_error(path_ + ": cannot be read: " + why);
+    }
+
+    /* Each group on the way must be there before the next is asked for. */
+    bool has(const std::string &name) const
+    {
+        for (size_t at = name.find('/', 1); at != std::string::npos; at = name.find('/', at + 1))
+            if (H5Lexists(file_, name.substr(0, at).c_str(), H5P_DEFAULT) <= 0) return false;
+        return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0;
+    }
+
+    /* The file's Type. */
+    std::string type() const
+    {
+        if (H5Aexists_by_name(file_, "/VTKHDF", "Type", H5P_DEFAULT) <= 0) refuse("its group VTKHDF has no Type");
+        const handle attribute(H5Aopen_by_name(file_, "/VTKHDF", "Type", H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+        const handle kind(H5Aget_type(attribute), H5Tclose);
+        if (H5Tget_class(kind) != H5T_STRING) refuse("its Type is no text");
+        if (H5Tis_variable_str(kind) > 0) {
+            char *text = nullptr;
+            if (H5Aread(attribute, kind, static_cast<void *>(&text)) < 0 || !text) refuse("its Type is unreadable");
+            const std::string copy = text;
+            H5free_memory(text);
+            return copy;
+        }
+        std::string text(H5Tget_size(kind), '\0');
+        if (H5Aread(attribute, kind, text.data()) < 0) refuse("its Type is unreadable");
+        return text.substr(0, text.find('\0'));
+    }
+
+    /* The names of the data sets in a group; none where it is missing. */
+    std::vector<std::string> names(const std::string &group) const
+    {
+        std::vector<std::string> all;
+        if (!has(group)) return all;
+        const auto add = [](hid_t, const char *name, const H5L_info_t *, void *list) -> herr_t {
+            static_cast<std::vector<std::string> *>(list)->emplace_back(name);
+            return 0;
+        };
+        if (H5Literate_by_name(file_, group.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &all, H5P_DEFAULT) < 0)
+            refuse(group + " is unreadable");
+        return all;
+    }
+
+    /* Rows first, first + 1, ... of a data set, as VTK's type `as`, or of the file's type for VTK_VOID. Null where it
+     * holds no numbers. A negative count is all. */
+    array_pointer rows(const std::string &name, int64_t first, int64_t count, int as = VTK_VOID) const
+    {
+        if (!has(name)) refuse(name + " is missing");
+        const handle set(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
+        if (!set.is_open()) refuse(name + " is no data set");
+        const handle kind(H5Dget_type(set), H5Tclose), space(H5Dget_space(set), H5Sclose);
+        const int type = vtk_type(kind) == VTK_VOID ? VTK_VOID : as != VTK_VOID ? as : vtk_type(kind);
+        std::array<hsize_t, H5S_MAX_RANK> sizes{}, start{};
+        const int rank = H5Sget_simple_extent_dims(space, sizes.data(), nullptr);
+        if (type == VTK_VOID || rank < 1) return nullptr;
+        const auto length = static_cast<int64_t>(sizes[0]);
+        if (count < 0) count = length;
+        if (first < 0 || first > length || count > length - first)
+            refuse(name + " has " + std::to_string(length) + " entries, expected " + std::to_string(count) + " from " +
+                   std::to_string(first) + " on");
+        const auto components =
+            std::accumulate(sizes.begin() + 1, sizes.begin() + rank, hsize_t{1}, std::multiplies<>());
+        if (components < 1 || components > std::numeric_limits<int>::max()) return nullptr;
+        auto array = array_pointer::Take(vtkDataArray::CreateDataArray(type));
+        array->SetNumberOfComponents(static_cast<int>(components));
+        array->SetNumberOfTuples(count);
+        if (count == 0) return array;
+        start[0] = static_cast<hsize_t>(first);
+        sizes[0] = static_cast<hsize_t>(count);
+        H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, sizes.data(), nullptr);
+        const handle memory(H5Screate_simple(rank, sizes.data(), nullptr), H5Sclose);
+        if (H5Dread(set, memory_type(type), memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
+            refuse(name + " is unreadable");
+        return array;
+    }
+
+    /* The number of rows of a data set; 0 where there is none. */
+    int64_t length(const std::string &name) const
+    {
+        const handle set(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
+        if (!set.is_open()) return 0;
+        const handle space(H5Dget_space(set), H5Sclose);
+        std::array<hsize_t, H5S_MAX_RANK> sizes{};
+        return H5Sget_simple_extent_dims(space, sizes.data(), nullptr) > 0 ? static_cast<int64_t>(sizes[0]) : 0;
+    }
+
+    /* Row `row`'s first number. */
+    int64_t number(const std::string &name, int64_t row) const
+    {
+        const array_pointer one = rows(name, row, 1, VTK_ID_TYPE);
+        if (!one) refuse(name + " has no numbers");
+        return static_cast<int64_t>(one->GetComponent(0, 0));
+    }
+
+  private:
+    std::string path_;
+    handle file_;
+};
+
+/* Where the arrays of a part begin. */
+struct part_place {
+    int64_t part = 0;
+    int64_t point = 0, cell = 0, id = 0, offset = 0;
+    int64_t points = 0, cells = 0, ids = 0;
+};
+
+class hdf_grids : public data_file
+{
+  public:
+    explicit hdf_grids(const std::string &path) : path_(path), in_(path), has_steps_(in_.has("/VTKHDF/Steps"))
+    {
+        if (!has_steps_) return;
+        const array_pointer values = in_.rows("/VTKHDF/Steps/Values", 0, -1, VTK_DOUBLE);
+        for (vtkIdType i = 0; values && i < values->GetNumberOfTuples(); i++)
+            times_.push_back(values->GetComponent(i, 0));
+        if (times_.empty()) in_.refuse("it has no steps");
+    }
+
+    const std::vector<double> &times() const override { return times_; }
+    std::string step_path(size_t) const override { return path_; }
+    int pieces(size_t step) override { return static_cast<int>(part_count(step)); }
+    vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) override
+    {
+        const quiet_stderr quiet;
+        const int64_t count = part_count(step);
+        auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+        all->SetNumberOfBlocks(static_cast<unsigned>(count));
+        if (count == 0) return all;
+        part_place at = first_part(step);
+        const part_place first = at;
+        for (int64_t i = 0; i < count; i++) {
+            set_counts(at);
+            const bool is_mine = i * pieces / count == piece;
+            if (is_mine) {
+                const auto grid = read_part(at, first, step);
+                if (count == 1) return grid;
+                all->SetBlock(static_cast<unsigned>(i), grid);
+            }
+            at = {at.part + 1,
+                  at.point + at.points,
+                  at.cell + at.cells,
+                  at.id + at.ids,
+                  at.offset + at.cells + 1,
+                  0,
+                  0,
+                  0};
+        }
+        return all;
+    }
+
+  private:
+    std::string path_;
+    hdf in_;
+    bool has_steps_;
+    std::vector<double> times_;
+
+    /* An entry of Steps; `missing` where there are no steps, or no such list. */
+    int64_t of_step(const std::string &name, size_t step, int64_t missing) const
+    {
+        const std::string list = "/VTKHDF/Steps/" + name;
+        return has_steps_ && in_.has(list) ? in_.number(list, static_cast<int64_t>(step)) : missing;
+    }
+
+    int64_t part_count(size_t step) const
+    {
+        const array_pointer parts = in_.rows("/VTKHDF/NumberOfPoints", 0, -1, VTK_ID_TYPE);
+        const int64_t all = parts ? parts->GetNumberOfTuples() : 0;
+        const int64_t count = of_step("NumberOfParts", step, in_.has("/VTKHDF/Steps/PartOffsets") ? 1 : all);
+        if (count < 0 || count > all)
+            in_.refuse("step " + std::to_string(step) + " has " + std::to_string(count) + " parts, of " +
+                       std::to_string(all));
+        return count;
+    }
+
+    part_place first_part(size_t step) const
+    {
+        part_place at;
+        at.part = of_step("PartOffsets", step, 0);
+        at.point = of_step("PointOffsets", step, 0);
+        at.cell = of_step("CellOffsets", step, 0);
+        at.id = of_step("ConnectivityIdOffsets", step, 0);
+        set_counts(at);
+        at.offset = at.cell + at.part;
+        if (!offsets_fit(at)) at.offset = at.cell + offsets_beside_cells(at);
+        return at;
+    }
+
+    bool offsets_fit(const part_place &at) const
+    {
+        const std::string offsets = "/VTKHDF/Offsets";
+        return at.offset >= 0 && in_.has(offsets) && at.offset + at.cells < in_.length(offsets) &&
+               in_.number(offsets, at.offset) == 0 && in_.number(offsets, at.offset + at.cells) == at.ids;
+    }
+
+    /* The list of offsets has one entry more than that of cells for each part before; parts whose cells are those of
+     * an earlier step have none of their own. */
+    int64_t offsets_beside_cells(const part_place &at) const
+    {
+        int64_t parts = 0;
+        for (int64_t cells = 0; parts < at.part && cells < at.cell; parts++)
+            cells += in_.number("/VTKHDF/NumberOfCells", parts);
+        return parts;
+    }
+
+    void set_counts(part_place &at) const
+    {
+        at.points = in_.number("/VTKHDF/NumberOfPoints", at.part);
+        at.cells = in_.number("/VTKHDF/NumberOfCells", at.part);
+        at.ids = in_.number("/VTKHDF/NumberOfConnectivityIds", at.part);
+        if (at.points < 0 || at.cells < 0 || at.ids < 0) in_.refuse("a part has a negative number of points or cells");
+    }
+
+    vtkSmartPointer<vtkDataObject> read_part(const part_place &at, const part_place &first, size_t step) const
+    {
+        auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+        const array_pointer coordinates = in_.rows("/VTKHDF/Points", at.point, at.points);
+        if (!coordinates || coordinates->GetNumberOfComponents() != 3) in_.refuse("Points are no three numbers each");
+        vtkNew<vtkPoints> points;
+        points->SetData(coordinates);
+        grid->SetPoints(points);
+        set_cells(at, grid);
+        add_fields("PointData", {at.point - first.point, at.points, first.point, step}, grid->GetPointData());
+        add_fields("CellData", {at.cell - first.cell, at.cells, first.cell, step}, grid->GetCellData());
+        return grid;
+    }
+
+    void set_cells(const part_place &at, vtkUnstructuredGrid *grid) const
+    {
+        const auto list = [&](const char *name, int64_t first, int64_t count, int type) {
+            const array_pointer array = in_.rows(std::string("/VTKHDF/") + name, first, count, type);
+            if (!array || array->GetNumberOfComponents() != 1) in_.refuse(std::string(name) + " is no list of numbers");
+            return array;
+        };
+        const array_pointer types = list("Types", at.cell, at.cells, VTK_UNSIGNED_CHAR);
+        const array_pointer offsets = list("Offsets", at.offset, at.cells + 1, VTK_ID_TYPE);
+        const array_pointer ids = list("Connectivity", at.id, at.ids, VTK_ID_TYPE);
+        if (offsets->GetComponent(0, 0) != 0 || offsets->GetComponent(at.cells, 0) != static_cast<double>(at.ids))
+            in_.refuse("the Offsets of part " + std::to_string(at.part) + " do not fit its Connectivity");
+        for (int64_t i = 0; i < at.cells; i++)
+            if (types->GetComponent(i, 0) == VTK_POLYHEDRON) in_.refuse("polyhedra of this format are not read");
+        vtkNew<vtkCellArray> cells;
+        cells->SetData(vtkIdTypeArray::SafeDownCast(offsets), vtkIdTypeArray::SafeDownCast(ids));
+        grid->SetCells(vtkUnsignedCharArray::SafeDownCast(types), cells);
+    }
+
+    struct field_place {
+        int64_t in_step, count; // from the first part's on
+        int64_t first;          // the first part's points or cells, where a field has no place of its own
+        size_t step;
+    };
+
+    void add_fields(const std::string &group, const field_place &at, vtkDataSetAttributes *to) const
+    {
+        for (const std::string &name : in_.names("/VTKHDF/" + group)) {
+            std::string path = "/VTKHDF/";
+            path.append(group).append("/").append(name);
+            std::string place = group;
+            place.append("Offsets/").append(name);
+            const array_pointer values = in_.rows(path, of_step(place, at.step, at.first) + at.in_step, at.count);
+            if (!values) continue;
+            values->SetName(name.c_str());
+            to->AddArray(values);
+        }
+    }
+};
+
+} // namespace
+
+std::unique_ptr<data_file> open_hdf(const std::string &path)
+{
+    const quiet_stderr quiet;
+    const hdf in(path);
+    const std::string type = in.type();
+    if (type == "UnstructuredGrid") return std::make_unique<hdf_grids>(path);
+    if (type != "ImageData") in.refuse("a VTKHDF file of Type " + type + ", expected UnstructuredGrid or ImageData");
+    if (in.has("/VTKHDF/Steps"))
+        in.refuse("images with steps are not read in a VTKHDF file, expected UnstructuredGrid");
+    return nullptr;
+}
+
+} // namespace render_tool
