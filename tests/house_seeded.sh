@@ -49,6 +49,8 @@ planted() {
 fresh_tree
 accepts sh "$here/house_includes.sh" "$place/tree"
 planted libinsitu/base/seeded.c '#include "comp.h"' 'base must not include comp.h of compositing'
+planted libinsitu/session/seeded.c '    FILE *file = fopen(path, "r");' 'opens a file'
+planted libinsitu/base/seeded.c '    if ((file = open(path, O_RDONLY)) < 0) return;' 'opens a file'
 planted libinsitu/base/seeded.c '#include <mpi.h>' 'base knows no MPI'
 planted mmbvh/seeded.c '#include "render.h"' 'mmbvh must not include render.h of render_face'
 planted mmbvh/seeded.c '  #  include <mpi.h>' 'mmbvh knows no MPI'

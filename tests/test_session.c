@@ -581,7 +581,7 @@ static void scene_that_is_no_file_is_told(void **context)
     told_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
     everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
     const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
-    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE, "/: is a directory, expected a regular file");
+    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE, "/: cannot be read: it is a directory, expected a regular file");
     insitu_destroy(&session);
 }
 

@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include "file.h"
+
 /* From begin to end, the calling thread writes and reads numbers as C's locale does. begin returns false where memory
  * runs out; then end is not called. */
 typedef struct c_numbers {
@@ -17,21 +19,14 @@ void c_numbers_end(c_numbers *numbers);
 
 typedef void text_writer(FILE *file, const void *what);
 
-/* Replace a file: the text goes to a new one beside it, which then takes its place, so that no reader ever sees a part.
- * False with errno where that cannot be done; the old file is then as it was. */
-bool text_file_replace(const char *path, text_writer *write, const void *what);
+/* Write a file anew, as file_replace(); its text is what write() writes, numbers as in C's locale. */
+bool text_file_replace(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Make the folders of a path that are missing. False with errno where that cannot be done. */
-bool text_file_make_folders(const char *path);
-
-/* The whole file as text, from base_alloc(). False with errno where that cannot be done; *text is then NULL. */
-bool text_file_read(const char *path, char **text);
+/* Append to a file, as file_append(). */
+bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure);
 
 /* Keeps only the lines that begin with a whole number below number: they move to the beginning of text. Returns how
  * many bytes they are. A torn last line, without an end, is dropped. */
 size_t text_keep_below(char *text, long long number);
-
-/* Open a file to read it. NULL with errno where that cannot be done; a pipe does not make the caller wait. */
-FILE *text_file_open(const char *path);
 
 #endif

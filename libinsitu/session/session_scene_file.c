@@ -3,11 +3,9 @@
  * edit that does not parse leaves the old scene in place and a warning in the reports until it is mended. */
 #include "session_scene_file.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <string.h>
-#include <unistd.h>
 
+#include "file.h"
 #include "memory.h"
 #include "session_agree.h"
 
@@ -20,41 +18,19 @@ typedef struct scene_file_text {
     struct stat stamp;
 } scene_file_text;
 
-static const char *kind_of(mode_t mode)
-{
-    if (S_ISDIR(mode)) return "a directory";
-    if (S_ISFIFO(mode)) return "a named pipe (FIFO)";
-    if (S_ISSOCK(mode)) return "a socket";
-    return "a device";
-}
-
-/* Reads a regular file; any other is refused first, so that reading never waits for anybody. */
-static insitu_status read_regular(int file, const char *path, scene_file_text *text, base_error *error)
-{
-    if (fstat(file, &text->stamp) != 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
-    text->has_stamp = true;
-    if (!S_ISREG(text->stamp.st_mode))
-        return base_fail(error, INSITU_ERROR_SCENE, "%s: is %s, expected a regular file", path,
-                         kind_of(text->stamp.st_mode));
-    text->data = base_alloc(MAX_SCENE_BYTES);
-    if (!text->data) return session_no_memory(error, MAX_SCENE_BYTES, "scene text");
-    while (text->size < MAX_SCENE_BYTES) {
-        const ssize_t more = read(file, text->data + text->size, (size_t)(MAX_SCENE_BYTES - text->size));
-        if (more < 0 && errno == EINTR) continue;
-        if (more < 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
-        if (more == 0) return INSITU_OK;
-        text->size += more;
-    }
-    return base_fail(error, INSITU_ERROR_SCENE, "%s: is no scene: larger than %d bytes", path, MAX_SCENE_BYTES);
-}
-
 static insitu_status read_file(const char *path, scene_file_text *text, base_error *error)
 {
-    const int file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: cannot be read: %s", path, strerror(errno));
-    const insitu_status status = read_regular(file, path, text, error);
-    close(file);
-    return status;
+    file_content content;
+    file_failure failure;
+    const bool is_read = file_read(path, MAX_SCENE_BYTES, &content, &failure);
+    text->has_stamp = content.stamp.st_mode != 0;
+    text->stamp = content.stamp;
+    if (!is_read)
+        return base_fail(error, failure.is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_SCENE, "%s: cannot be read: %s",
+                         path, failure.reason);
+    text->data = content.text;
+    text->size = (int64_t)content.size;
+    return INSITU_OK;
 }
 
 /* Reads a file that a scene names. */
@@ -62,13 +38,10 @@ static insitu_status read_attachment(const char *path, char **text, int64_t *siz
 {
     scene_file_text file = {0};
     const insitu_status status = read_file(path, &file, error);
-    if (status == INSITU_OK) {
-        *text = file.data;
-        *size = file.size;
-    } else {
-        base_free(file.data);
-    }
-    return status;
+    if (status) return status;
+    *text = file.data;
+    *size = file.size;
+    return INSITU_OK;
 }
 
 /* Rank 0's bytes to all; *data is allocated on the others. Collective. */
@@ -135,8 +108,8 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* Copies the caller's text as if it had been read. One that is too long is cut behind the limit, and so refused as too
- * long. */
+/* Copies the caller's text as if it had been read. One that is cut here is longer than a scene may be, and refused as
+ * such. */
 static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);

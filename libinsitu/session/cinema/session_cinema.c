@@ -1,17 +1,25 @@
 #include "session_cinema.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
 #include "text_file.h"
 
-static insitu_status fail(const scene_database *database, const char *file, const char *what, int reason,
-                          base_error *error)
+enum { MOST_BYTES = 1 << 28 }; /* of a table that is continued: some four million pictures */
+
+/* `what`: "read" or "written". */
+static insitu_status fail(const scene_database *database, const char *file, const char *what,
+                          const file_failure *failure, base_error *error)
 {
-    return base_fail(error, reason == ENOMEM ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
-                     "cinema: %.300s/%s: cannot be %s: %s", database->path, file, what, strerror(reason));
+    return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+                     "cinema: %.300s/%s: cannot be %s: %s", database->path, file, what, failure->reason);
+}
+
+static insitu_status fail_memory(const scene_database *database, const char *file, const char *what, base_error *error)
+{
+    const file_failure failure = {.is_memory = true, .reason = "cannot allocate memory"};
+    return fail(database, file, what, &failure, error);
 }
 
 /* The file's name, from base_alloc(); NULL: no memory. */
@@ -120,17 +128,17 @@ static void drop_from(session_table *t, int64_t cycle)
 }
 
 /* Takes over the lines of the folder's table from before this cycle. */
-static insitu_status take_over(session_table *t, const char *old, int64_t cycle, base_error *error)
+static insitu_status take_over(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
-    if (strncmp(old, t->text, t->size) != 0)
+    if (strncmp(old->text, t->text, t->size) != 0)
         return base_fail(error, INSITU_ERROR_IO,
                          "cinema: %.300s/data.csv: exists with other columns, expected \"%.*s\" (move or delete the "
                          "folder to begin anew)",
                          database->path, (int)t->size - 1, t->text);
     table_line line = {t, true};
-    add_bytes(&line, old + t->size, strlen(old) - t->size);
-    if (!line.is_well) return fail(database, "data.csv", "read", ENOMEM, error);
+    add_bytes(&line, old->text + t->size, old->size - t->size);
+    if (!line.is_well) return fail_memory(database, "data.csv", "read", error);
     drop_from(t, cycle);
     return INSITU_OK;
 }
@@ -138,17 +146,20 @@ static insitu_status take_over(session_table *t, const char *old, int64_t cycle,
 static insitu_status begin_table(session_table *t, int64_t cycle, base_error *error)
 {
     table_line line = {t, true};
-    char *old = NULL, *path = file_in(t->database, "data.csv");
+    file_content old;
+    file_failure failure;
+    char *path = file_in(t->database, "data.csv");
     t->size = 0;
     add_header(&line);
     if (!path || !line.is_well) {
         base_free(path);
-        return fail(t->database, "data.csv", "read", ENOMEM, error);
+        return fail_memory(t->database, "data.csv", "read", error);
     }
     insitu_status status = INSITU_OK;
-    if (!text_file_read(path, &old) && errno != ENOENT) status = fail(t->database, "data.csv", "read", errno, error);
-    if (!status && old && *old) status = take_over(t, old, cycle, error);
-    base_free(old);
+    if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
+        status = fail(t->database, "data.csv", "read", &failure, error);
+    if (!status && old.size) status = take_over(t, &old, cycle, error);
+    base_free(old.text);
     base_free(path);
     t->is_begun = !status;
     t->last_cycle = INT64_MIN;
@@ -176,7 +187,7 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
 {
     const scene_database *database = &scene->databases[output->database];
     c_numbers numbers;
-    if (!make_tables(cinema, scene)) return fail(database, "data.csv", "written", ENOMEM, error);
+    if (!make_tables(cinema, scene)) return fail_memory(database, "data.csv", "written", error);
     session_table *t = &cinema->tables[output->database];
     insitu_status status = t->is_begun ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
     if (status) return status;
@@ -184,7 +195,7 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
     char *file = scene_expand(output->path + output->folder_bytes, moment);
     if (!file || !c_numbers_begin(&numbers)) {
         base_free(file);
-        return fail(database, "data.csv", "written", ENOMEM, error);
+        return fail_memory(database, "data.csv", "written", error);
     }
     const size_t before = t->size;
     table_line line = {t, true};
@@ -193,7 +204,7 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
     base_free(file);
     if (!line.is_well) {
         t->size = before;
-        return fail(database, "data.csv", "written", ENOMEM, error);
+        return fail_memory(database, "data.csv", "written", error);
     }
     t->is_open = t->is_changed = true;
     t->last_cycle = moment->cycle;
@@ -201,18 +212,6 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
 }
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
-
-static void write_page(FILE *file, const void *what)
-{
-    (void)what;
-    fwrite(session_cinema_page, 1, session_cinema_page_size, file);
-}
-
-static void write_table(FILE *file, const void *what)
-{
-    const session_table *t = what;
-    fwrite(t->text, 1, t->size, file);
-}
 
 /* Tells whether a byte must be escaped in a script's text. Bytes above 0x7f need not be: the page's scripts are UTF-8.
  */
@@ -246,13 +245,33 @@ static void write_script(FILE *file, const void *what)
     fputs("]);\n", file);
 }
 
-static insitu_status replace(const session_table *t, const char *file, text_writer *write, base_error *error)
+typedef bool table_writer(const session_table *t, const char *path, file_failure *failure);
+
+static bool put_table(const session_table *t, const char *path, file_failure *failure)
 {
-    char *path = file_in(t->database, file);
-    const bool is_written = path && text_file_make_folders(path) && text_file_replace(path, write, t);
-    const int reason = path ? errno : ENOMEM;
+    return file_replace(path, t->text, t->size, failure);
+}
+
+static bool put_script(const session_table *t, const char *path, file_failure *failure)
+{
+    return text_file_replace(path, write_script, t, failure);
+}
+
+/* The page is always the same: it is written once, and where it was taken away. */
+static bool put_page(const session_table *t, const char *path, file_failure *failure)
+{
+    if (t->has_page && file_exists(path)) return true;
+    return file_replace(path, (const char *)session_cinema_page, session_cinema_page_size, failure);
+}
+
+static insitu_status write_file(const session_table *t, const char *name, table_writer *put, base_error *error)
+{
+    file_failure failure;
+    char *path = file_in(t->database, name);
+    if (!path) return fail_memory(t->database, name, "written", error);
+    const bool is_written = put(t, path, &failure);
     base_free(path);
-    return is_written ? INSITU_OK : fail(t->database, file, "written", reason, error);
+    return is_written ? INSITU_OK : fail(t->database, name, "written", &failure, error);
 }
 
 insitu_status session_write_cinema(session_cinema *cinema, base_error *error)
@@ -262,9 +281,9 @@ insitu_status session_write_cinema(session_cinema *cinema, base_error *error)
         base_error own = {.status = INSITU_OK};
         t->is_open = false;
         if (!t->is_changed) continue;
-        insitu_status status = replace(t, "data.csv", write_table, &own);
-        if (!status) status = replace(t, "data.js", write_script, &own);
-        if (!status && !t->has_page) status = replace(t, "index.html", write_page, &own);
+        insitu_status status = write_file(t, "data.csv", put_table, &own);
+        if (!status) status = write_file(t, "data.js", put_script, &own);
+        if (!status) status = write_file(t, "index.html", put_page, &own);
         t->is_changed = status != INSITU_OK;
         t->has_page = t->has_page || !status;
         if (status && !error->status) *error = own;

@@ -1,6 +1,5 @@
 #include "session_run_ranges.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +8,7 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { longest_line = 512 };
+enum { MOST_BYTES = 1 << 20 }; /* of a file of ranges */
 
 /* ---- which layers ---------------------------------------------------------------------------------------------- */
 
@@ -51,11 +50,12 @@ static int count_layers(const scene_image *image)
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
-/* Records an error of the file; reason is an errno. */
-static insitu_status fail(const session_image_ranges *ranges, const char *what, int reason, base_error *error)
+/* `what`: "read" or "written". */
+static insitu_status fail(const session_image_ranges *ranges, const char *what, const file_failure *failure,
+                          base_error *error)
 {
-    return base_fail(error, reason == ENOMEM ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
-                     "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, strerror(reason));
+    return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+                     "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, failure->reason);
 }
 
 static char *file_path(const scene_image *image)
@@ -81,12 +81,11 @@ static void take_line(session_image_ranges *ranges, const session_run_range *lin
     }
 }
 
-static bool read_line(session_image_ranges *ranges, char *text)
+static bool read_line(session_image_ranges *ranges, const char *text)
 {
     char kind[16];
     session_run_range line = {.kind = kind};
     int component, at = 0;
-    text[strcspn(text, "\n")] = '\0';
     if (text[0] == '#' || text[0] == '\0') return true;
     if (sscanf(text, "%15s %d %d %lf %lf %n", kind, &line.number, &component, &line.low, &line.high, &at) < 5)
         return false;
@@ -95,31 +94,40 @@ static bool read_line(session_image_ranges *ranges, char *text)
     return true;
 }
 
-static insitu_status read_lines(session_image_ranges *ranges, FILE *file, base_error *error)
+/* Takes the lines of the text, which is cut into them. */
+static insitu_status read_lines(session_image_ranges *ranges, const file_content *content, base_error *error)
 {
-    char line[longest_line];
-    for (int number = 1; fgets(line, sizeof line, file); number++)
-        if (!read_line(ranges, line))
+    char *line = content->text, *const end = content->text + content->size;
+    for (int number = 1; line < end; number++) {
+        char *stop = memchr(line, '\n', (size_t)(end - line));
+        if (!stop) stop = end; /* where a byte 0 is */
+        *stop = '\0';
+        if (line + strlen(line) != stop || !read_line(ranges, line))
             return base_fail(error, INSITU_ERROR_SCENE,
                              "image \"%s\": %.300s:%d: is no range, expected kind, number, component, low, high and "
                              "field (delete the file to begin anew)",
                              ranges->image, ranges->path, number);
-    return ferror(file) ? fail(ranges, "read", errno, error) : INSITU_OK;
+        line = stop + 1;
+    }
+    return INSITU_OK;
 }
 
 /* Reads the file; finds nothing where there is none. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
     c_numbers numbers;
-    FILE *file = text_file_open(ranges->path);
-    if (!file) return errno == ENOENT ? INSITU_OK : fail(ranges, "read", errno, error);
-    if (!c_numbers_begin(&numbers)) {
-        fclose(file);
-        return fail(ranges, "read", ENOMEM, error);
+    file_content content;
+    file_failure failure;
+    if (!file_read_own(ranges->path, MOST_BYTES, &content, &failure))
+        return failure.is_missing ? INSITU_OK : fail(ranges, "read", &failure, error);
+    insitu_status status = INSITU_OK;
+    if (c_numbers_begin(&numbers)) {
+        status = read_lines(ranges, &content, error);
+        c_numbers_end(&numbers);
+    } else {
+        status = session_no_memory(error, (int64_t)content.size, "ranges of a run");
     }
-    const insitu_status status = read_lines(ranges, file, error);
-    c_numbers_end(&numbers);
-    fclose(file);
+    base_free(content.text);
     return status;
 }
 
@@ -138,7 +146,9 @@ static void write_lines(FILE *file, const void *what)
 insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error *error)
 {
     if (!ranges->is_changed) return INSITU_OK;
-    if (!text_file_replace(ranges->path, write_lines, ranges)) return fail(ranges, "written", errno, error);
+    file_failure failure;
+    if (!text_file_replace(ranges->path, write_lines, ranges, &failure))
+        return fail(ranges, "written", &failure, error);
     ranges->is_changed = false;
     return INSITU_OK;
 }

@@ -1,11 +1,12 @@
 #include "session_statistics_file.h"
 
-#include <errno.h>
 #include <string.h>
 
 #include "memory.h"
 #include "session_agree.h"
 #include "text_file.h"
+
+enum { MOST_BYTES = 1 << 28 }; /* of a file that is continued: some two million lines */
 
 /* The line of column names, without its end: from base_alloc(). NULL: no memory. */
 static char *make_header(int bin_count)
@@ -24,7 +25,7 @@ static char *make_header(int bin_count)
 typedef struct new_lines {
     char *old; /* the lines that stay */
     size_t old_size;
-    const char *header; /* NULL: there is one */
+    const char *header; /* NULL: the file has one */
     int64_t cycle;
     double time;
     const session_statistics *values;
@@ -43,61 +44,62 @@ static void write_line(FILE *file, const new_lines *n)
 static void write_lines(FILE *file, const void *what)
 {
     const new_lines *n = what;
-    if (n->header) fprintf(file, "%s\n", n->header);
+    fprintf(file, "%s\n", n->header);
     if (n->old_size) fwrite(n->old, 1, n->old_size, file);
     write_line(file, n);
 }
 
-static insitu_status fail(const char *path, const char *what, int reason, base_error *error)
+/* `what`: "read" or "written". */
+static insitu_status fail(const char *path, const char *what, const file_failure *failure, base_error *error)
 {
-    return base_fail(error, reason == ENOMEM ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
-                     "statistics: %.300s: cannot be %s: %s", path, what, strerror(reason));
+    return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+                     "statistics: %.300s: cannot be %s: %s", path, what, failure->reason);
 }
 
-/* The session's first line. */
+/* Finds the lines of the file that stay. */
+static insitu_status keep_lines(const char *path, file_content *old, new_lines *lines, base_error *error)
+{
+    const size_t header = strlen(lines->header);
+    if (strncmp(old->text, lines->header, header) != 0 || old->text[header] != '\n')
+        return base_fail(error, INSITU_ERROR_IO,
+                         "statistics: %.300s: exists with other columns, expected \"%.200s\" (move or delete "
+                         "it to begin anew)",
+                         path, lines->header);
+    lines->old = old->text + header + 1;
+    lines->old_size = text_keep_below(lines->old, lines->cycle);
+    return INSITU_OK;
+}
+
+/* The session's first line, or the first after the file was taken away. */
 static insitu_status begin_file(const char *path, new_lines *lines, base_error *error)
 {
-    char *text;
-    const size_t header = strlen(lines->header);
-    if (!text_file_make_folders(path)) return fail(path, "written", errno, error);
-    insitu_status status = INSITU_OK;
-    if (!text_file_read(path, &text) && errno != ENOENT) return fail(path, "read", errno, error);
-    if (text && *text) {
-        if (strncmp(text, lines->header, header) != 0 || text[header] != '\n')
-            status = base_fail(error, INSITU_ERROR_IO,
-                               "statistics: %.300s: exists with other columns, expected \"%.200s\" (move or delete "
-                               "it to begin anew)",
-                               path, lines->header);
-        else
-            lines->old_size = text_keep_below(lines->old = text + header + 1, lines->cycle);
-    }
-    if (!status && !text_file_replace(path, write_lines, lines)) status = fail(path, "written", errno, error);
-    base_free(text);
+    file_content old;
+    file_failure failure;
+    if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
+        return fail(path, "read", &failure, error);
+    insitu_status status = old.size ? keep_lines(path, &old, lines, error) : INSITU_OK;
+    if (!status && !text_file_replace(path, write_lines, lines, &failure))
+        status = fail(path, "written", &failure, error);
+    base_free(old.text);
     return status;
 }
 
-static insitu_status append(const char *path, const new_lines *lines, base_error *error)
+static void write_last(FILE *file, const void *what)
 {
-    c_numbers numbers;
-    FILE *file = fopen(path, "ae");
-    if (!file || !c_numbers_begin(&numbers)) {
-        const int reason = file ? ENOMEM : errno;
-        if (file) fclose(file);
-        return fail(path, "written", reason, error);
-    }
-    write_line(file, lines);
-    const bool is_written = !ferror(file);
-    c_numbers_end(&numbers);
-    return fclose(file) == 0 && is_written ? INSITU_OK : fail(path, "written", errno, error);
+    write_line(file, what);
 }
 
 insitu_status session_write_statistics(const char *path, bool is_first, int64_t cycle, double time,
                                        const session_statistics *values, base_error *error)
 {
+    file_failure failure = {.is_missing = is_first};
+    new_lines lines = {.cycle = cycle, .time = time, .values = values};
+    if (!is_first && text_file_append(path, write_last, &lines, &failure)) return INSITU_OK;
+    if (!failure.is_missing) return fail(path, "written", &failure, error);
     char *header = make_header(values->bin_count);
-    new_lines lines = {.header = header, .cycle = cycle, .time = time, .values = values};
-    if (!header) return fail(path, "written", ENOMEM, error);
-    const insitu_status status = is_first ? begin_file(path, &lines, error) : append(path, &lines, error);
+    if (!header) return session_no_memory(error, 1 << 12, "a line of statistics");
+    lines.header = header;
+    const insitu_status status = begin_file(path, &lines, error);
     base_free(header);
     return status;
 }

@@ -1,0 +1,245 @@
+#define _GNU_SOURCE 1 /* O_PATH */
+#include "file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#include "memory.h"
+
+/* ---- failures -------------------------------------------------------------------------------------------------- */
+
+static bool fail(file_failure *failure, int code)
+{
+    *failure = (file_failure){.is_missing = code == ENOENT, .is_memory = code == ENOMEM};
+    snprintf(failure->reason, sizeof failure->reason, "%s", strerror(code));
+    return false;
+}
+
+static bool fail_kind(file_failure *failure, mode_t mode)
+{
+    const char *kind = "a device";
+    if (S_ISDIR(mode)) kind = "a directory";
+    if (S_ISFIFO(mode)) kind = "a named pipe (FIFO)";
+    if (S_ISSOCK(mode)) kind = "a socket";
+    *failure = (file_failure){.is_missing = false};
+    snprintf(failure->reason, sizeof failure->reason, "it is %s, expected a regular file", kind);
+    return false;
+}
+
+static bool fail_size(file_failure *failure, size_t limit)
+{
+    *failure = (file_failure){.is_missing = false};
+    snprintf(failure->reason, sizeof failure->reason, "it has more than %zu bytes, the most that is read", limit);
+    return false;
+}
+
+/* ---- opening --------------------------------------------------------------------------------------------------- */
+
+/* Asks what is at the path: a failure unless it is a regular file. */
+static bool look(const char *path, int flags, struct stat *stamp, file_failure *failure)
+{
+    const int look_flags = flags & O_NOFOLLOW ? AT_SYMLINK_NOFOLLOW : 0;
+    if (fstatat(AT_FDCWD, path, stamp, look_flags) != 0) return fail(failure, errno);
+    return S_ISREG(stamp->st_mode) || fail_kind(failure, stamp->st_mode);
+}
+
+/* Opens a regular file. What it is is asked before, since opening a device may act on it. O_NONBLOCK and the second
+ * look are for what takes its place in between. Returns the descriptor, -1 on a failure. */
+static int open_regular(const char *path, int flags, struct stat *stamp, file_failure *failure)
+{
+    if (!look(path, flags, stamp, failure)) return -1;
+    const int file = open(path, flags | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0) {
+        fail(failure, errno);
+        return -1;
+    }
+    const bool is_known = fstat(file, stamp) == 0;
+    if (is_known && S_ISREG(stamp->st_mode)) return file;
+    if (is_known)
+        fail_kind(failure, stamp->st_mode);
+    else
+        fail(failure, errno);
+    close(file);
+    return -1;
+}
+
+static bool is_link(const char *path)
+{
+    struct stat found;
+    return lstat(path, &found) == 0 && S_ISLNK(found.st_mode);
+}
+
+bool file_exists(const char *path)
+{
+    return access(path, F_OK) == 0;
+}
+
+/* ---- reading --------------------------------------------------------------------------------------------------- */
+
+/* Reads until the end. The file may grow meanwhile, up to the limit. */
+static bool read_all(int file, size_t limit, file_content *out, file_failure *failure)
+{
+    size_t capacity = (size_t)out->stamp.st_size + 1;
+    while (true) {
+        if (out->size > limit) return fail_size(failure, limit);
+        if (!out->text || out->size == capacity) {
+            if (out->text) capacity += capacity / 2 + 4096;
+            char *more = base_realloc(out->text, capacity + 1);
+            if (!more) return fail(failure, ENOMEM);
+            out->text = more;
+        }
+        const ssize_t count = read(file, out->text + out->size, capacity - out->size);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) return fail(failure, errno);
+        out->text[out->size += (size_t)count] = '\0';
+        if (count == 0) return true;
+    }
+}
+
+bool file_read(const char *path, size_t limit, file_content *out, file_failure *failure)
+{
+    *out = (file_content){0};
+    const int file = open_regular(path, O_RDONLY, &out->stamp, failure);
+    if (file < 0) return false;
+    const bool is_small = (uintmax_t)out->stamp.st_size <= limit;
+    const bool is_read = is_small ? read_all(file, limit, out, failure) : fail_size(failure, limit);
+    close(file);
+    if (is_read) return true;
+    base_free(out->text);
+    out->text = NULL;
+    out->size = 0;
+    return false;
+}
+
+bool file_read_own(const char *path, size_t limit, file_content *out, file_failure *failure)
+{
+    if (file_read(path, limit, out, failure)) return true;
+    failure->is_missing = failure->is_missing || (!S_ISREG(out->stamp.st_mode) && is_link(path));
+    return false;
+}
+
+/* ---- writing --------------------------------------------------------------------------------------------------- */
+
+static bool write_all(int file, const char *bytes, size_t size)
+{
+    while (size) {
+        const ssize_t count = write(file, bytes, size);
+        if (count < 0 && errno == EINTR) continue;
+        if (count == 0) errno = EIO;
+        if (count <= 0) return false;
+        bytes += count;
+        size -= (size_t)count;
+    }
+    return true;
+}
+
+bool file_append(const char *path, const char *bytes, size_t size, file_failure *failure)
+{
+    struct stat before;
+    const int file = open_regular(path, O_WRONLY | O_APPEND | O_NOFOLLOW, &before, failure);
+    if (file < 0) {
+        failure->is_missing = failure->is_missing || is_link(path);
+        return false;
+    }
+    bool is_written = write_all(file, bytes, size);
+    int code = errno;
+    if (!is_written && ftruncate(file, before.st_size) != 0) code = errno;
+    if (close(file) != 0 && is_written) {
+        is_written = false;
+        code = errno;
+    }
+    return is_written || fail(failure, code);
+}
+
+static bool make_folders(char *path)
+{
+    for (char *end = strchr(path + 1, '/'); end; end = strchr(end + 1, '/')) {
+        *end = '\0';
+        const bool is_made = mkdir(path, 0777) == 0 || errno == EEXIST || file_exists(path);
+        *end = '/';
+        if (!is_made) return false;
+    }
+    return true;
+}
+
+/* The folder of the path in the same memory, and the name in it. */
+typedef struct file_place {
+    char *path;
+    const char *name;
+    int folder; /* its descriptor, -1 before it is open */
+} file_place;
+
+/* Refuses what a rename must not replace. */
+static bool check_place(const file_place *place, file_failure *failure)
+{
+    struct stat found;
+    if (*place->name == '\0') return fail_kind(failure, S_IFDIR);
+    if (fstatat(place->folder, place->name, &found, AT_SYMLINK_NOFOLLOW) != 0)
+        return errno == ENOENT || fail(failure, errno);
+    return S_ISREG(found.st_mode) || S_ISLNK(found.st_mode) || fail_kind(failure, found.st_mode);
+}
+
+static bool open_place(const char *path, file_place *place, file_failure *failure)
+{
+    place->folder = -1;
+    place->path = base_strdup(path);
+    if (!place->path) return fail(failure, ENOMEM);
+    char *slash = strrchr(place->path, '/');
+    place->name = slash ? slash + 1 : place->path;
+    if (slash && !make_folders(place->path)) return fail(failure, errno);
+    if (slash) *slash = '\0';
+    const char *folder = !slash ? "." : slash == place->path ? "/" : place->path;
+    place->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
+    return (place->folder >= 0 || fail(failure, errno)) && check_place(place, failure);
+}
+
+enum { TEMPORARY_NAME = 40, TRIES = 8 };
+
+/* Writes to a new file of this name and moves it to its place. */
+static bool try_to_replace(const file_place *place, const char *temporary, const char *bytes, size_t size)
+{
+    const int file = openat(place->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    if (file < 0) return false;
+    /* The lock keeps pictures' writers from taking the file for one that a killed run left. */
+    flock(file, LOCK_EX | LOCK_NB);
+    bool is_written = write_all(file, bytes, size);
+    int code = errno;
+    if (close(file) != 0 && is_written) {
+        is_written = false;
+        code = errno;
+    }
+    if (is_written && renameat(place->folder, temporary, place->folder, place->name) == 0) return true;
+    if (is_written) code = errno;
+    unlinkat(place->folder, temporary, 0);
+    errno = code;
+    return false;
+}
+
+/* Tries again where another process has taken the temporary file for one that a killed run left. */
+static bool replace(const file_place *place, const char *bytes, size_t size, file_failure *failure)
+{
+    for (int i = 0; i < TRIES; i++) {
+        uint64_t random;
+        char temporary[TEMPORARY_NAME];
+        if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) return fail(failure, errno);
+        snprintf(temporary, sizeof temporary, ".insitu-%016llx.part", (unsigned long long)random);
+        if (try_to_replace(place, temporary, bytes, size)) return true;
+        if (errno != ENOENT && errno != EEXIST) break;
+    }
+    return fail(failure, errno);
+}
+
+bool file_replace(const char *path, const char *bytes, size_t size, file_failure *failure)
+{
+    file_place place;
+    const bool is_replaced = open_place(path, &place, failure) && replace(&place, bytes, size, failure);
+    if (place.folder >= 0) close(place.folder);
+    base_free(place.path);
+    return is_replaced;
+}

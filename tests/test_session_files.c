@@ -1,0 +1,344 @@
+/* Files that the library reads, continues and replaces, where something else has been put in their place: pipes,
+ * devices, folders, sockets, links and huge files, before the first step or between two; and folders that are missing,
+ * are taken away or cannot be made. No call waits, every failure names the file and the reason on all ranks, links are
+ * replaced as pictures replace them, and a step is well again when the thing is gone. */
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, MOST = 1 << 14, SECONDS = 20 };
+
+static session_input input;
+
+/* ---- a limit of time ------------------------------------------------------------------------------------------- */
+
+static char under_way[200];
+
+static void stop_late(int signal_number)
+{
+    static const char words[] = " took longer than 20 s\n";
+    (void)signal_number;
+    if (write(2, under_way, strlen(under_way)) > 0 && write(2, words, sizeof words - 1) > 0) _exit(1);
+    _exit(1);
+}
+
+static void begin(const char *what, const char *plant, const char *when)
+{
+    snprintf(under_way, sizeof under_way, "%s, %s, %s", what, plant, when);
+    signal(SIGALRM, stop_late);
+    alarm(SECONDS);
+}
+
+/* ---- what is put in a file's place ----------------------------------------------------------------------------- */
+
+typedef enum plant {
+    PIPE,
+    FOLDER,
+    SOCKET,
+    HUGE_FILE,
+    LINK_TO_DEVICE,
+    LINK_TO_PIPE,
+    LINK_TO_ITSELF,
+    DANGLING_LINK,
+    LINK_TO_FILE,
+    PLANT_COUNT
+} plant;
+
+static const char *const plant_names[] = {"pipe",           "folder",         "socket",
+                                          "huge file",      "link to device", "link to pipe",
+                                          "link to itself", "dangling link",  "link to file"};
+
+static void put_socket(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int file = socket(AF_UNIX, SOCK_STREAM, 0);
+    snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
+    assert_true(file >= 0 && bind(file, (const struct sockaddr *)&address, sizeof address) == 0);
+    close(file);
+}
+
+/* The file itself, if there is one, is kept as "victim", which a link may lead to. Rank 0. */
+static void put_plant(plant p, const char *path)
+{
+    unlink("victim");
+    if (rename(path, "victim") != 0) assert_int_equal(access(path, F_OK), -1);
+    char victim[600];
+    const char *slash = strrchr(path, '/');
+    assert_non_null(getcwd(victim, 500));
+    strcat(victim, "/victim");
+    unlink("pipe");
+    switch (p) {
+    case PIPE: assert_int_equal(mkfifo(path, 0600), 0); break;
+    case FOLDER: assert_int_equal(mkdir(path, 0700), 0); break;
+    case SOCKET: put_socket(path); break;
+    case HUGE_FILE: {
+        const int file = open(path, O_WRONLY | O_CREAT, 0600);
+        assert_true(file >= 0 && ftruncate(file, (off_t)3 << 30) == 0 && close(file) == 0);
+        break;
+    }
+    case LINK_TO_DEVICE: assert_int_equal(symlink("/dev/zero", path), 0); break;
+    case LINK_TO_PIPE:
+        assert_true(mkfifo("pipe", 0600) == 0 && getcwd(victim, 500));
+        assert_int_equal(symlink(strcat(victim, "/pipe"), path), 0);
+        break;
+    case LINK_TO_ITSELF: assert_int_equal(symlink(slash ? slash + 1 : path, path), 0); break;
+    case DANGLING_LINK: assert_int_equal(symlink("nowhere", path), 0); break;
+    default: assert_int_equal(symlink(victim, path), 0);
+    }
+}
+
+static void remove_plant(const char *path)
+{
+    if (unlink(path) != 0) rmdir(path);
+}
+
+/* Removes whatever has this name, if anything. */
+static void forget(const char *name)
+{
+    char command[100];
+    snprintf(command, sizeof command, "rm -rf %s", name);
+    if (own_rank == 0) assert_int_equal(system(command), 0);
+    MPI_Barrier(MPI_COMM_WORLD);
+}
+
+/* ---- files that a user names ----------------------------------------------------------------------------------- */
+
+#define IMAGE "images:\n  - name: a\n    size: [8, 6]\n    layers: [{%s}]\n    outputs: [{%s}]\n"
+#define SURFACE "isosurface: {field: f, values: [0.1]}"
+
+static const char *const refusals[] = {"is a named pipe (FIFO)", "is a directory", "is a socket",
+                                       "has more than",          "is a device",    "is a named pipe (FIFO)",
+                                       "Too many levels",        "No such file",   NULL};
+
+static void check_read(const char *what, const char *path)
+{
+    for (plant p = 0; p < PLANT_COUNT; p++) {
+        insitu_session *session = NULL;
+        begin(what, plant_names[p], "at the beginning");
+        if (own_rank == 0) put_plant(p, path);
+        const insitu_status status = insitu_create(MPI_COMM_WORLD, "scene.yaml", &session);
+        if (refusals[p])
+            told_everywhere(NULL, status, INSITU_ERROR_SCENE, path, refusals[p]);
+        else
+            everywhere(status == INSITU_OK);
+        insitu_destroy(&session);
+        if (own_rank == 0) remove_plant(path), assert_int_equal(rename("victim", path), 0);
+    }
+}
+
+static void scenes_are_regular_files(void **state)
+{
+    (void)state;
+    char text[512];
+    snprintf(text, sizeof text, IMAGE, SURFACE, "path: a.png");
+    put_file("scene.yaml", text);
+    check_read("scene", "scene.yaml");
+}
+
+static void colour_maps_are_regular_files(void **state)
+{
+    (void)state;
+    char text[512];
+    snprintf(text, sizeof text, IMAGE, "slice: {field: f, planes: [{normal: [0, 0, 1]}], map: {file: map.json}}",
+             "path: a.png");
+    put_file("scene.yaml", text);
+    put_file("map.json", "[{\"Name\": \"m\", \"RGBPoints\": [0, 0, 0, 0, 1, 1, 1, 1]}]");
+    check_read("colour map", "map.json");
+}
+
+/* ---- files that the library writes ----------------------------------------------------------------------------- */
+
+/* Kinds of files that are read again or appended to. */
+typedef struct own_file {
+    const char *name, *path, *header;
+    char scene[512];
+    bool is_appended; /* else it is replaced at each step */
+} own_file;
+
+enum { OWN_COUNT = 3 };
+
+static own_file own_files[OWN_COUNT] = {
+    {.name = "statistics", .path = "own.cdb/s.csv", .header = "cycle,time,cells", .is_appended = true},
+    {.name = "ranges", .path = "own.cdb/a.ranges", .header = "# The widest"},
+    {.name = "table", .path = "own.cdb/data.csv", .header = "cycle,time,FILE"}};
+
+static void name_scenes(const char *folder)
+{
+    const char *ranges = "surface: {colour_by: {field: f, range: run}}";
+    char output[200];
+    snprintf(own_files[0].scene, 512, IMAGE "statistics: [{field: f, path: %s/s.csv}]\n", SURFACE, "path: a.png",
+             folder);
+    snprintf(output, sizeof output, "path: %s/a.png", folder);
+    snprintf(own_files[1].scene, 512, IMAGE, ranges, output);
+    snprintf(output, sizeof output, "cinema: %s", folder);
+    snprintf(own_files[2].scene, 512, IMAGE, SURFACE, output);
+}
+
+/* A step whose values are larger than the last one's, so that ranges widen. */
+static insitu_status step(insitu_session *session, int cycle)
+{
+    input_renew(&input);
+    for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] *= 1 + cycle;
+    forget_pictures();
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    return insitu_step(session, cycle, cycle);
+}
+
+/* The file is a regular one with whole lines. */
+static void assert_written(const own_file *file)
+{
+    char text[MOST];
+    struct stat found;
+    everywhere(own_rank != 0 || (lstat(file->path, &found) == 0 && S_ISREG(found.st_mode)));
+    read_file(file->path, MOST, text);
+    everywhere(own_rank != 0 || strncmp(text, file->header, strlen(file->header)) == 0);
+    everywhere(own_rank != 0 || (strchr(text, '\n')[1] && text[strlen(text) - 1] == '\n'));
+}
+
+/* A pipe, a folder and a socket are refused, at whichever step; a huge file where it is to be read. Links are replaced
+ * at the next writing. */
+static const char *refusal_of(const own_file *file, plant p, bool is_later)
+{
+    if (p == HUGE_FILE) return is_later ? NULL : "has more than";
+    (void)file;
+    return p < HUGE_FILE ? (p == FOLDER ? "directory" : refusals[p]) : NULL;
+}
+
+static void plant_in_run(const own_file *file, plant p, bool is_later)
+{
+    static char before[MOST], after[MOST];
+    begin(file->name, plant_names[p], is_later ? "between two steps" : "before the first step");
+    forget("own.cdb");
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(file->scene));
+    everywhere(step(session, 0) == INSITU_OK);
+    if (!is_later) insitu_destroy(&session);
+    if (own_rank == 0) put_plant(p, file->path);
+    MPI_Barrier(MPI_COMM_WORLD);
+    if (!is_later) session = open_session(MPI_COMM_WORLD, write_scene(file->scene));
+    read_file("victim", MOST, before);
+    const char *refusal = refusal_of(file, p, is_later);
+    insitu_status status = step(session, 1);
+    if (refusal) {
+        told_everywhere(session, status, INSITU_ERROR_IO, file->path, refusal);
+        if (own_rank == 0) remove_plant(file->path);
+        MPI_Barrier(MPI_COMM_WORLD);
+        status = step(session, 2);
+    }
+    if (status) fprintf(stderr, "%s: %s\n", under_way, insitu_error(session));
+    everywhere(status == INSITU_OK);
+    if (p != HUGE_FILE || !file->is_appended || !is_later) assert_written(file);
+    read_file("victim", MOST, after);
+    everywhere(strcmp(before, after) == 0 && (own_rank != 0 || access("own.cdb/nowhere", F_OK) != 0));
+    read_file(file->path, MOST, after); /* lines of a linked file are continued */
+    const bool has_first = strstr(after, "\n0,0,") != NULL;
+    everywhere(own_rank != 0 || p != LINK_TO_FILE || file == &own_files[1] || has_first);
+    insitu_destroy(&session);
+}
+
+static void plants_are_refused_or_replaced(void **state)
+{
+    (void)state;
+    name_scenes("own.cdb");
+    for (int i = 0; i < OWN_COUNT; i++)
+        for (plant p = 0; p < PLANT_COUNT; p++)
+            for (int is_later = 0; is_later < 2; is_later++) plant_in_run(&own_files[i], p, is_later);
+}
+
+/* A link to the ranges of another run is read before it is replaced. */
+static void linked_ranges_are_read(void **state)
+{
+    (void)state;
+    char text[MOST];
+    name_scenes("own.cdb");
+    begin("ranges", "link to file", "of another run");
+    forget("own.cdb");
+    if (own_rank == 0) {
+        assert_int_equal(mkdir("own.cdb", 0700), 0);
+        put_plant(LINK_TO_FILE, own_files[1].path);
+    }
+    put_file("victim", "surface 0 -2 -100 0.5 f\n");
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[1].scene));
+    everywhere(step(session, 0) == INSITU_OK);
+    assert_written(&own_files[1]);
+    read_file(own_files[1].path, MOST, text);
+    everywhere(own_rank != 0 || strstr(text, " -100 "));
+    read_file("victim", MOST, text);
+    everywhere(own_rank != 0 || strcmp(text, "surface 0 -2 -100 0.5 f\n") == 0);
+    insitu_destroy(&session);
+}
+
+/* ---- folders --------------------------------------------------------------------------------------------------- */
+
+static void missing_folders_are_made(void **state)
+{
+    (void)state;
+    name_scenes("own.cdb");
+    for (int i = 0; i < OWN_COUNT; i++) {
+        begin(own_files[i].name, "no folder", "at every step");
+        forget("own.cdb");
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
+        for (int cycle = 0; cycle < 3; cycle++) {
+            forget("own.cdb");
+            const insitu_status status = step(session, cycle);
+            if (status) fprintf(stderr, "%s: %s\n", under_way, insitu_error(session));
+            everywhere(status == INSITU_OK);
+            assert_written(&own_files[i]);
+            everywhere(own_rank != 0 || i != 2 || access("own.cdb/index.html", F_OK) == 0);
+        }
+        insitu_destroy(&session);
+    }
+}
+
+/* Nothing can be made in a regular file; in a folder without the right to write, by users who need it. */
+static void folders_that_cannot_be_made_are_told(void **state)
+{
+    (void)state;
+    struct folder {
+        const char *name, *reason;
+    } folders[] = {{"blocked/in.cdb", "Not a directory"},
+                   {"/proc/in.cdb", "No such file"},
+                   {"closed/in.cdb", "Permission denied"}};
+    put_file("blocked", "a file");
+    if (own_rank == 0) rmdir("closed/in.cdb"), rmdir("closed"), mkdir("closed", 0500);
+    for (int f = 0; f < (geteuid() ? 3 : 2); f++)
+        for (int i = 0; i < OWN_COUNT; i++) {
+            begin(own_files[i].name, folders[f].name, folders[f].reason);
+            name_scenes(folders[f].name);
+            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
+            for (int cycle = 0; cycle < 2; cycle++)
+                told_everywhere(session, step(session, cycle), INSITU_ERROR_IO, folders[f].name,
+                                strrchr(own_files[i].path, '/'), folders[f].reason);
+            insitu_destroy(&session);
+        }
+}
+
+static const char *work_folder = ".";
+
+static int run(void)
+{
+    if (!enter_folder(work_folder, "files")) return 1;
+    forget("scene.yaml map.json own.cdb pipe victim blocked"); /* which an interrupted test leaves */
+    input_create(&input, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scenes_are_regular_files),       cmocka_unit_test(colour_maps_are_regular_files),
+        cmocka_unit_test(plants_are_refused_or_replaced), cmocka_unit_test(linked_ranges_are_read),
+        cmocka_unit_test(missing_folders_are_made),       cmocka_unit_test(folders_that_cannot_be_made_are_told),
+    };
+    const int failures = cmocka_run_group_tests(tests, NULL, NULL);
+    input_free(&input);
+    return failures;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) work_folder = argv[1];
+    return run_session_tests(argc, argv, run);
+}
