@@ -53,6 +53,8 @@ set_tests_properties(session_cores_bound_by_openmp PROPERTIES ENVIRONMENT "${INS
 
 insitu_session_program(test_session_collectives)
 insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_session_program(test_session_many)
+insitu_add_mpi_test(session_many test_session_many 1 2 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_turns)
 insitu_add_mpi_test(session_turns test_session_turns 1 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_add_long_test(session_turns_np8_whole ${CMAKE_COMMAND} -E env INSITU_TEST_WHOLE=1

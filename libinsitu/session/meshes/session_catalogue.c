@@ -75,19 +75,58 @@ void session_catalogue_free(session_catalogue *catalogue)
     *catalogue = (session_catalogue){0};
 }
 
-static session_catalogue_mesh *add_mesh(session_catalogue *catalogue, const char *name)
+static int by_text(const void *a, const void *b)
 {
-    for (int i = 0; i < catalogue->mesh_count; i++)
-        if (strcmp(catalogue->meshes[i].name, name) == 0) return &catalogue->meshes[i];
-    session_catalogue_mesh *meshes =
-        base_realloc(catalogue->meshes, (size_t)(catalogue->mesh_count + 1) * sizeof *meshes);
-    if (!meshes) return NULL;
-    catalogue->meshes = meshes;
-    session_catalogue_mesh *mesh = &meshes[catalogue->mesh_count];
-    *mesh = (session_catalogue_mesh){.name = base_strdup(name), .has_ids = true, .first_rank = -1};
-    if (!mesh->name) return NULL;
-    catalogue->mesh_count++;
-    return mesh;
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+static int by_mesh_name(const void *a, const void *b)
+{
+    return strcmp(((const session_catalogue_mesh *)a)->name, ((const session_catalogue_mesh *)b)->name);
+}
+
+static session_catalogue_mesh *find_mesh(const session_catalogue *catalogue, const char *name)
+{
+    const session_catalogue_mesh key = {.name = (char *)(uintptr_t)name};
+    return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, by_mesh_name);
+}
+
+/* Stores the names of the meshes in the text, if names is not NULL. Returns how many there are. */
+static size_t list_names(const char *text, size_t size, const char **names)
+{
+    size_t count = 0;
+    for (const char *line = text; line < text + size; line += strlen(line) + 1) {
+        if (line[0] != 'm') continue;
+        char *end = NULL;
+        strtol(line + 1, &end, 10);
+        strtol(end, &end, 10);
+        if (names) names[count] = end + 1;
+        count++;
+    }
+    return count;
+}
+
+/* Makes the catalogue's meshes, by name, of the tables of all ranks. */
+static bool add_meshes(session_catalogue *catalogue, const char *text, size_t size)
+{
+    const size_t count = list_names(text, size, NULL);
+    if (!count) return true;
+    const char **names = base_alloc(count * sizeof *names);
+    catalogue->meshes = base_calloc(count, sizeof *catalogue->meshes);
+    bool has_memory = names && catalogue->meshes;
+    if (has_memory) {
+        list_names(text, size, names);
+        qsort(names, count, sizeof *names, by_text);
+    }
+    for (size_t i = 0; i < count && has_memory; i++) {
+        if (i > 0 && strcmp(names[i], names[i - 1]) == 0) continue;
+        session_catalogue_mesh *mesh = &catalogue->meshes[catalogue->mesh_count];
+        *mesh = (session_catalogue_mesh){.name = base_strdup(names[i]), .has_ids = true, .first_rank = -1};
+        has_memory = mesh->name != NULL;
+        catalogue->mesh_count += has_memory;
+    }
+    base_free(names);
+    return has_memory;
 }
 
 static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const char *name)
@@ -144,8 +183,7 @@ static bool take_table(session_catalogue *catalogue, const char *text, size_t si
         const char *name = end + 1;
         if (line[0] == 'm') {
             close_mesh(mesh, has_cells, has_ids, rank);
-            mesh = add_mesh(catalogue, name);
-            if (!mesh) return false;
+            mesh = find_mesh(catalogue, name);
             has_cells = a != 0;
             has_ids = b != 0;
         } else if (!take_field(mesh, has_cells, rank, (int)a, (insitu_centring)b, name)) {
@@ -163,20 +201,13 @@ const session_catalogue_field *session_catalogue_find(const session_catalogue_me
     return NULL;
 }
 
-static int by_mesh_name(const void *a, const void *b)
-{
-    return strcmp(((const session_catalogue_mesh *)a)->name, ((const session_catalogue_mesh *)b)->name);
-}
-
 static int by_field_name(const void *a, const void *b)
 {
     return strcmp(((const session_catalogue_field *)a)->name, ((const session_catalogue_field *)b)->name);
 }
 
-static void sort_catalogue(session_catalogue *catalogue)
+static void sort_fields(const session_catalogue *catalogue)
 {
-    if (catalogue->mesh_count == 0) return;
-    qsort(catalogue->meshes, (size_t)catalogue->mesh_count, sizeof *catalogue->meshes, by_mesh_name);
     for (int i = 0; i < catalogue->mesh_count; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         if (mesh->field_count) qsort(mesh->fields, (size_t)mesh->field_count, sizeof *mesh->fields, by_field_name);
@@ -246,6 +277,7 @@ static insitu_status gather_tables(const session_meshes *meshes, const session_t
 
 static bool take_tables(int ranks, const gathered_tables *tables, session_catalogue *out)
 {
+    if (!add_meshes(out, tables->all, (size_t)tables->total)) return false;
     for (int rank = 0; rank < ranks; rank++)
         if (!take_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank)) return false;
     return true;
@@ -259,7 +291,8 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     insitu_status status = INSITU_OK;
     if (is_shared) {
         int size = 0;
-        if (write_mine(meshes, &tables, &size, error) == INSITU_OK && !take_table(&found, tables.mine, (size_t)size, 0))
+        if (write_mine(meshes, &tables, &size, error) == INSITU_OK &&
+            !(add_meshes(&found, tables.mine, (size_t)size) && take_table(&found, tables.mine, (size_t)size, 0)))
             session_no_memory(error, size, "the catalogue of meshes and fields");
     } else {
         status = gather_tables(meshes, team, &tables, error);
@@ -272,7 +305,7 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
         session_catalogue_free(&found);
         return status;
     }
-    sort_catalogue(&found);
+    sort_fields(&found);
     session_catalogue_free(catalogue);
     *catalogue = found;
     meshes->are_names_changed = false;

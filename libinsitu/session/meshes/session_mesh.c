@@ -154,35 +154,27 @@ void session_drop_outers(session_mesh *mesh, bool are_cells_new)
     mesh->outer_count = 0;
 }
 
-int session_part_slots(const session_meshes *meshes)
+bool session_next_part(session_part_walk *walk)
 {
-    int slots = meshes->count;
-    for (int i = 0; i < meshes->count; i++) slots += meshes->items[i]->outer_count;
-    return slots;
-}
-
-session_mesh *session_part_of(const session_meshes *meshes, int slot, session_mesh **whole, session_outer **outer)
-{
-    *whole = NULL;
-    *outer = NULL;
-    if (slot < meshes->count) return meshes->items[slot];
-    slot -= meshes->count;
-    for (int i = 0; i < meshes->count; i++) {
-        *whole = meshes->items[i];
-        if (slot < (*whole)->outer_count) {
-            *outer = (*whole)->outers[slot];
-            return (*outer)->mesh;
-        }
-        slot -= (*whole)->outer_count;
+    const session_meshes *meshes = walk->meshes;
+    walk->whole = NULL;
+    walk->outer = NULL;
+    if (walk->mesh_at < meshes->count) {
+        walk->part = meshes->items[walk->mesh_at++];
+        return true;
     }
-    return NULL;
-}
-
-session_mesh *session_part(const session_meshes *meshes, int slot)
-{
-    session_mesh *whole;
-    session_outer *outer;
-    return session_part_of(meshes, slot, &whole, &outer);
+    for (; walk->whole_at < meshes->count; walk->whole_at++, walk->outer_at = 0) {
+        session_mesh *whole = meshes->items[walk->whole_at];
+        while (walk->outer_at < whole->outer_count) {
+            session_outer *outer = whole->outers[walk->outer_at++];
+            if (!outer->mesh) continue;
+            walk->part = outer->mesh;
+            walk->whole = whole;
+            walk->outer = outer;
+            return true;
+        }
+    }
+    return false;
 }
 
 void session_drop_contents(session_mesh *mesh)
@@ -208,9 +200,15 @@ static void free_mesh(session_mesh *mesh)
 /* Where name stands, or would stand, among the meshes. */
 static int mesh_position(const session_meshes *meshes, const char *name)
 {
-    int at = 0;
-    while (at < meshes->count && strcmp(meshes->items[at]->name, name) < 0) at++;
-    return at;
+    int low = 0, high = meshes->count;
+    while (low < high) {
+        const int middle = low + (high - low) / 2;
+        if (strcmp(meshes->items[middle]->name, name) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
 }
 
 session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
@@ -219,24 +217,32 @@ session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
     return at < meshes->count && strcmp(meshes->items[at]->name, name) == 0 ? meshes->items[at] : NULL;
 }
 
+/* Makes room for one more mesh. */
+static bool make_room(session_meshes *meshes)
+{
+    if (meshes->count < meshes->capacity) return true;
+    const int capacity = meshes->capacity ? 2 * meshes->capacity : 8;
+    session_mesh **items = base_realloc(meshes->items, (size_t)capacity * sizeof *items);
+    if (!items) return false;
+    meshes->items = items;
+    meshes->capacity = capacity;
+    return true;
+}
+
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error)
 {
     session_mesh *mesh = base_calloc(1, sizeof *mesh);
-    session_mesh **items = base_alloc((size_t)(meshes->count + 1) * sizeof *items);
     if (mesh) mesh->name = base_strdup(name);
-    if (!mesh || !mesh->name || !items) goto fail;
+    if (!mesh || !mesh->name || !make_room(meshes)) {
+        session_no_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
+        free_mesh(mesh);
+        return NULL;
+    }
     const int at = mesh_position(meshes, name);
-    for (int i = 0; i < meshes->count; i++) items[i + (i >= at)] = meshes->items[i];
-    items[at] = mesh;
-    base_free(meshes->items);
-    meshes->items = items;
+    memmove(meshes->items + at + 1, meshes->items + at, (size_t)(meshes->count - at) * sizeof *meshes->items);
+    meshes->items[at] = mesh;
     meshes->count++;
     return mesh;
-fail:
-    session_no_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
-    base_free(items);
-    free_mesh(mesh);
-    return NULL;
 }
 
 void session_remove_mesh(session_meshes *meshes, const char *name)

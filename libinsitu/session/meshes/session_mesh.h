@@ -169,7 +169,7 @@ typedef struct session_mesh {
 
 /* All meshes of this rank. */
 typedef struct session_meshes {
-    int count;
+    int count, capacity;
     session_mesh **items;   /* by name */
     bool are_cells_changed; /* or coordinates, since the last agreed extent */
     bool are_names_changed; /* since the last agreed catalogue */
@@ -235,11 +235,20 @@ void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
-/* Slots of meshes that may become parts of a picture: the meshes, then the meshes of their outer faces, some NULL. */
-int session_part_slots(const session_meshes *meshes);
-/* whole: set to the mesh whose outer faces they are, NULL where it is a mesh itself. */
-session_mesh *session_part_of(const session_meshes *meshes, int slot, session_mesh **whole, session_outer **outer);
-session_mesh *session_part(const session_meshes *meshes, int slot);
+/* Visits the meshes that may become parts of a picture: the caller's meshes, then the meshes of their outer faces.
+ *
+ *     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) use(walk.part);
+ */
+typedef struct session_part_walk {
+    const session_meshes *meshes;
+    session_mesh *part;
+    session_mesh *whole;  /* the mesh whose outer faces the part is made of; NULL: the part is a mesh itself */
+    session_outer *outer; /* these faces; NULL likewise */
+    int mesh_at, whole_at, outer_at;
+} session_part_walk;
+
+/* Returns false after the last part. */
+bool session_next_part(session_part_walk *walk);
 
 /* The number of vertices that scalars have values at. */
 static inline int64_t session_vertex_count(const session_mesh *mesh)

@@ -96,8 +96,7 @@ insitu_status session_update_space(session_space *space, session_meshes *meshes,
     space->has_extent = true;
     if (!still_fits(space)) {
         choose_origin(space);
-        for (int i = 0; i < session_part_slots(meshes); i++)
-            if (session_part(meshes, i)) session_drop_tree(session_part(meshes, i));
+        for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) session_drop_tree(walk.part);
     }
     meshes->are_cells_changed = false;
     return INSITU_OK;

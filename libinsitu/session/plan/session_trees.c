@@ -222,9 +222,9 @@ static uint64_t parts_key(const session_meshes *meshes, int *count)
 {
     uint64_t key = 0;
     *count = 0;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        const session_mesh *mesh = session_part(meshes, i);
-        if (!mesh || !mesh->is_needed || mesh->tree.node_count == 0) continue;
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        const session_mesh *mesh = walk.part;
+        if (!mesh->is_needed || mesh->tree.node_count == 0) continue;
         key = (key ^ (uint64_t)(uintptr_t)mesh) * 0x100000001b3u;
         (*count)++;
     }
@@ -235,9 +235,9 @@ static uint64_t parts_key(const session_meshes *meshes, int *count)
 static void fill_boxes(const session_meshes *meshes, float *boxes, int count)
 {
     int part = 0;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        const session_mesh *mesh = session_part(meshes, i);
-        if (!mesh || !mesh->is_needed || mesh->tree.node_count == 0) continue;
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        const session_mesh *mesh = walk.part;
+        if (!mesh->is_needed || mesh->tree.node_count == 0) continue;
         float lower[4], upper[4];
         mmbvh_node_box(&mesh->tree, 0, lower, upper);
         for (int axis = 0; axis < 3; axis++) {
@@ -353,9 +353,9 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
 
 static insitu_status update_all(const tree_update *u, const session_meshes *meshes, base_error *error)
 {
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        session_mesh *mesh = session_part(meshes, i);
-        if (!mesh || !mesh->is_needed) continue;
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        session_mesh *mesh = walk.part;
+        if (!mesh->is_needed) continue;
         const insitu_status status = update_tree(u, mesh, error);
         if (status) return status;
     }

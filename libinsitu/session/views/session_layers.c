@@ -29,7 +29,7 @@ static int count_surfaces(const scene_image *image)
 static bool allocate_layers(const session_meshes *meshes, const scene_image *image, session_layers *out)
 {
     const size_t surfaces = (size_t)count_surfaces(image), volumes = (size_t)image->volume_count;
-    for (int i = 0; i < session_part_slots(meshes); i++) out->part_count += is_part(session_part(meshes, i));
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) out->part_count += is_part(walk.part);
     const size_t fields = (size_t)out->part_count * (2 * surfaces + volumes);
     out->surface_count = (int)surfaces;
     out->parts = base_calloc((size_t)out->part_count, sizeof *out->parts);
@@ -66,12 +66,10 @@ void session_layers_free(session_layers *layers)
 static void fill_parts(const session_meshes *meshes, session_layers *layers)
 {
     int part = 0;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        session_mesh *whole;
-        session_outer *outer;
-        const session_mesh *mesh = session_part_of(meshes, i, &whole, &outer);
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        const session_mesh *mesh = walk.part;
         if (is_part(mesh))
-            layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree, outer ? outer->loops : NULL};
+            layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree, walk.outer ? walk.outer->loops : NULL};
     }
 }
 
@@ -99,8 +97,8 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
     ptrdiff_t at = first;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        const session_mesh *mesh = session_part(meshes, i);
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        const session_mesh *mesh = walk.part;
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar && plane) scalar = session_find_distance(mesh, plane);
@@ -115,8 +113,8 @@ static const render_vertex_gradients *place_gradients(const session_meshes *mesh
 {
     render_vertex_gradients *const out = layers->gradients + (ptrdiff_t)index * layers->part_count;
     int at = 0;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        const session_mesh *mesh = session_part(meshes, i);
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        const session_mesh *mesh = walk.part;
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar) out[at] = (render_vertex_gradients){scalar->gradient_entries, (const float(*)[3])scalar->gradients};
@@ -182,13 +180,11 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Tells whether the layer shows the slot's faces. If so, whole is set to the mesh that has them. */
-static bool is_shown(const session_meshes *meshes, int slot, const scene_surface *layer, session_mesh **whole,
-                     session_outer **outer)
+/* Returns whether the layer shows the outer faces that the part is made of. */
+static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
-    session_part_of(meshes, slot, whole, outer);
-    return *outer && scene_field_is_on(&layer->on, (*whole)->name) &&
-           session_find_outer(*whole, &layer->threshold) == *outer;
+    return walk->outer && scene_field_is_on(&layer->on, walk->whole->name) &&
+           session_find_outer(walk->whole, &layer->threshold) == walk->outer;
 }
 
 static render_field place_faces(const session_meshes *meshes, session_layers *layers, int slot,
@@ -196,13 +192,11 @@ static render_field place_faces(const session_meshes *meshes, session_layers *la
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     ptrdiff_t at = first;
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        session_mesh *whole;
-        session_outer *outer;
-        const session_mesh *mesh = session_part(meshes, i);
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        const session_mesh *mesh = walk.part;
         if (!is_part(mesh)) continue;
         layers->fields[at] = absent_field();
-        if (is_shown(meshes, i, layer, &whole, &outer)) {
+        if (is_shown(&walk, layer)) {
             layers->fields[at] = session_scalar_field(mesh, &mesh->scalars[0]);
             layers->ranges[at] = session_scalar_ranges(mesh, &mesh->scalars[0]);
         }
@@ -229,14 +223,12 @@ static bool place_gathered(const session_meshes *meshes, session_layers *layers,
 {
     ptrdiff_t at = (ptrdiff_t)slot * layers->part_count;
     *out = (render_field){layers->fields + at, layers->ranges + at};
-    for (int i = 0; i < session_part_slots(meshes); i++) {
-        session_mesh *whole;
-        session_outer *outer;
-        if (!is_part(session_part(meshes, i))) continue;
-        const bool is_layer_s = is_shown(meshes, i, layer, &whole, &outer);
-        const session_scalar *scalar = is_layer_s ? session_find_scalar(whole, &layer->colour_by) : NULL;
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        if (!is_part(walk.part)) continue;
+        const session_scalar *scalar =
+            is_shown(&walk, layer) ? session_find_scalar(walk.whole, &layer->colour_by) : NULL;
         layers->fields[at] = absent_field();
-        if (scalar && !gather(whole, outer, scalar, &layers->gathered[at], &layers->fields[at])) return false;
+        if (scalar && !gather(walk.whole, walk.outer, scalar, &layers->gathered[at], &layers->fields[at])) return false;
         at++;
     }
     return true;

@@ -1,0 +1,134 @@
+/* Thousands of meshes on a rank, of one hex each: what a step costs grows as their number does. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "test_session_fixture.h"
+
+enum { FEW = 1000, MANY = 8000, STEPS = 4, CORNERS = 8 };
+
+static const char *scene_text = "images:\n"
+                                "  - name: many\n"
+                                "    size: [64, 64]\n"
+                                "    layers:\n"
+                                "      - isosurface: {field: f, values: [0.5]}\n"
+                                "      - surface: {colour: [1, 1, 1]}\n"
+                                "    outputs: [{path: \"many.png\"}]\n";
+
+/* Cubes in a row along x, and f = x / count. */
+typedef struct row_of_cubes {
+    int count;
+    double (*coordinates)[CORNERS][3], (*values)[CORNERS];
+} row_of_cubes;
+
+static const int cube[CORNERS] = {0, 1, 2, 3, 4, 5, 6, 7};
+
+static void row_create(row_of_cubes *row, int count)
+{
+    static const int corners[CORNERS][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                            {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    row->count = count;
+    row->coordinates = malloc((size_t)count * sizeof *row->coordinates);
+    row->values = malloc((size_t)count * sizeof *row->values);
+    if (!row->coordinates || !row->values) abort();
+    for (int i = 0; i < count; i++)
+        for (int n = 0; n < CORNERS; n++)
+            for (int a = 0; a < 3; a++) row->coordinates[i][n][a] = corners[n][a] + (a == 0 ? i : 0);
+}
+
+static void row_free(row_of_cubes *row)
+{
+    free(row->coordinates);
+    free(row->values);
+}
+
+/* Names of neighbours differ in their first digit, so that they do not come in the order of names. */
+static void name_of(int i, char name[32])
+{
+    snprintf(name, 32, "%d%03d rank %d", i % 10, i / 10, own_rank);
+}
+
+static void set_meshes(insitu_session *session, const row_of_cubes *row)
+{
+    for (int i = 0; i < row->count; i++) {
+        char name[32];
+        insitu_mesh mesh;
+        insitu_mesh_defaults(&mesh);
+        mesh.vertex_count = CORNERS;
+        insitu_mesh_interleaved(&mesh, row->coordinates[i], INSITU_FLOAT64);
+        mesh.cell_count = 1;
+        mesh.cell_type = INSITU_HEX;
+        mesh.connectivity_count = CORNERS;
+        mesh.connectivity = (insitu_array){.data = cube, .type = INSITU_INT32};
+        name_of(i, name);
+        assert_int_equal(insitu_set_mesh(session, name, &mesh), INSITU_OK);
+    }
+}
+
+static void set_fields(insitu_session *session, const row_of_cubes *row, int step)
+{
+    for (int i = 0; i < row->count; i++) {
+        char name[32];
+        insitu_field field;
+        for (int n = 0; n < CORNERS; n++) row->values[i][n] = row->coordinates[i][n][0] / row->count + 0.01 * step;
+        insitu_field_defaults(&field);
+        field.name = "f";
+        field.count = CORNERS;
+        field.values = (insitu_array){.data = row->values[i], .type = INSITU_FLOAT64};
+        name_of(i, name);
+        assert_int_equal(insitu_set_field(session, name, &field), INSITU_OK);
+    }
+}
+
+static double cpu_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* CPU seconds of the first step with its set calls, and the least of later ones with new values. */
+static void measure(int count, double *first, double *later)
+{
+    row_of_cubes row;
+    row_create(&row, count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    *first = *later = 1e9;
+    for (int step = 0; step < STEPS; step++) {
+        const double start = cpu_seconds();
+        if (step == 0) set_meshes(session, &row);
+        set_fields(session, &row, step);
+        everywhere(insitu_step(session, step, step) == INSITU_OK);
+        const double seconds = cpu_seconds() - start;
+        if (step == 0) *first = seconds;
+        if (step > 0 && seconds < *later) *later = seconds;
+    }
+    everywhere(insitu_last_report(session)->cells == count);
+    everywhere(insitu_destroy(&session) == INSITU_OK);
+    row_free(&row);
+}
+
+/* Eight times the meshes take eight times as long, or a little more where caches no longer hold them; what grows as the
+ * square would take 64 times as long. The bound is halfway between, by ratios. */
+static void a_step_is_linear_in_the_number_of_meshes(void **context)
+{
+    (void)context;
+    const double most = 8 * sqrt(8);
+    double few_first, few, many_first, many;
+    measure(FEW, &few_first, &few);
+    measure(MANY, &many_first, &many);
+    everywhere(many < most * few);
+    everywhere(many_first < most * few_first);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_is_linear_in_the_number_of_meshes)};
+    return cmocka_run_group_tests_name("session_many", tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
