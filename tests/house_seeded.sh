@@ -88,13 +88,12 @@ figures() {
     python3 "$here/house_figures.py" --hold "$place/tree"
 }
 accepts figures
-echo 'int seeded(int a, int b, int c, int d, int e, int f, int g, int h)
 {
-    return a + b + c + d + e + f + g + h;
-}' >"$place/tree/render/seeded.c"
-refuses 'render: functions of more than 7 parameters: 1' figures
-echo '#include "render_kernels.c"' >"$place/tree/render/seeded.c"
-refuses 'render: depth of includes: 9, more than 8' figures
+    printf 'int seeded(void)\n{\n    int a = 0;\n'
+    yes '    a++;' | head -n 60
+    printf '    return a;\n}\n'
+} >"$place/tree/render/seeded.c"
+refuses 'render: lines of a function: 65, more than 60' figures
 rm "$place/tree/render/seeded.c"
 for room in libinsitu mmbvh render compositing adaptors mini-app tools; do
     mkdir "$place/tree/$room/seeded"
