@@ -7,6 +7,7 @@
 
 #include <vtkCellArray.h>
 #include <vtkCellData.h>
+#include <vtkDoubleArray.h>
 #include <vtkFloatArray.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
@@ -46,8 +47,9 @@ const char *const scene = "images:\n"
                           "    outputs:\n"
                           "      - path: a_{cycle:02}.exr\n";
 
-/* Tets along x, each with its own points; point field "x" is the x of the point, cell field "number" counts. */
-vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count)
+/* Tets along x from `first` on, each with its own points; point field "x" is the x of the point, cell field "number"
+ * counts. */
+vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count, int first = 0)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
     vtkNew<vtkPoints> points;
@@ -55,7 +57,7 @@ vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count)
     x->SetName("x");
     number->SetName("number");
     const double corner[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    for (int i = 0; i < count; i++) {
+    for (int i = first; i < first + count; i++) {
         vtkIdType ids[4];
         for (int k = 0; k < 4; k++) {
             ids[k] = points->InsertNextPoint(corner[k][0] + i, corner[k][1], corner[k][2]);
@@ -293,6 +295,61 @@ void chosen_steps_keep_their_cycles(void **)
     assert_int_equal(count_of(r.out, "cycle"), 1);
 }
 
+vtkSmartPointer<vtkUnstructuredGrid> row_without_x(int count, int first = 0)
+{
+    auto grid = row_of_tets(count, first);
+    grid->GetPointData()->RemoveArray("x");
+    return grid;
+}
+
+void a_field_that_begins_later_leaves_out_the_first_steps(void **)
+{
+    write_vtu("late_0.vtu", row_without_x(3));
+    write_vtu("late_1.vtu", row_of_tets(3));
+    write_vtu("late_2.vtu", row_of_tets(3));
+    const run_result r = run_tool("scene.yaml late_0.vtu late_1.vtu late_2.vtu");
+    expect(r, 0, "3 steps, 2 pictures");
+    expect(r, 0, "late_0.vtu: not drawn: scene.yaml:6: no mesh has the field \"x\"");
+    expect(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1, "insitu-render: scene.yaml:6: no mesh has the field");
+}
+
+/* One piece has doubles, one no field, one a field that is not declared: the same picture and warnings on any ranks. */
+void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
+{
+    auto wide = row_of_tets(4), more = row_of_tets(2, 10);
+    vtkNew<vtkDoubleArray> x;
+    x->DeepCopy(wide->GetPointData()->GetArray("x"));
+    x->SetName("x");
+    wide->GetPointData()->AddArray(x);
+    vtkNew<vtkFloatArray> other;
+    other->DeepCopy(more->GetPointData()->GetArray("x"));
+    other->SetName("other");
+    more->GetPointData()->AddArray(other);
+    write_vtu("wide.vtu", wide);
+    write_vtu("none.vtu", row_without_x(6, 4));
+    write_vtu("more.vtu", more);
+    write_file(path_of("differ.pvtu"),
+               "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\"><PUnstructuredGrid GhostLevel=\"0\">"
+               "<PPointData><PDataArray type=\"Float32\" Name=\"x\"/></PPointData>"
+               "<PCellData><PDataArray type=\"Float32\" Name=\"number\"/></PCellData>\n"
+               "<Piece Source=\"wide.vtu\"/>\n<Piece Source=\"none.vtu\"/>\n<Piece Source=\"more.vtu\"/>\n"
+               "</PUnstructuredGrid></VTKFile>\n");
+    std::string png = scene; // EXR files hold the time of day
+    png.replace(png.find(".exr"), 4, ".png");
+    write_file(path_of("png.yaml"), png);
+    std::string first;
+    for (const int ranks : {1, 3}) {
+        const run_result r = run_ranks(ranks, "png.yaml differ.pvtu");
+        expect(r, 0, "1 step, 1 picture");
+        expect(r, 0, "wide.vtu: its field \"x\" is of type Float64, declared as Float32");
+        expect(r, 0, "none.vtu: has no field \"x\"");
+        expect(r, 0, "more.vtu: has a field \"other\"");
+        const std::string picture = read_file(path_of("a_00.png"));
+        if (ranks == 1) first = picture;
+        assert_true(picture == first && !picture.empty());
+    }
+}
+
 /* All cells are there, however they are read and dealt out. */
 void every_way_of_reading_gives_all_cells(void **)
 {
@@ -325,6 +382,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(wrong_scenes_are_errors),
         cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
         cmocka_unit_test(chosen_steps_keep_their_cycles),
+        cmocka_unit_test(a_field_that_begins_later_leaves_out_the_first_steps),
+        cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(every_way_of_reading_gives_all_cells),
     };
     return cmocka_run_group_tests(tests, make_files, nullptr);

@@ -108,9 +108,14 @@ class stage
         return report;
     }
 
-    const insitu_report &step(int64_t cycle, double time)
+    /* Images that want a field which the step has not are left out, and missing says why. */
+    const insitu_report &step(int64_t cycle, double time, std::string &missing)
     {
-        if (insitu_step(session_, cycle, time) != INSITU_OK) throw std::runtime_error(insitu_error(session_));
+        const insitu_status status = insitu_step(session_, cycle, time);
+        if (status == INSITU_ERROR_FIELD)
+            missing = insitu_error(session_);
+        else if (status != INSITU_OK)
+            throw std::runtime_error(insitu_error(session_));
         return *insitu_last_report(session_);
     }
 
@@ -139,10 +144,12 @@ std::vector<std::string> new_lines(const world &w, const std::string &text, std:
     return fresh;
 }
 
-/* The warnings that a run has shown, and the number of its images. */
+/* The warnings that a run has shown, the number of its images, and of its steps that had all fields. */
 struct run_state {
     std::set<std::string> said;
     int images = 0;
+    int whole_steps = 0;
+    std::string missing; // why the last step that lacked a field was not drawn whole
 };
 
 constexpr size_t warnings_at_once = 8;
@@ -222,8 +229,14 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
     /* All ranks take rank 0's time, as some may have read a part without one. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
-    std::string warnings = check_cells(w, report, name) + report.warnings + "\n";
-    const insitu_report &done = on.step(source.cycle(index), part.time);
+    std::string warnings = part.warnings + check_cells(w, report, name) + report.warnings + "\n", missing;
+    const insitu_report &done = on.step(source.cycle(index), part.time, missing);
+    if (missing.empty()) {
+        run.whole_steps++;
+    } else {
+        run.missing = missing;
+        if (source.count() > 1 && w.is_root()) warnings += name + ": not drawn: " + missing + "\n";
+    }
     if (done.warnings) warnings += done.warnings;
     run.images += done.images;
     bar.line(step_line(w, done, name, part.time, read_time.count()));
@@ -251,6 +264,7 @@ void draw(const world &w, const options &o)
     progress bar(w.is_root(), source->count());
     for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);
     on.close();
+    if (run.whole_steps == 0 && !run.missing.empty()) throw std::runtime_error(run.missing);
     bar.line(std::to_string(source->count()) + (source->count() == 1 ? " step, " : " steps, ") +
              std::to_string(run.images) + (run.images == 1 ? " picture" : " pictures") + " in " + working_folder());
 }

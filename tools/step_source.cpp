@@ -66,7 +66,7 @@ bool step_source::keeps_whole_files() const
     return options_.how == partition::block && static_cast<int>(options_.files.size()) >= ranks_;
 }
 
-vtkSmartPointer<vtkDataObject> step_source::read_pieces()
+vtkSmartPointer<vtkDataObject> step_source::read_pieces(std::string &warnings)
 {
     const auto files = static_cast<int64_t>(options_.files.size());
     auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
@@ -75,6 +75,7 @@ vtkSmartPointer<vtkDataObject> step_source::read_pieces()
         if (keeps_whole_files() && f * ranks_ / files != rank_) continue;
         const auto file = static_cast<size_t>(f);
         all->SetBlock(static_cast<unsigned>(f), grids_of(open(file).read(0, 0, 1), options_.files[file]));
+        warnings += open(file).take_warnings();
     }
     if (keeps_whole_files()) return all;
     return deal(all, options_.how, rank_, ranks_);
@@ -86,13 +87,14 @@ step_source::result step_source::read(size_t index)
     const auto fallback = static_cast<double>(s.cycle);
     result r;
     if (options_.pieces) {
-        r.data = read_pieces();
+        r.data = read_pieces(r.warnings);
         r.time = fallback;
         return r;
     }
     data_file &file = open(s.file);
     const bool is_by_pieces = ranks_ > 1 && options_.how == partition::block && file.pieces(s.inside) >= ranks_;
     const auto data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
+    r.warnings = file.take_warnings();
     r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(data, fallback);
     const auto grids = grids_of(data, file.step_path(s.inside));
     r.data = is_by_pieces ? grids : deal(grids, options_.how, rank_, ranks_);

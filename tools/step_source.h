@@ -27,6 +27,7 @@ class step_source
     struct result {
         vtkSmartPointer<vtkDataObject> data; // this rank's part; null where it has none
         double time = 0;
+        std::string warnings; // a line each
     };
     result read(size_t step); /* throws std::runtime_error */
 
@@ -39,7 +40,7 @@ class step_source
     };
     void add_steps_of(size_t file, int64_t &cycle);
     data_file &open(size_t file);
-    vtkSmartPointer<vtkDataObject> read_pieces();
+    vtkSmartPointer<vtkDataObject> read_pieces(std::string &warnings);
     bool keeps_whole_files() const;
 
     options options_;

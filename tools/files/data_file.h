@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vtkSmartPointer.h>
@@ -40,6 +41,12 @@ class data_file
     /* Reads piece `piece` of `pieces` of a step (0 where the file has none); 0 of 1 is all of it. Throws
      * std::runtime_error with the file's name and what is wrong. */
     virtual vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) = 0;
+
+    /* What is worth a warning of what was read since the last call, a line each. */
+    std::string take_warnings() { return std::exchange(warnings_, ""); }
+
+  protected:
+    std::string warnings_;
 };
 
 /* Throws as data_file::read() does. */

@@ -27,6 +27,7 @@
 
 #include "file_length.h"
 #include "grids_of.h"
+#include "piece_fields.h"
 #include "vtk_messages.h"
 
 namespace render_tool
@@ -54,13 +55,16 @@ vtkSmartPointer<vtkXMLDataElement> read_xml(const std::string &path)
     return root;
 }
 
-/* The elements called `name` in the element called `list` of an XML file. */
-std::vector<vtkSmartPointer<vtkXMLDataElement>> read_elements(const std::string &path, const char *list,
-                                                              const char *name)
+vtkSmartPointer<vtkXMLDataElement> read_list(const std::string &path, const char *list)
 {
-    const auto root = read_xml(path);
-    vtkXMLDataElement *parent = root->FindNestedElementWithName(list);
-    if (!parent) refuse(path, "cannot be read: has no element " + std::string(list));
+    const vtkSmartPointer<vtkXMLDataElement> found = read_xml(path)->FindNestedElementWithName(list);
+    if (!found) refuse(path, "cannot be read: has no element " + std::string(list));
+    return found;
+}
+
+/* The elements called `name` in another. */
+std::vector<vtkSmartPointer<vtkXMLDataElement>> elements_of(vtkXMLDataElement *parent, const char *name)
+{
     std::vector<vtkSmartPointer<vtkXMLDataElement>> found;
     for (int i = 0; i < parent->GetNumberOfNestedElements(); i++)
         if (std::string(parent->GetNestedElement(i)->GetName()) == name)
@@ -107,6 +111,7 @@ vtkSmartPointer<vtkUnstructuredGrid> append(const grid_list &grids)
     if (grids.empty()) return vtkSmartPointer<vtkUnstructuredGrid>::New();
     if (grids.size() == 1) return grids[0];
     even_out_ghosts(grids);
+    even_out_types({grids.begin(), grids.end()});
     vtkNew<vtkAppendFilter> filter;
     for (const auto &grid : grids) filter->AddInputData(grid);
     filter->Update();
@@ -118,8 +123,9 @@ class pvtu_file : public data_file
   public:
     explicit pvtu_file(const std::string &path) : path_(path)
     {
-        for (const auto &piece : read_elements(path, "PUnstructuredGrid", "Piece"))
-            pieces_.push_back(file_named_by(piece, "Source", path));
+        const auto list = read_list(path, "PUnstructuredGrid");
+        fields_ = declared_fields(list);
+        for (const auto &piece : elements_of(list, "Piece")) pieces_.push_back(file_named_by(piece, "Source", path));
     }
 
     const std::vector<double> &times() const override { return times_; }
@@ -133,7 +139,9 @@ class pvtu_file : public data_file
             const auto data = grids_of(open_data_file(pieces_[i])->read(0, 0, 1), pieces_[i]);
             auto *grid = vtkUnstructuredGrid::SafeDownCast(data);
             if (!grid) refuse(path_, pieces_[i] + " is no unstructured grid");
-            if (grid->GetNumberOfCells() > 0) grids.emplace_back(grid);
+            if (grid->GetNumberOfCells() == 0) continue;
+            make_fields_as_declared(grid, fields_, pieces_[i], warnings_);
+            grids.emplace_back(grid);
         }
         vtkSmartPointer<vtkDataObject> all = append(grids);
         throw_caught(path_);
@@ -143,6 +151,7 @@ class pvtu_file : public data_file
   private:
     std::string path_;
     std::vector<std::string> pieces_;
+    std::vector<declared_field> fields_;
     std::vector<double> times_; // none
 };
 
@@ -175,12 +184,12 @@ class series_file : public data_file
     vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) override
     {
         const std::vector<std::string> &parts = steps_[step].parts;
-        if (parts.size() == 1) return open(parts[0]).read(0, piece, pieces);
+        if (parts.size() == 1) return read_file(parts[0], piece, pieces);
         auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
         all->SetNumberOfBlocks(static_cast<unsigned>(parts.size()));
         for (size_t i = 0; i < parts.size(); i++)
             if (is_file_of_piece(i, parts.size(), piece, pieces))
-                all->SetBlock(static_cast<unsigned>(i), open(parts[i]).read(0, 0, 1));
+                all->SetBlock(static_cast<unsigned>(i), read_file(parts[i], 0, 1));
         return all;
     }
 
@@ -189,6 +198,13 @@ class series_file : public data_file
     {
         const std::string ending = path.substr(path.find_last_of('.'));
         return ending == ".pvd" || ending == ".series";
+    }
+    vtkSmartPointer<vtkDataObject> read_file(const std::string &path, int piece, int pieces)
+    {
+        data_file &file = open(path);
+        auto data = file.read(0, piece, pieces);
+        warnings_ += file.take_warnings();
+        return data;
     }
     data_file &open(const std::string &path)
     {
@@ -253,7 +269,7 @@ std::unique_ptr<data_file> open_pvd(const std::string &path)
 {
     std::vector<series_step> steps;
     bool has_times = true;
-    for (const auto &element : read_elements(path, "Collection", "DataSet")) {
+    for (const auto &element : elements_of(read_list(path, "Collection"), "DataSet")) {
         const char *text = element->GetAttribute("timestep");
         has_times = has_times && text;
         const double time = text ? parse_time(text, path) : 0;
