@@ -1,5 +1,5 @@
 # Debian packages, one a component of install.cmake, by ./package (cpack). The library alone needs MPI, OpenMP and
-# libyaml; OpenImageIO comes with the package that rank 0 loads, VTK with the adaptor and the tool.
+# libyaml; OpenImageIO and FreeType come with the package that rank 0 loads, VTK with the adaptor and the tool.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "The developers of libinsitu <libinsitu@localhost>")
 set(CPACK_PACKAGE_HOMEPAGE_URL "")

@@ -36,6 +36,7 @@ holds libinsitu-dev 'insitu\.pc'
 holds python3-insitu 'dist-packages/insitu\.py'
 needs libinsitu0 libopenmpi
 needs libinsitu-image libopenimageio
+needs libinsitu-image libfreetype6
 if dpkg-deb -f "$folder"/libinsitu0_*.deb Depends | grep -q 'vtk\|openimageio'; then
     echo 'libinsitu0 needs VTK or OpenImageIO'
     exit 1

@@ -1,31 +1,23 @@
 /* Everything is drawn in linear light on premultiplied colours, so that edges of lines and letters are smooth on any
  * background. Strokes that the picture hides are drawn under it, the background under these, and all else over it.
  * Sizes are shares of the picture's height: a picture of twice the size looks the same, only finer.
- *
- * OpenImageIO draws text by FreeType. It looks fonts up by name in the system's folders and in those that
- * OPENIMAGEIO_FONTS names. */
+ */
 #include "decorate.h"
-
-#include <OpenImageIO/imagebuf.h>
-#include <OpenImageIO/imagebufalgo.h>
+#include "typeface.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <glob.h>
-#include <new>
+#include <optional>
 
 namespace
 {
-
-const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans", "DroidSans"};
 
 struct sheet {
     const insitu_image &image;
     const insitu_decorations &what;
     std::vector<float> &rgba;
-    const char *font; /* NULL: none was found */
-    int size;         /* of words, pixels */
+    typeface *font; /* NULL where there are no words */
+    int size;       /* of words, pixels */
     double margin;
     std::vector<area> taken;
 };
@@ -114,59 +106,21 @@ void draw_strokes(sheet &s, bool behind)
 
 /* ---- words --------------------------------------------------------------------------------------------------- */
 
-/* FreeType crashes where it finds no memory for a font, and OpenImageIO leaves out letters for which there is none. So
- * this checks, before any words are drawn, that there is far more memory than they take. */
-void check_memory()
-{
-    enum { ENOUGH = 2 << 20 };
-    void *volatile block = std::malloc(ENOUGH);
-    if (!block) throw std::bad_alloc();
-    std::free(block);
-}
-
 int width_of(const sheet &s, const std::string &text, int size)
 {
-    if (!s.font || text.empty()) return 0;
-    check_memory();
-    const OIIO::ROI box = OIIO::ImageBufAlgo::text_size(text, size, s.font);
-    return box.defined() ? box.xend : 0;
-}
-
-/* Letters, as the share of each pixel that they cover. They begin at `left`, on this baseline. */
-struct lettering {
-    int width, height, left, baseline;
-    std::vector<float> covered;
-};
-
-lettering make_lettering(const sheet &s, const std::string &text, int size)
-{
-    using namespace OIIO;
-    const float one = 1;
-    lettering out{width_of(s, text, size) + size, 2 * size, size / 2, size + size / 2, {}};
-    out.covered.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-    ImageBuf picture(ImageSpec(out.width, out.height, 1, TypeDesc::FLOAT), out.covered.data());
-    const bool well =
-        ImageBufAlgo::render_text(picture, out.left, out.baseline, text, size, s.font, one,
-                                  ImageBufAlgo::TextAlignX::Left, ImageBufAlgo::TextAlignY::Baseline, 0, ROI(), 1);
-    if (!well) throw std::bad_alloc(); /* the font was there when it was looked for */
-    return out;
+    return s.font ? s.font->width_of(text, size) : 0;
 }
 
 /* Writes text from the left end of its baseline. */
 void write_text(sheet &s, const std::string &text, double x, double baseline, int size)
 {
-    if (!s.font || text.empty()) return;
-    const lettering letters = make_lettering(s, text, size);
-    const int left = static_cast<int>(std::lround(x)) - letters.left;
-    const int top = static_cast<int>(std::lround(baseline)) - letters.baseline;
-    for (int row = std::max(0, -top); row < letters.height && top + row < s.image.height; row++)
-        for (int column = std::max(0, -left); column < letters.width && left + column < s.image.width; column++) {
-            const float covered =
-                letters.covered[static_cast<std::size_t>(row) * static_cast<std::size_t>(letters.width) +
-                                static_cast<std::size_t>(column)];
-            if (covered > 0)
-                blend(pixel_at(s, left + column, top + row), s.what.colour, static_cast<double>(covered), false);
-        }
+    const int left = static_cast<int>(std::lround(x)), top = static_cast<int>(std::lround(baseline));
+    if (!s.font) return;
+    s.font->draw(text, size, 0, [&](int column, int row, double covered) {
+        const int px = left + column, py = top + row;
+        if (px >= 0 && py >= 0 && px < s.image.width && py < s.image.height)
+            blend(pixel_at(s, px, py), s.what.colour, covered, false);
+    });
 }
 
 /* Draws a plate in the background's colour, so that words can be read on any picture. */
@@ -340,39 +294,6 @@ void draw_axes(sheet &s)
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
-/* Uses glob(), because the C++ library's walk through folders ends the process where it finds no memory. */
-bool is_in_folder(const std::string &folder)
-{
-    bool is_found = false;
-    for (const char *font : fonts) {
-        const std::string pattern = folder + "/{,*/,*/*/,*/*/*/}" + font + ".*";
-        glob_t files{};
-        const int result = glob(pattern.c_str(), GLOB_BRACE, nullptr, &files);
-        globfree(&files);
-        if (result == GLOB_NOSPACE) throw std::bad_alloc();
-        is_found = is_found || result == 0;
-    }
-    return is_found;
-}
-
-/* Tells whether a font is installed. If OpenImageIO finds none all the same, there was no memory for it. */
-bool is_installed()
-{
-    const char *own = std::getenv("OPENIMAGEIO_FONTS");
-    return is_in_folder("/usr/share/fonts") || is_in_folder("/usr/local/share/fonts") || (own && is_in_folder(own));
-}
-
-const char *find_font(std::string &warning)
-{
-    check_memory();
-    for (const char *font : fonts)
-        if (OIIO::ImageBufAlgo::text_size("x", 16, font).defined()) return font;
-    if (is_installed()) throw std::bad_alloc();
-    warning = "no font was found, so its words are left out; expected DejaVuSans in the system's fonts or in a folder "
-              "that OPENIMAGEIO_FONTS names";
-    return nullptr;
-}
-
 bool has_words(const insitu_decorations &what)
 {
     return what.words_count > 0 || what.bar_count > 0 || what.has_axes || what.label_count > 0 ||
@@ -428,7 +349,11 @@ void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &
     sheet s{image, what, rgba, nullptr, 0, 0, {}};
     s.size = std::max(1, static_cast<int>(std::lround(what.size * image.height)));
     s.margin = 0.7 * s.size;
-    if (has_words(what)) s.font = find_font(warning);
+    std::optional<typeface> font;
+    if (has_words(what)) s.font = &font.emplace();
+    if (font && !font->found())
+        warning = "no font was found, so its words are left out; expected DejaVuSans in the system's fonts or in a "
+                  "folder that OPENIMAGEIO_FONTS names";
     draw_strokes(s, true);
     put_background(s);
     draw_strokes(s, false);
@@ -437,4 +362,5 @@ void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &
     draw_scale_bar(s);
     if (what.has_axes) draw_axes(s);
     for (int i = 0; i < what.label_count; i++) draw_label(s, what.labels[i]);
+    if (font && font->found()) warning = font->missing();
 }

@@ -229,17 +229,13 @@ void write_undecorated(const insitu_image &image, insitu_image_format format, co
     }
 }
 
-/* FreeType and OpenImageIO hold a font's glyphs and tables of their own. */
 std::string write(const insitu_image &image, insitu_image_format format, const std::string &path)
 {
-    enum { FONT_TABLES = 4 << 20 };
     std::string warning;
     insitu_image finished = image;
     std::vector<float> rgba;
     if (image.decorations && format != INSITU_DEEP_EXR) {
         rgba.assign(image.rgba, image.rgba + 4 * pixel_count(image));
-        const memory_reserve reserve(FONT_TABLES);
-        OIIO::attribute("threads", 1);
         decorate(image, rgba, warning);
         finished.rgba = rgba.data();
     }

@@ -132,7 +132,8 @@ typedef struct insitu_image {
  * The temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written; the first
  * picture that a process writes to a folder removes the temporary files that killed runs of the same user left there.
  * It is an error if path is a pipe, a device or a directory. On an error, message (size bytes) says what went wrong,
- * with the path. Otherwise message is empty, or warns that no font was found and the picture has no words. Local. */
+ * with the path. Otherwise message is empty, or warns: no font was found and the picture has no words, or the font
+ * lacks characters of words, which are boxes, or words are not UTF-8. Local. */
 typedef insitu_status insitu_image_write_function(const insitu_image *image, insitu_image_format format,
                                                   const char *path, char *message, size_t size);
 

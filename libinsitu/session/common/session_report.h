@@ -47,7 +47,7 @@ typedef enum session_warning_kind {
     WARNING_VIEW,     /* a camera sees no cell */
     WARNING_GREY,     /* a surface does not have the field that colours it */
     WARNING_OVERLAP,  /* cells overlap in some pixels */
-    WARNING_WORDS,    /* rank 0 has no font for the words of a picture */
+    WARNING_WORDS,    /* words of a picture are not drawn as they are written */
     WARNING_WRITER,   /* rank 0 has no thread to write pictures */
     WARNING_ISA       /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;

@@ -1,0 +1,227 @@
+/* FreeType reports missing memory by codes, which become std::bad_alloc. Glyphs are hinted, so that they stand on whole
+ * pixels and are sharp in small sizes. */
+#include "typeface.h"
+
+#include <ft2build.h>
+#include FT_FREETYPE_H
+#include FT_GLYPH_H
+#include FT_STROKER_H
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <glob.h>
+#include <memory>
+#include <new>
+
+namespace
+{
+
+const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans", "DroidSans"};
+const char32_t replacement = 0xFFFD;
+
+/* Throws where memory ran out. */
+bool is_done(FT_Error code)
+{
+    if (code == FT_Err_Out_Of_Memory) throw std::bad_alloc();
+    return code == FT_Err_Ok;
+}
+
+/* ---- finding a font ---- */
+
+/* Returns the files of this font in the folder and those three levels below it. Uses glob(), because the C++ library's
+ * walk through folders ends the process where it finds no memory. */
+std::vector<std::string> find_files(const std::string &folder, const std::string &font)
+{
+    std::vector<std::string> out;
+    const std::string pattern = folder + "/{,*/,*/*/,*/*/*/}" + font + ".{ttf,otf,ttc,pfb}";
+    glob_t found{};
+    const int result = glob(pattern.c_str(), GLOB_BRACE, nullptr, &found);
+    const std::unique_ptr<glob_t, void (*)(glob_t *)> guard(&found, globfree);
+    if (result == GLOB_NOSPACE) throw std::bad_alloc();
+    for (std::size_t i = 0; result == 0 && i < found.gl_pathc; i++) out.emplace_back(found.gl_pathv[i]);
+    return out;
+}
+
+/* OPENIMAGEIO_FONTS holds folders between colons or semicolons. */
+std::vector<std::string> font_folders()
+{
+    std::vector<std::string> out;
+    const char *own = std::getenv("OPENIMAGEIO_FONTS");
+    std::string folder;
+    for (const char *at = own ? own : ""; *at; at++) {
+        const bool ends = *at == ':' || *at == ';';
+        if (!ends) folder += *at;
+        if ((ends || !at[1]) && !folder.empty()) out.push_back(folder), folder.clear();
+    }
+    out.emplace_back("/usr/share/fonts");
+    out.emplace_back("/usr/local/share/fonts");
+    return out;
+}
+
+FT_Face open_font(FT_Library library, std::string &name)
+{
+    const std::vector<std::string> folders = font_folders();
+    for (const char *font : fonts)
+        for (const std::string &folder : folders)
+            for (const std::string &path : find_files(folder, font)) {
+                FT_Face face = nullptr;
+                name = font;
+                if (!is_done(FT_New_Face(library, path.c_str(), 0, &face))) continue;
+                if (FT_IS_SCALABLE(face)) return face;
+                FT_Done_Face(face);
+            }
+    return nullptr;
+}
+
+/* ---- characters ---- */
+
+/* Reads one character at `at` and steps over it; replacement where there is none. */
+char32_t next_character(const std::string &text, std::size_t &at)
+{
+    static const char32_t least[] = {0, 0x80, 0x800, 0x10000};
+    const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+    const unsigned first = byte(at);
+    const std::size_t more = first < 0x80 ? 0 : first >> 5 == 6 ? 1 : first >> 4 == 14 ? 2 : first >> 3 == 30 ? 3 : 4;
+    const std::size_t begin = at++;
+    if (more == 0) return first;
+    if (more == 4) return replacement;
+    char32_t out = first & (0x3FU >> more);
+    for (std::size_t i = 1; i <= more; i++) {
+        if (byte(begin + i) >> 6 != 2) return replacement;
+        out = out << 6 | (byte(begin + i) & 0x3FU);
+    }
+    if (out < least[more] || out > 0x10FFFF || (out >= 0xD800 && out < 0xE000)) return replacement;
+    at = begin + more + 1;
+    return out;
+}
+
+/* Control characters are blanks: a line is one line. */
+FT_UInt glyph_of(FT_Face face, char32_t character)
+{
+    const bool is_control = character < 0x20 || (character >= 0x7F && character < 0xA0);
+    return FT_Get_Char_Index(face, is_control ? ' ' : character);
+}
+
+/* Returns how far the pen steps back or on between two glyphs, in pixels. */
+int kerning(FT_Face face, FT_UInt before, FT_UInt glyph)
+{
+    FT_Vector step = {0, 0};
+    if (!before || !glyph || !FT_HAS_KERNING(face)) return 0;
+    if (!is_done(FT_Get_Kerning(face, before, glyph, FT_KERNING_DEFAULT, &step))) return 0;
+    return static_cast<int>(step.x >> 6);
+}
+
+/* Calls visit(x) with each glyph loaded, x being where the pen is; returns where it ends. */
+template <typename visitor>
+int walk(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int32 flags, visitor visit)
+{
+    int x = 0;
+    FT_UInt before = 0;
+    if (!is_done(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(size)))) return 0;
+    for (const char32_t character : characters) {
+        const FT_UInt glyph = glyph_of(face, character);
+        x += kerning(face, before, glyph);
+        before = glyph;
+        if (!is_done(FT_Load_Glyph(face, glyph, flags))) continue;
+        const int advance = static_cast<int>((face->glyph->advance.x + 32) >> 6);
+        visit(x);
+        x += advance;
+    }
+    return x;
+}
+
+void cover_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &cover)
+{
+    for (unsigned row = 0; row < map.rows; row++)
+        for (unsigned column = 0; column < map.width; column++) {
+            const unsigned char grey = map.buffer[static_cast<std::ptrdiff_t>(row) * map.pitch + column];
+            if (grey) cover(left + static_cast<int>(column), static_cast<int>(row) - top, grey / 255.0);
+        }
+}
+
+/* Covers the loaded glyph's outline and all that is within the stroker's radius of it. */
+void cover_widened(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
+{
+    FT_Glyph glyph = nullptr;
+    if (slot->format != FT_GLYPH_FORMAT_OUTLINE || !is_done(FT_Get_Glyph(slot, &glyph))) return;
+    FT_Error code = FT_Glyph_StrokeBorder(&glyph, stroker, 0, 1);
+    if (!code) code = FT_Glyph_To_Bitmap(&glyph, FT_RENDER_MODE_NORMAL, nullptr, 1);
+    const std::unique_ptr<FT_GlyphRec_, void (*)(FT_Glyph)> guard(glyph, FT_Done_Glyph);
+    if (!is_done(code)) return;
+    const auto *const bitmap = reinterpret_cast<FT_BitmapGlyph>(glyph);
+    cover_bitmap(bitmap->bitmap, x + bitmap->left, bitmap->top, cover);
+}
+
+} // namespace
+
+std::vector<char32_t> decode_utf8(const std::string &text, bool &is_bad)
+{
+    std::vector<char32_t> out;
+    out.reserve(text.size());
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t begin = at;
+        out.push_back(next_character(text, at));
+        is_bad = is_bad || (out.back() == replacement && at == begin + 1);
+    }
+    return out;
+}
+
+typeface::typeface()
+{
+    if (!is_done(FT_Init_FreeType(&library_))) return;
+    try {
+        face_ = open_font(library_, name_);
+    } catch (...) {
+        FT_Done_FreeType(library_);
+        throw;
+    }
+}
+
+typeface::~typeface()
+{
+    if (library_) FT_Done_FreeType(library_);
+}
+
+int typeface::width_of(const std::string &text, int size) const
+{
+    bool is_bad = false;
+    return face_ ? walk(face_, decode_utf8(text, is_bad), size, FT_LOAD_DEFAULT, [](int) {}) : 0;
+}
+
+void typeface::draw(const std::string &text, int size, double halo, const cover_pixel &cover)
+{
+    if (!face_) return;
+    const std::vector<char32_t> characters = decode_utf8(text, has_bad_bytes_);
+    for (const char32_t character : characters)
+        if (glyph_of(face_, character) == 0) missing_.insert(character);
+    if (!(halo > 0)) {
+        const FT_GlyphSlot slot = face_->glyph;
+        walk(face_, characters, size, FT_LOAD_RENDER,
+             [&](int x) { cover_bitmap(slot->bitmap, x + slot->bitmap_left, slot->bitmap_top, cover); });
+        return;
+    }
+    FT_Stroker stroker = nullptr;
+    if (!is_done(FT_Stroker_New(library_, &stroker))) return;
+    const std::unique_ptr<FT_StrokerRec_, void (*)(FT_Stroker)> guard(stroker, FT_Stroker_Done);
+    FT_Stroker_Set(stroker, std::lround(64 * halo), FT_STROKER_LINECAP_ROUND, FT_STROKER_LINEJOIN_ROUND, 0);
+    walk(face_, characters, size, FT_LOAD_NO_BITMAP, [&](int x) { cover_widened(face_->glyph, stroker, x, cover); });
+}
+
+std::string typeface::missing() const
+{
+    enum { NAMED = 8 };
+    std::string out = missing_.empty() ? "" : "the font " + name_ + " has no glyphs for";
+    std::size_t count = 0;
+    for (const char32_t character : missing_) {
+        char name[24];
+        if (++count > NAMED) break;
+        std::snprintf(name, sizeof name, "%s U+%04X", count > 1 ? "," : "", static_cast<unsigned>(character));
+        out += name;
+    }
+    if (missing_.size() > NAMED) out += " and " + std::to_string(missing_.size() - NAMED) + " others";
+    if (!missing_.empty()) out += ", which are drawn as boxes";
+    if (has_bad_bytes_)
+        out += std::string(out.empty() ? "" : "; ") + "words have bytes that are not UTF-8, drawn as U+FFFD";
+    return out;
+}

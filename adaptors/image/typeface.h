@@ -1,0 +1,47 @@
+/* Words as FreeType draws them: each glyph's own pixels, side by side with the font's kerning. Text is UTF-8; a
+ * character that the font lacks is its box for missing glyphs, and a byte that is not UTF-8 is U+FFFD. */
+#ifndef ADAPTORS_TYPEFACE_H
+#define ADAPTORS_TYPEFACE_H
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+struct FT_LibraryRec_;
+struct FT_FaceRec_;
+
+/* How much of one pixel a glyph covers, 0 to 1; x to the right of the line's begin, y down from its baseline. */
+using cover_pixel = std::function<void(int x, int y, double covered)>;
+
+/* Every call but found() may throw std::bad_alloc. */
+class typeface
+{
+  public:
+    /* Opens the first of the usual fonts that is in the system's folders or in those that OPENIMAGEIO_FONTS names. */
+    typeface();
+    ~typeface();
+    typeface(const typeface &) = delete;
+    typeface &operator=(const typeface &) = delete;
+
+    bool found() const { return face_ != nullptr; }
+    /* Pixels from the line's begin to its end, for letters of this height. 0 where no font was found. */
+    int width_of(const std::string &text, int size) const;
+    /* Covers the pixels of glyphs; where halo > 0, those of glyphs that are wider by so many pixels on every side. */
+    void draw(const std::string &text, int size, double halo, const cover_pixel &cover);
+    /* Empty, or a message about characters that were drawn as boxes. */
+    std::string missing() const;
+
+  private:
+    FT_LibraryRec_ *library_ = nullptr;
+    FT_FaceRec_ *face_ = nullptr;
+    std::string name_;
+    std::set<char32_t> missing_;
+    bool has_bad_bytes_ = false;
+};
+
+/* Decodes UTF-8. A byte that belongs to no character, an overlong form, a surrogate and a number above U+10FFFF are
+ * U+FFFD each, and set is_bad. */
+std::vector<char32_t> decode_utf8(const std::string &text, bool &is_bad);
+
+#endif
