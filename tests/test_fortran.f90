@@ -8,8 +8,32 @@ module test_fortran_maker
     real(real64), pointer :: made_of(:)
     integer :: calls = 0
     logical :: fails = .false.
+    type(insitu_session), pointer :: caller
+    integer :: forbidden = 0 ! the call that call_and_make makes
 
 contains
+
+    subroutine call_and_make(values, status)
+        type(insitu_array), intent(out) :: values
+        integer, intent(out) :: status
+        type(insitu_picture), allocatable :: pictures(:)
+        status = INSITU_ERROR_ARGUMENT
+        select case (forbidden)
+        case (1)
+            call caller%step(1, 0.0_real64, status)
+        case (2)
+            call caller%destroy(status)
+        case (3)
+            call caller%set_field('m', 'p', insitu_borrow(made_of), status)
+        case (4)
+            call caller%set_filled_field('m', 'p', make_values, status)
+        case (5)
+            pictures = caller%pictures()
+            if (size(pictures) > 0) status = INSITU_OK
+        end select
+        if (forbidden > 0 .and. status == INSITU_OK) error stop 'a call of a fill is not refused'
+        call make_values(values, status)
+    end subroutine call_and_make
 
     ! Called by the steps that need the field: it may communicate.
     subroutine make_values(values, status)
@@ -362,10 +386,11 @@ contains
     end function wall_picture
 
     subroutine procedures_make_values()
-        type(insitu_session) :: session
+        type(insitu_session), pointer :: session
         type(insitu_picture), allocatable :: given(:), made(:)
         real(real32) :: rgba(4, 48, 32)
         integer :: ranks
+        allocate (session)
         call MPI_Comm_size(MPI_COMM_WORLD, ranks)
         call session%create_from_text(MPI_COMM_WORLD, 'images: [{name: a, every: 2, size: [48, 32], layers: '// &
             '[{isosurface: {field: p, values: [1.3]}}], outputs: [{path: '//prefix//'made.png}]}]', status)
@@ -398,7 +423,21 @@ contains
         fails = rank == 0
         call session%step(6, 0.0_real64, status)
         call refused(session, 'its fill returned 5')
+        fails = .false.
+        caller => session
+        call session%set_filled_field('m', 'p', call_and_make, status)
+        do forbidden = 1, 5
+            call session%step(6 + 4 * forbidden, 0.0_real64, status)
+            call refused(session, 'its fill called insitu_')
+            call session%set_field('m', 'q', insitu_borrow(pressure), status)
+            call expect(status == INSITU_OK .and. index(session%error(), 'its fill called insitu_') > 0, &
+                'the message of a step stays when a later call is well')
+        end do
+        forbidden = 0
+        call session%step(40, 0.0_real64, status)
+        call expect(status == INSITU_OK .and. session%error() == '', 'a step that is well clears the message')
         call session%destroy(status)
+        deallocate (session)
     end subroutine procedures_make_values
 
     subroutine refused(session, words)

@@ -317,6 +317,17 @@ def callables_are_asked_in_steps_that_need_them():
         error = raises(insitu.Error, "its fill returned", s.step, 6, 0.0)
         own = isinstance(error.__cause__, ZeroDivisionError)
         everywhere(own == (comm.rank == comm.size - 1) and error.on_all_ranks, "the cause is told where it is")
+        for i, (name, call) in enumerate([
+                ("set_mesh", lambda: s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)),
+                ("set_mesh", lambda: s.remove_mesh("m")), ("set_field", lambda: s.set_field("m", "f", f.copy())),
+                ("step", lambda: s.step(1, 0.0)), ("keep_pictures", lambda: s.keep_pictures()), ("destroy", s.close),
+                ("last_pictures", lambda: s.pictures), ("last_report", lambda: s.report)]):
+            s.set_field("m", "f", lambda call=call: (call(), f.copy())[1])
+            error = raises(insitu.Error, f"its fill called insitu_{name}()", s.step, 12 + 4 * i, 0.0)
+            cause = error.__cause__
+            everywhere(isinstance(cause, insitu.Error) and cause.status == "INSITU_ERROR_ARGUMENT", f"{name}: {cause}")
+            s.set_field("m", "f", lambda: f.copy())
+            s.step(14 + 4 * i, 0.0)
         s.set_field("m", "f", lambda: f[:, None].repeat(2, axis=1))
         raises(insitu.Error, "2 components of 1", s.step, 8, 0.0)
         s.set_field("m", "f", lambda: f[:, None].repeat(2, axis=1), components=2)

@@ -193,10 +193,84 @@ static void what_goes_wrong_is_told_to_all(void **state)
     input_free(&in);
 }
 
+/* ---- calls that a fill must not make ---------------------------------------------------------------------------- */
+
+enum { CALLS = 9 };
+static const char *const calls[CALLS] = {"insitu_set_mesh",      "insitu_set_mesh",    "insitu_set_field",
+                                         "insitu_step",          "insitu_destroy",     "insitu_keep_pictures",
+                                         "insitu_last_pictures", "insitu_last_report", "insitu_set_field"};
+
+/* A fill that makes one of the calls on its session, and gives values all the same. */
+typedef struct caller {
+    maker values;
+    insitu_session *session;
+    int call; /* -1: none */
+    bool is_refused;
+} caller;
+
+static bool is_refused(caller *c)
+{
+    insitu_session *session = c->session;
+    insitu_field another = describe("another", &c->values, false);
+    int count = 7;
+    switch (c->call) {
+    case 0: return insitu_set_mesh(session, "m", &c->values.in->mesh) == INSITU_ERROR_ARGUMENT;
+    case 1: return insitu_set_mesh(session, "m", NULL) == INSITU_ERROR_ARGUMENT;
+    case 2: return insitu_set_field(session, "m", &another) == INSITU_ERROR_ARGUMENT;
+    case 3: return insitu_step(session, 1, 0) == INSITU_ERROR_ARGUMENT;
+    case 4: return insitu_destroy(&session) == INSITU_ERROR_ARGUMENT && session && strstr(insitu_error(NULL), calls[4]);
+    case 5: return insitu_keep_pictures(session, 1) == INSITU_ERROR_ARGUMENT;
+    case 6: return !insitu_last_pictures(session, &count) && count == 0;
+    case 7: return insitu_last_report(session)->cycle == 0 && !*insitu_last_report(session)->warnings;
+    default: another.name = "f"; return insitu_set_field(session, "m", &another) == INSITU_ERROR_ARGUMENT;
+    }
+}
+
+static insitu_status make_and_call(void *data, insitu_field *field)
+{
+    caller *c = data;
+    if (c->call >= 0) c->is_refused = is_refused(c) && strstr(insitu_error(c->session), calls[c->call]);
+    return make(&c->values, field);
+}
+
+static void calls_of_a_fill_are_refused(void **state)
+{
+    (void)state;
+    static const char text[] = "statistics: [{field: f, path: filled.csv}]\nimages:\n" IMAGE(
+        "a", "1", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}");
+    session_input in = {0};
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    caller f = {.values = make_maker(&in, 1), .call = -1};
+    maker g = make_maker(&in, 2);
+    insitu_field fields[] = {describe("f", &f.values, true), describe("g", &g, true)};
+    fields[0].fill = make_and_call;
+    fields[0].fill_data = &f;
+    f.session = open_session(MPI_COMM_WORLD, write_scene(text));
+    everywhere(insitu_set_mesh(f.session, "m", &in.mesh) == INSITU_OK);
+    for (int i = 0; i < 2; i++) everywhere(insitu_set_field(f.session, "m", &fields[i]) == INSITU_OK);
+    for (int i = 0; i < 2 * CALLS; i++) { /* on the last rank, then on all */
+        char words[128];
+        const bool calls_now = i >= CALLS || own_rank == rank_count - 1;
+        snprintf(words, sizeof words, "field \"f\": its fill called %s() of its session", calls[i % CALLS]);
+        f.call = calls_now ? i % CALLS : -1;
+        f.is_refused = false;
+        forget_pictures();
+        told_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
+        everywhere(f.is_refused == calls_now && caught_count == 0 && insitu_last_report(f.session)->cycle == 2 * i);
+        f.call = -1;
+        step_is_good(f.session, 2 * i + 1);
+    }
+    insitu_destroy(&f.session);
+    free(f.values.values);
+    free(g.values);
+    input_free(&in);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
-                                       cmocka_unit_test(what_goes_wrong_is_told_to_all)};
+                                       cmocka_unit_test(what_goes_wrong_is_told_to_all),
+                                       cmocka_unit_test(calls_of_a_fill_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

@@ -448,6 +448,26 @@ static void flat_cells_are_counted(void **context)
     everywhere(insitu_last_report(session)->cells_flat == 0);
 }
 
+/* A step's failure can be read until the next step, unless a call fails in between, whose message is newer. */
+static void message_stays_until_the_next_step(void **context)
+{
+    (void)context;
+    const int64_t right = input.part.connectivity[0];
+    input.part.connectivity[0] = -1;
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    told_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
+    input.part.connectivity[0] = right;
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(insitu_keep_pictures(session, 0) == INSITU_OK);
+    everywhere(insitu_last_report(session)->cycle == 70 && strstr(insitu_error(session), "vertex index -1"));
+    everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
+    everywhere(strstr(insitu_error(session), "its mesh \"none\" is not set") != NULL);
+    told_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
+                    "rank 0: ", "its mesh \"none\" is not set");
+    step_is_good(session, 72);
+    everywhere(*insitu_error(session) == '\0');
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -460,6 +480,7 @@ static int run(void)
         cmocka_unit_test(inverse_maps_that_fail_are_counted),
         cmocka_unit_test(bad_cell_of_a_mesh_of_one_type_is_named),
         cmocka_unit_test(flat_cells_are_counted),
+        cmocka_unit_test(message_stays_until_the_next_step),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);

@@ -532,6 +532,23 @@ contains
         if (face_lists%lists%columns /= face_lists%sizes%columns) out = 'the lists of faces are not as many as their sizes'
     end function find_fault
 
+    ! Tells whether an argument is faulty: then its fault is the session's message. Else the last message stays.
+    logical function is_refused(self, fault)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: fault
+        is_refused = len(fault) > 0
+        if (is_refused) self%own_error = fault
+    end function is_refused
+
+    ! status becomes that of a call of C, whose message is the last one if the call failed.
+    subroutine take_status(self, of_c, status)
+        class(insitu_session), intent(inout) :: self
+        integer(c_int), intent(in) :: of_c
+        integer, intent(out) :: status
+        status = of_c
+        if (status /= INSITU_OK) self%own_error = ''
+    end subroutine take_status
+
     subroutine take_lists(mesh, face_lists, nothing)
         type(c_mesh), intent(inout) :: mesh
         type(insitu_face_lists), intent(in) :: face_lists
@@ -559,6 +576,7 @@ contains
         integer(c_int64_t) :: gap ! elements between one column's last and the next one's first
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
+        character(:), allocatable :: fault
         integer :: axis, corners
         nothing = 0
         call c_mesh_defaults(mesh)
@@ -576,9 +594,9 @@ contains
         if (present(vertex_order)) mesh%vertex_order = vertex_order
         if (.not. (present(offsets) .or. present(cell_types))) mesh%connectivity_row = row_of(connectivity)
         gap = max(0_c_int64_t, mesh%connectivity_row - connectivity%rows)
-        self%own_error = find_fault(points, connectivity, mesh%connectivity_row, given(1:5), face_lists)
+        fault = find_fault(points, connectivity, mesh%connectivity_row, given(1:5), face_lists)
         status = INSITU_ERROR_ARGUMENT
-        if (len(self%own_error) > 0) return
+        if (is_refused(self, fault)) return
         mesh%vertex_count = points(1)%columns
         do axis = 1, 3
             mesh%coordinates(axis) = as_c(points(axis), nothing)
@@ -602,10 +620,11 @@ contains
         else
             mesh%cell_count = connectivity%rows * connectivity%columns / max(1, corners)
         end if
-        self%own_error = find_length(mesh%cell_count, mesh%vertex_count, connectivity%rows, corners, given(1:5))
-        if (len(self%own_error) > 0) return
-        status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
+        fault = find_length(mesh%cell_count, mesh%vertex_count, connectivity%rows, corners, given(1:5))
+        if (is_refused(self, fault)) return
+        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_loc(mesh)), status)
         if (present(offsets) .or. present(cell_types)) corners = 0
+        if (status /= INSITU_OK) return
         call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, &
             merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
@@ -625,13 +644,13 @@ contains
         logical, intent(in), optional :: keep_polyhedra
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
+        character(:), allocatable :: fault
         nothing = 0
         call c_mesh_defaults(mesh)
         status = INSITU_ERROR_ARGUMENT
-        self%own_error = find_fault(points, faces, 0_c_int64_t, [face_offsets])
-        if (len(self%own_error) == 0 .and. face_offsets%columns /= owner%columns + 1) &
-            self%own_error = 'face_offsets are not one more than owner'
-        if (len(self%own_error) > 0) return
+        fault = find_fault(points, faces, 0_c_int64_t, [face_offsets])
+        if (len(fault) == 0 .and. face_offsets%columns /= owner%columns + 1) fault = 'face_offsets are not one more than owner'
+        if (is_refused(self, fault)) return
         mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
         mesh%face_offsets = as_c(face_offsets, nothing)
         mesh%face_connectivity_count = faces%rows * faces%columns
@@ -653,13 +672,14 @@ contains
         logical, intent(in), optional :: keep_polyhedra
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
+        character(:), allocatable :: fault
         nothing = 0
         call c_mesh_defaults(mesh)
         status = INSITU_ERROR_ARGUMENT
-        self%own_error = find_fault(points, owner, 0_c_int64_t, [face_lists%sizes], face_lists)
-        if (len(self%own_error) == 0 .and. face_lists%lists%columns /= owner%columns) &
-            self%own_error = 'the lists of faces are not as many as owner'
-        if (len(self%own_error) > 0) return
+        fault = find_fault(points, owner, 0_c_int64_t, [face_lists%sizes], face_lists)
+        if (len(fault) == 0 .and. face_lists%lists%columns /= owner%columns) &
+            fault = 'the lists of faces are not as many as owner'
+        if (is_refused(self, fault)) return
         call take_lists(mesh, face_lists, nothing)
         call set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
             index_base, keep_polyhedra)
@@ -679,6 +699,7 @@ contains
         logical, intent(in), optional :: keep_polyhedra
         type(insitu_array) :: given(4)
         real(real64), target :: nothing
+        character(:), allocatable :: fault
         integer :: axis
         nothing = 0
         mesh%index_base = 1
@@ -690,10 +711,10 @@ contains
         given(1:2) = [owner, neighbour]
         if (present(ghosts)) given(3) = ghosts
         if (present(vertex_ids)) given(4) = vertex_ids
-        self%own_error = find_fault(points, owner, 0_c_int64_t, given)
-        if (len(self%own_error) == 0) self%own_error = find_face_length(points(1)%columns, mesh%cell_count, given(3:4))
+        fault = find_fault(points, owner, 0_c_int64_t, given)
+        if (len(fault) == 0) fault = find_face_length(points(1)%columns, mesh%cell_count, given(3:4))
         status = INSITU_ERROR_ARGUMENT
-        if (len(self%own_error) > 0) return
+        if (is_refused(self, fault)) return
         mesh%vertex_count = points(1)%columns
         do axis = 1, 3
             mesh%coordinates(axis) = as_c(points(axis), nothing)
@@ -703,7 +724,8 @@ contains
         mesh%neighbour = as_c(neighbour, nothing)
         if (present(ghosts)) mesh%ghosts = as_c(ghosts, nothing)
         if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
-        status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
+        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_loc(mesh)), status)
+        if (status /= INSITU_OK) return
         call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
     end subroutine set_owned
 
@@ -792,8 +814,7 @@ contains
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         integer, intent(out) :: status
-        self%own_error = ''
-        status = c_set_mesh(self%handle, as_c_text(name), c_null_ptr)
+        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_null_ptr), status)
     end subroutine remove_mesh
 
     ! Hand over this rank's part of a field: a list, or a matrix (components, tuples). index: the tuple that each
@@ -813,6 +834,7 @@ contains
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(c_field) :: field
         real(real64), target :: nothing
+        character(:), allocatable :: fault
         nothing = 0
         c_name = as_c_text(name)
         call c_field_defaults(field)
@@ -825,32 +847,32 @@ contains
         field%component_stride = values%row_stride
         field%values = as_c(values, nothing)
         field%values%stride = values%stride
-        self%own_error = ''
+        fault = ''
         if (present(index)) then
             field%index = as_c(index, nothing)
             if (field%centring == INSITU_CORNER .and. .not. present(corner_row)) field%corner_row = row_of(index)
             entries = index%rows * index%columns &
                 + max(0_c_int64_t, field%corner_row - index%rows) * merge(index%columns - 1, 0_c_int64_t, index%rows > 1)
             if (index%rows > 1 .and. field%centring /= INSITU_CORNER) then
-                self%own_error = 'index is a list, and a matrix is given'
+                fault = 'index is a list, and a matrix is given'
             else if (field%corner_row == 0 .and. .not. is_list(index)) then
-                self%own_error = 'index has gaps between its columns'
+                fault = 'index has gaps between its columns'
             else if (.not. is_as_long(self%sizes, mesh, field%centring, field%corner_row, entries)) then
-                self%own_error = 'index has not as many entries as the mesh has vertices, cells or corners'
+                fault = 'index has not as many entries as the mesh has vertices, cells or corners'
             end if
             status = INSITU_ERROR_ARGUMENT
-            if (len(self%own_error) > 0) return
+            if (is_refused(self, fault)) return
         end if
         if (present(patches)) then
-            self%own_error = find_patch_fault(patches, values%rows)
+            fault = find_patch_fault(patches, values%rows)
             status = INSITU_ERROR_ARGUMENT
-            if (len(self%own_error) > 0) return
+            if (is_refused(self, fault)) return
             allocate (table(size(patches)))
             call put_patches(patches, table, nothing)
             field%patch_count = size(patches)
             if (size(patches) > 0) field%patches = c_loc(table)
         end if
-        status = c_set_field(self%handle, as_c_text(mesh), field)
+        call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
     end subroutine set_field
 
     ! Lengths that C is not told, and would read beyond.
@@ -901,8 +923,8 @@ contains
         end do
     end subroutine put_patches
 
-    ! C calls this: it runs the caller's procedure, and gives C its array.
-    function run_fill(data, field) bind(C) result(status)
+    ! C calls this: it runs the caller's procedure, and gives C its array. That may step another session.
+    recursive function run_fill(data, field) bind(C) result(status)
         type(c_ptr), value :: data
         type(c_field), intent(inout) :: field
         integer(c_int) :: status
@@ -950,15 +972,14 @@ contains
         type(c_field) :: field
         c_name = as_c_text(name)
         record => record_of(self, mesh, name)
-        record%fill => fill
         call c_field_defaults(field)
         field%name = c_loc(c_name)
         if (present(centring)) field%centring = centring
         if (present(components)) field%component_count = components
         field%fill = c_funloc(run_fill)
         field%fill_data = c_loc(record)
-        self%own_error = ''
-        status = c_set_field(self%handle, as_c_text(mesh), field)
+        call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
+        if (status == INSITU_OK) record%fill => fill
     end subroutine set_filled_field
 
     ! Turn on or off that rank 0 keeps each step's pictures in memory. Collective; rank 0's keep counts.
@@ -966,8 +987,7 @@ contains
         class(insitu_session), intent(inout) :: self
         logical, intent(in) :: keep
         integer, intent(out) :: status
-        self%own_error = ''
-        status = c_keep_pictures(self%handle, merge(1_c_int, 0_c_int, keep))
+        call take_status(self, c_keep_pictures(self%handle, merge(1_c_int, 0_c_int, keep)), status)
     end subroutine keep_pictures
 
     ! The pictures of the last step; none on other ranks, or where none are kept.
@@ -989,8 +1009,9 @@ contains
         end do
     end function pictures
 
-    ! Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable.
-    subroutine step(self, cycle, time, status)
+    ! Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable. It is
+    ! recursive because a fill may call it, on its own session to be refused.
+    recursive subroutine step(self, cycle, time, status)
         class(insitu_session), intent(inout) :: self
         integer, intent(in) :: cycle
         real(real64), intent(in) :: time
@@ -1011,7 +1032,7 @@ contains
         out = last
     end function report
 
-    ! The reason why the last call failed.
+    ! The reason why the last call failed, of those since the last step began (insitu_error in insitu.h).
     function error(self) result(out)
         class(insitu_session), intent(in) :: self
         character(:), allocatable :: out
@@ -1026,6 +1047,7 @@ contains
         type(fill_record), pointer :: record
         self%own_error = ''
         status = c_destroy(self%handle)
+        if (c_associated(self%handle)) return ! refused, as a fill has called this
         do while (associated(self%fills))
             record => self%fills
             self%fills => record%next

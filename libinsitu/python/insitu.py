@@ -323,9 +323,11 @@ def _patches(field, given):
     return [table, *(held for _, held in made)]
 
 
-def _fill_by(make, index, row, made, raised):
-    """A C function that has make() give the values. made: holds them until the step is over; raised: what went wrong."""
+def _fill_by(make, index, row, made, raised, running):
+    """A C function that has make() give the values. made: holds them until the step is over; raised: what went wrong;
+    running: holds something while make() runs."""
     def fill(_, field):
+        running.append(make)
         try:
             made.append(_put_values(field.contents, make()))
             field.contents.index, field.contents.corner_row = index, row
@@ -333,6 +335,8 @@ def _fill_by(make, index, row, made, raised):
         except BaseException as error:  # C must not be passed by
             raised.append(error)
             return 8  # INSITU_ERROR_INTERNAL
+        finally:
+            running.pop()
     return _Fill(fill)
 
 
@@ -349,6 +353,7 @@ class Session:
         self._retired = []  # borrowed before it was set again: until a step has returned
         self._made = []  # by callables: until the step has returned
         self._raised = []  # by callables, in this step
+        self._running = []  # the callable that runs: what the step borrows stays then, and calls are refused
         create = _library.insitu_create if scene_text is None else _library.insitu_create_from_text
         text = scene_text if scene_text is not None else scene
         text = os.fsencode(text) if text is not None else None
@@ -422,7 +427,8 @@ class Session:
         if callable(values):
             if len(patches) > 0:
                 raise TypeError("patches: are given, and values are made by a callable; expected an array of values")
-            field.fill = _fill_by(values, borrowed, corner_row, self._made, self._raised)
+            field.fill = _fill_by(values, borrowed, corner_row, self._made, self._raised,
+                                  self._running)
             field.component_count = components
             held.append(field.fill)
         else:
@@ -435,6 +441,7 @@ class Session:
     def step(self, cycle, time):
         """Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable."""
         status = _library.insitu_step(self._open(), cycle, time)
+        self._refuse_if_running()
         self._retired.clear()
         self._made.clear()
         raised = self._raised[0] if self._raised else None
@@ -448,6 +455,7 @@ class Session:
     def report(self):
         """The report of the last step, as a dict with the keys of insitu_report."""
         report = _library.insitu_last_report(self._open()).contents
+        self._refuse_if_running()
         values = {key: getattr(report, key) for key, _ in _Report._fields_}
         return {key: (value or b"").decode(errors="replace") if kind is ctypes.c_char_p else value
                 for (key, kind), value in zip(_Report._fields_, values.values())}
@@ -461,6 +469,7 @@ class Session:
         """The last step's pictures, a list of Picture: copies, which stay. Empty on other ranks, or where none are kept."""
         count = ctypes.c_int()
         kept = _library.insitu_last_pictures(self._open(), ctypes.byref(count))
+        self._refuse_if_running()
         return [Picture(kept[i].image.decode(),
                         numpy.ctypeslib.as_array(kept[i].rgba, (kept[i].height, kept[i].width, 4)).copy(),
                         numpy.ctypeslib.as_array(kept[i].depth, (kept[i].height, kept[i].width)).copy())
@@ -470,6 +479,7 @@ class Session:
         """End the session and let go of what it borrowed; pictures that wait are written first, and Error is raised where
         one could not be. Collective. A closed session may be closed again."""
         status = _library.insitu_destroy(ctypes.byref(self._session)) if self._session else 0
+        self._refuse_if_running()
         self._held.clear()
         self._retired.clear()
         _check(status, None, True)
@@ -486,6 +496,11 @@ class Session:
         if not self._session:
             raise ValueError("the session is closed")
         return self._session
+
+    def _refuse_if_running(self):
+        """A callable has called the session, and the library has refused it, in words: not one that all ranks have."""
+        if self._running:
+            _check(1, self._session, False)  # INSITU_ERROR_ARGUMENT
 
     def _hand_over(self, call, mesh, description, key, arrays):
         """Those borrowed before are held until a step has returned, or with these if the call is refused."""

@@ -12,14 +12,26 @@
 /* The message of insitu_error(NULL): there is no session to ask after a failed insitu_create(). */
 static _Thread_local base_error thread_error;
 
+/* Returned while a fill runs, when the report of the step is half made. */
+static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""};
+
+/* Refuses a call that a fill of the session makes. To note that is all that a session that is only read is changed by.
+ */
+static bool is_in_fill(const insitu_session *session, const char *call)
+{
+    return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
+}
+
 const char *insitu_error(const insitu_session *session)
 {
-    return session ? session->error.message : thread_error.message;
+    if (!session) return thread_error.message;
+    return session->meshes.filling.mesh ? session->meshes.filling.refused.message : session->error.message;
 }
 
 const insitu_report *insitu_last_report(const insitu_session *session)
 {
-    return session ? &session->report.numbers : NULL;
+    if (!session) return NULL;
+    return is_in_fill(session, "insitu_last_report") ? &no_report : &session->report.numbers;
 }
 
 const char *insitu_status_name(insitu_status status)
@@ -129,33 +141,43 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
+/* A call that succeeds leaves the message of the last one that failed, until a step begins. */
+static insitu_status keep_error(insitu_session *session, const base_error *error)
+{
+    if (error->status) session->error = *error;
+    return error->status;
+}
+
 insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, const insitu_mesh *mesh)
 {
-    if (!session) return INSITU_ERROR_ARGUMENT;
-    return session_set_mesh(&session->meshes, mesh_name, mesh, &session->error);
+    base_error error = {.status = INSITU_OK};
+    if (!session || is_in_fill(session, "insitu_set_mesh")) return INSITU_ERROR_ARGUMENT;
+    session_set_mesh(&session->meshes, mesh_name, mesh, &error);
+    return keep_error(session, &error);
 }
 
 insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, const insitu_field *field)
 {
-    if (!session) return INSITU_ERROR_ARGUMENT;
-    return session_set_field(&session->meshes, mesh_name, field, &session->error);
+    base_error error = {.status = INSITU_OK};
+    if (!session || is_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
+    session_set_field(&session->meshes, mesh_name, field, &error);
+    return keep_error(session, &error);
 }
 
 insitu_status insitu_keep_pictures(insitu_session *session, int keep)
 {
-    if (!session) return INSITU_ERROR_ARGUMENT;
+    base_error error = {.status = INSITU_OK};
+    if (!session || is_in_fill(session, "insitu_keep_pictures")) return INSITU_ERROR_ARGUMENT;
     session_drop_kept(&session->kept);
-    session->error = (base_error){0};
     int is_on = keep != 0;
-    const insitu_status status =
-        session_mpi(&session->error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast");
-    if (!status) session->kept.is_on = is_on;
-    return status;
+    if (session_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
+        session->kept.is_on = is_on;
+    return keep_error(session, &error);
 }
 
 const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count)
 {
-    const int kept = session ? session->kept.count : 0;
+    const int kept = session && !is_in_fill(session, "insitu_last_pictures") ? session->kept.count : 0;
     if (count) *count = kept;
     return kept ? session->kept.items : NULL;
 }
@@ -165,6 +187,10 @@ insitu_status insitu_destroy(insitu_session **session)
     if (!session || !*session) return INSITU_OK;
     insitu_session *s = *session;
     thread_error = (base_error){0};
+    if (is_in_fill(s, "insitu_destroy")) {
+        thread_error = s->meshes.filling.refused;
+        return INSITU_ERROR_ARGUMENT;
+    }
     session_writer_drain(&s->writer);
     session_writer_collect(&s->writer, &s->report);
     if (s->writer.failures) thread_error = session_writer_failure(&s->writer);

@@ -35,7 +35,7 @@ struct insitu_session {
     session_report report;
     bool has_stepped;
     double last_time; /* of the last step */
-    base_error error; /* of the last call */
+    base_error error; /* of the last call that failed since the last step began */
 };
 
 #endif

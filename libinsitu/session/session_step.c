@@ -162,7 +162,7 @@ static insitu_status tell_unwritten(insitu_session *s, base_error *error)
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
 {
-    if (!session) return INSITU_ERROR_ARGUMENT;
+    if (!session || session_refuse_in_fill(&session->meshes, "insitu_step")) return INSITU_ERROR_ARGUMENT;
     session_guard guard;
     session_guard_begin(&guard);
     const double start = MPI_Wtime();

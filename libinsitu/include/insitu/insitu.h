@@ -217,8 +217,10 @@ struct insitu_field;
  * component_count. insitu_step() calls it on its caller's thread, at most once a step, and only if a picture, a
  * statistic or a condition of this step needs the field. The arrays are borrowed until the step has returned. All ranks
  * call the fills of their fields in the same order, by the names of meshes and then of fields: where all ranks set the
- * field with a fill, it may communicate, on a communicator of the caller's. It must not call the session. A status
- * other than INSITU_OK is an error of the step, returned on all ranks; the other fills are still called. */
+ * field with a fill, it may communicate, on a communicator of the caller's. It must not call the session: each such
+ * call but insitu_error() is refused (the functions that return a status return INSITU_ERROR_ARGUMENT,
+ * insitu_last_report() an empty report, and insitu_last_pictures() none) and is an error of the step. So is a status
+ * other than INSITU_OK. The step returns it on all ranks; the other fills are still called. */
 typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
 
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
@@ -381,9 +383,10 @@ INSITU_API insitu_status insitu_keep_pictures(insitu_session *session, int keep)
  * on other ranks than 0, where nothing was due, or where pictures are not kept. Local. */
 INSITU_API const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count);
 
-/* The message of the last call on the session that failed, "" if none did. Local. Valid until the next call on the
- * session. For NULL: the message of this thread's last insitu_create(), insitu_create_from_text() or insitu_destroy()
- * that failed. */
+/* The message of the last call on the session that failed since insitu_step() was last called, that call included; ""
+ * if none did. So a step's failure can be read until the next step, whatever calls succeed in between. Local. Valid
+ * until the next call on the session. For NULL: the message of this thread's last insitu_create(),
+ * insitu_create_from_text() or insitu_destroy() that failed. */
 INSITU_API const char *insitu_error(const insitu_session *session);
 
 /* Close a session and set *session to NULL. Collective. NULL, or a pointer to NULL, is fine. Waiting pictures are

@@ -275,6 +275,16 @@ const base_error *session_pending_error(const session_meshes *meshes)
     return meshes->pending.status ? &meshes->pending : NULL;
 }
 
+bool session_refuse_in_fill(session_meshes *meshes, const char *call)
+{
+    session_filling *filling = &meshes->filling;
+    if (!filling->mesh) return false;
+    base_fail(&filling->refused, INSITU_ERROR_ARGUMENT,
+              "mesh \"%s\": field \"%s\": its fill called %s() of its session, which a fill must not", filling->mesh,
+              filling->field, call);
+    return true;
+}
+
 void session_meshes_free(session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) free_mesh(meshes->items[i]);

@@ -167,6 +167,12 @@ typedef struct session_mesh {
     session_outer **outers;
 } session_mesh;
 
+/* The fill of the caller's that is running (session_filled.h). */
+typedef struct session_filling {
+    const char *mesh, *field; /* NULL: none is running */
+    base_error refused;       /* the first call of the fill on its session */
+} session_filling;
+
 /* All meshes of this rank. */
 typedef struct session_meshes {
     int count, capacity;
@@ -174,6 +180,7 @@ typedef struct session_meshes {
     bool are_cells_changed; /* or coordinates, since the last agreed extent */
     bool are_names_changed; /* since the last agreed catalogue */
     base_error pending;     /* the error of a set call that had no mesh to keep it; for one step */
+    session_filling filling;
 } session_meshes;
 
 static inline int64_t session_type_size(insitu_type type)
@@ -258,5 +265,9 @@ static inline int64_t session_vertex_count(const session_mesh *mesh)
 
 /* The first error that a set call left behind, or NULL. */
 const base_error *session_pending_error(const session_meshes *meshes);
+
+/* Refuses a public call if a fill of the session makes it: it would change what the step reads. Returns whether it
+ * does; filling.refused says so, and is what the step fails with. Local. */
+bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
 #endif

@@ -11,26 +11,32 @@ static bool is_needed(const session_mesh *mesh, int index, bool of_images)
     return is_used;
 }
 
-static insitu_status call_fill(const session_mesh *mesh, const insitu_field *given, insitu_field *out,
-                               base_error *error)
+static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh, const insitu_field *given,
+                               insitu_field *out, base_error *error)
 {
     *out = *given;
     out->changed = INSITU_CHANGED_ALL;
+    meshes->filling = (session_filling){.mesh = mesh->name, .field = given->name};
     const insitu_status status = given->fill(given->fill_data, out);
+    meshes->filling.mesh = NULL;
+    if (meshes->filling.refused.status) {
+        *error = meshes->filling.refused;
+        return error->status;
+    }
     if (status == INSITU_OK) return status;
     return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": its fill returned %d (%s)", mesh->name,
                      given->name, (int)status, insitu_status_name(status));
 }
 
 /* A fill that has failed is an error for all that need the field. */
-static insitu_status fill_field(session_mesh *mesh, int index, base_error *error)
+static insitu_status fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];
     insitu_field filled;
     *error = field->fill_problem;
     if (field->is_filled) return error->status;
     field->is_filled = true;
-    insitu_status status = call_fill(mesh, &field->given, &filled, error);
+    insitu_status status = call_fill(meshes, mesh, &field->given, &filled, error);
     if (!status) status = session_take_filled(mesh, index, &filled, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
@@ -39,7 +45,7 @@ static insitu_status fill_field(session_mesh *mesh, int index, base_error *error
     return status;
 }
 
-insitu_status session_fill_fields(const session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
+insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
@@ -49,7 +55,7 @@ insitu_status session_fill_fields(const session_meshes *meshes, const session_ca
             base_error own = {0};
             const int index = session_find_field(mesh, all->fields[f].name);
             if (index < 0 || !mesh->fields[index].given.fill || !is_needed(mesh, index, of_images)) continue;
-            if (fill_field(mesh, index, &own) && !error->status) *error = own;
+            if (fill_field(meshes, mesh, index, &own) && !error->status) *error = own;
         }
     }
     return error->status;

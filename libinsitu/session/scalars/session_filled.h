@@ -8,7 +8,7 @@
 /* Call the fills of the fields that are wanted, or, if of_images, of those whose scalars are in use, unless they were
  * called in this step. All are called, though some fail, in the same order on all ranks; the first error is returned.
  * Local, but fills may communicate. */
-insitu_status session_fill_fields(const session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
+insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 
 /* Ends the step: the filled arrays are the caller's again. */

@@ -87,7 +87,7 @@ static void note_conditions(session_events *events, const scene *scene, const ev
     }
 }
 
-insitu_status session_update_events(session_events *events, const scene *scene, const session_meshes *meshes,
+insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
                                     const session_event_time *now, base_error *error)
 {

@@ -24,7 +24,7 @@ bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle
 
 /* Find the statistics that are due and those that images wait for, write the former, and note which conditions hold.
  * An error is told when all of them are done. Collective. */
-insitu_status session_update_events(session_events *events, const scene *scene, const session_meshes *meshes,
+insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
                                     const session_event_time *now, base_error *error);
 
