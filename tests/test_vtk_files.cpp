@@ -2,6 +2,7 @@
  * short they get an error or the same cells and values, never others.
  *
  *     test_vtk_files [random cuts of each file] */
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -344,6 +345,63 @@ void grids_without_cells_are_no_errors(void **)
     assert_string_equal(difference(read_grid("with_none.pvtu"), hexes(lattice::curved), true).c_str(), "");
 }
 
+/* Each file of text has a number written as Fortran does in the place of the last one that is a value. */
+void numbers_without_the_letter_of_their_exponent_are_refused(void **)
+{
+    const std::string vtu = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>\n"
+                            "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><PointData>\n"
+                            "<DataArray type=\"Float64\" Name=\"f\" format=\"ascii\">\n1 2 NAN\nVALUE</DataArray>\n"
+                            "</PointData><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">"
+                            "0 0 0 1.e0 0 0 0 +1 0 0 0 .1E+1</DataArray></Points><Cells>"
+                            "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>"
+                            "<DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">4</DataArray>"
+                            "<DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10</DataArray>"
+                            "</Cells></Piece></UnstructuredGrid></VTKFile>\n";
+    const std::string vtk = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
+                            "0 0 0 1 0 0\n0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\n"
+                            "SCALARS f double\nLOOKUP_TABLE default\n1 2 3\nVALUE\n";
+    struct text_file {
+        std::string name, text, line;
+    };
+    for (const text_file &file : {text_file{"fortran.vtu", vtu, "line 5: "}, {"fortran.vtk", vtk, "line 16: "}})
+        for (const std::string value : {"0.123456-101", "0.5+120", "1.5D+00", "1e-101", "********", "4"}) {
+            std::string text = file.text;
+            text.replace(text.find("VALUE"), 5, value);
+            write_file(folder + "/" + file.name, text);
+            std::string message;
+            try {
+                (void)read_grid(file.name);
+            } catch (const std::exception &e) {
+                message = e.what();
+            }
+            const bool is_right = value == "1e-101" || value == "4";
+            if (is_right ? message.empty() || message.find("is no number") == std::string::npos
+                         : message.find(file.name + ": " + file.line + "\"" + value + "\" is no number") !=
+                               std::string::npos)
+                continue;
+            print_error("%s with %s: %s\n", file.name.c_str(), value.c_str(), message.c_str());
+            assert_true(false);
+        }
+}
+
+void ensight_numbers_without_the_letter_are_refused(void **)
+{
+    const std::string path = folder + "/t.x", whole = read_file(path);
+    const size_t last = whole.find_last_of('\n', whole.size() - 2) + 1;
+    write_file(path, whole.substr(0, last) + "0.123456-101\n");
+    std::string message;
+    try {
+        (void)read_grid("t.case");
+    } catch (const std::exception &e) {
+        message = e.what();
+    }
+    write_file(path, whole);
+    const auto line = std::count(whole.begin(), whole.end(), '\n');
+    if (message == path + ": line " + std::to_string(line) + ": \"0.123456-101\" is no number") return;
+    print_error("%s\n", message.c_str());
+    assert_true(false);
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -359,6 +417,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(series_have_the_times_of_their_entries),
         cmocka_unit_test(wrong_series_are_refused_by_what_is_wrong),
         cmocka_unit_test(grids_without_cells_are_no_errors),
+        cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
+        cmocka_unit_test(ensight_numbers_without_the_letter_are_refused),
     };
     return cmocka_run_group_tests(tests, write_all, nullptr);
 }

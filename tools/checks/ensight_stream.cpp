@@ -2,6 +2,8 @@
  * bytes; Fortran puts both into records, with the length in bytes before and after the contents. */
 #include "ensight_stream.h"
 
+#include "number_check.h"
+
 #include <array>
 #include <numeric>
 #include <stdexcept>
@@ -145,9 +147,12 @@ void ensight_stream::skip_numbers(int64_t count)
         end_record();
         return;
     }
-    double value = 0;
-    for (int64_t i = 0; i < count; i++)
+    std::string value;
+    for (int64_t i = 0; i < count; i++) {
         if (!(in_ >> value)) refuse("is cut short: a number is missing");
+        if (!is_number(value))
+            refuse_number(path_, value, in_.eof() ? size_ - 1 : static_cast<int64_t>(in_.tellg()) - 1);
+    }
 }
 
 } // namespace render_tool

@@ -12,6 +12,7 @@
 #include "ensight_check.h"
 #include "legacy_check.h"
 #include "netcdf_size.h"
+#include "number_check.h"
 
 namespace render_tool
 {
@@ -74,7 +75,10 @@ void check_length(const std::string &path)
     if (expected > 0 && stat(path.c_str(), &info) == 0 && info.st_size < expected)
         throw std::runtime_error(path + ": is cut short: " + std::to_string(info.st_size) + " bytes of " +
                                  std::to_string(expected));
-    if (is_vtk_xml(path)) check_last_tag(path);
+    if (is_vtk_xml(path)) {
+        check_last_tag(path);
+        check_xml_numbers(path);
+    }
     if (has_ending(path, ".vtk")) check_legacy(path);
     if (has_ending(path, ".case")) {
         check_last_line(path);

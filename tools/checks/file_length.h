@@ -7,7 +7,8 @@
 namespace render_tool
 {
 
-/* Throw std::runtime_error where the file is shorter than it says or ends within a line of text. */
+/* Throw std::runtime_error where the file is shorter than it says, ends within a line of text, or has a word among its
+ * numbers that is none. */
 void check_length(const std::string &path);
 
 /* Tells whether a .vtu is whole and declares all its pieces to have neither points nor cells. */

@@ -2,6 +2,8 @@
  * sections: each has a word and counts, and most have values, as text or as big-endian numbers and an end of line. */
 #include "legacy_check.h"
 
+#include "number_check.h"
+
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
@@ -138,7 +140,10 @@ class walker
             int c = bytes->sgetc();
             while (c != end && std::isspace(c)) c = bytes->snextc();
             if (c == end) refuse("values of \"" + words_[0] + "\" are missing");
-            while (c != end && !std::isspace(c)) c = bytes->snextc();
+            std::string value;
+            for (; c != end && !std::isspace(c); c = bytes->snextc()) value += static_cast<char>(c);
+            if (!is_number(value))
+                refuse_number(path_, value, static_cast<int64_t>(in_.tellg()) - static_cast<int64_t>(value.size()));
         }
     }
 
