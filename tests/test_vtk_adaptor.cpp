@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vtkCellArray.h>
@@ -539,6 +540,34 @@ void ghost_flags_that_hide_are_handed_over(void **)
     assert_null(f.mesh().mesh.ghosts.data);
 }
 
+/* vtkGhostType of 32 bits, VisIt's array alone, and both. */
+void ghost_flags_of_other_types_and_names_hide_cells_too(void **)
+{
+    const int own[4] = {0, vtkDataSetAttributes::DUPLICATECELL, 0, vtkDataSetAttributes::HIDDENCELL};
+    const int zones[4] = {0, 0, 2, 1};
+    for (const auto &[has_own, has_zones] : {std::pair{true, false}, {false, true}, {true, true}}) {
+        vtkNew<vtkUnstructuredGrid> grid;
+        vtkNew<vtkIntArray> first, second;
+        first->SetName(vtkDataSetAttributes::GhostArrayName());
+        second->SetName("avtGhostZones");
+        for (int i = 0; i < 4; i++) {
+            add_cell(grid, VTK_TETRA, corner);
+            first->InsertNextValue(own[i]);
+            second->InsertNextValue(zones[i]);
+        }
+        if (has_own) grid->GetCellData()->AddArray(first);
+        if (has_zones) grid->GetCellData()->AddArray(second);
+        fixture f;
+        assert_int_equal(f.set(grid), INSITU_OK);
+        assert_non_null(f.mesh().mesh.ghosts.data);
+        for (int i = 0; i < 4; i++) {
+            const bool is_hidden = (has_own && own[i] != 0) || (has_zones && zones[i] != 0);
+            assert_int_equal(integer_at(f.mesh().mesh.ghosts, i) != 0, is_hidden);
+        }
+        assert_true(f.mesh().fields.empty());
+    }
+}
+
 void ghost_flags_follow_cells_left_out(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
@@ -811,6 +840,7 @@ int main()
         cmocka_unit_test(polyhedra_share_their_faces),
         cmocka_unit_test(polyhedra_without_faces_are_warned_about),
         cmocka_unit_test(ghost_flags_that_hide_are_handed_over),
+        cmocka_unit_test(ghost_flags_of_other_types_and_names_hide_cells_too),
         cmocka_unit_test(ghost_flags_follow_cells_left_out),
         cmocka_unit_test(structured_grids_are_hexahedra),
         cmocka_unit_test(polygons_are_shells),

@@ -76,8 +76,9 @@ constexpr unsigned char ghosts_not_drawn =
  * holds only the former, and none is needed where nothing is hidden. */
 void set_ghosts(vtkUnstructuredGrid *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
 {
-    vtkUnsignedCharArray *ghosts = grid->GetCellGhostArray();
-    if (!ghosts || ghosts->GetNumberOfValues() != grid->GetNumberOfCells()) return;
+    const auto ghosts = vtkSmartPointer<vtkUnsignedCharArray>::Take(
+        insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells()));
+    if (!ghosts) return;
     const unsigned char *flags = ghosts->GetPointer(0);
     const vtkIdType flag_count = ghosts->GetNumberOfValues();
     unsigned all = 0;
@@ -86,7 +87,10 @@ void set_ghosts(vtkUnstructuredGrid *grid, const cell_list &cells, const std::st
     if (cells.is_one_to_one && (all & ~static_cast<unsigned>(ghosts_not_drawn)) == 0) {
         p.held.objects.emplace_back(ghosts);
         p.mesh.ghosts = {flags, INSITU_UINT8, 0};
-        count.bytes_borrowed += cells.count;
+        if (ghosts == grid->GetCellGhostArray())
+            count.bytes_borrowed += cells.count;
+        else
+            count.copied(what + " ghosts", "flags that are no bytes of VTK's", cells.count);
         return;
     }
     auto *copy = reinterpret_cast<unsigned char *>(p.held.allocate(static_cast<size_t>(cells.count)));
@@ -123,7 +127,7 @@ bool has_field(const part &p, const std::string &name)
 bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, tally &count)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
-    if (name.empty() || name == vtkDataSetAttributes::GhostArrayName()) return false;
+    if (name.empty() || name == vtkDataSetAttributes::GhostArrayName() || name == "avtGhostZones") return false;
     if (array->GetNumberOfTuples() == expected && array->GetNumberOfComponents() > 0) return true;
     count.warn(what + ": array '" + name + "' has " + std::to_string(array->GetNumberOfTuples()) +
                " tuples, expected " + std::to_string(expected) + ": left out");
@@ -263,8 +267,8 @@ void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &pa
     auto *at = vtkUniformGridAMRDataIterator::SafeDownCast(it);
     vtkSmartPointer<vtkUnsignedCharArray> flags;
     if (amr && at)
-        flags = refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'",
-                              out.count);
+        flags =
+            refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'", out.count);
     set_other(adaptor, parts, name, data, flags, out);
 }
 

@@ -3,12 +3,15 @@
  * refined. */
 #include "vtk_amr.h"
 
+#include "insitu/vtk_grids.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include <vtkAMRBox.h>
 #include <vtkAMRInformation.h>
+#include <vtkCellData.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkOverlappingAMR.h>
@@ -79,12 +82,12 @@ int64_t ratio_to_next(vtkOverlappingAMR *amr, unsigned level)
 /* data's own flags, or zeros. */
 vtkSmartPointer<vtkUnsignedCharArray> copied_flags(vtkDataSet *data)
 {
-    const vtkUnsignedCharArray *own = data->GetCellGhostArray();
+    const auto own = vtkSmartPointer<vtkUnsignedCharArray>::Take(
+        insitu_vtk_ghost_flags(data->GetCellData(), data->GetNumberOfCells()));
     auto flags = vtkSmartPointer<vtkUnsignedCharArray>::New();
     flags->SetName(vtkDataSetAttributes::GhostArrayName());
     flags->SetNumberOfValues(data->GetNumberOfCells());
-    const bool has_own = own && own->GetNumberOfValues() == data->GetNumberOfCells();
-    for (vtkIdType i = 0; i < data->GetNumberOfCells(); i++) flags->SetValue(i, has_own ? own->GetValue(i) : 0);
+    for (vtkIdType i = 0; i < data->GetNumberOfCells(); i++) flags->SetValue(i, own ? own->GetValue(i) : 0);
     return flags;
 }
 

@@ -144,14 +144,16 @@ void set_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 /* A structured grid may hide cells by their points; a flag of the cell then says the same. */
 void hide_cells_of_hidden_points(vtkUnstructuredGrid *grid)
 {
-    vtkUnsignedCharArray *points = grid->GetPointGhostArray(), *cells = grid->GetCellGhostArray();
-    if (!points || points->GetNumberOfValues() != grid->GetNumberOfPoints()) return;
+    using flag_list = vtkSmartPointer<vtkUnsignedCharArray>;
+    const auto points = flag_list::Take(insitu_vtk_ghost_flags(grid->GetPointData(), grid->GetNumberOfPoints()));
+    const auto cells = flag_list::Take(insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells()));
+    if (!points) return;
     vtkNew<vtkUnsignedCharArray> flags;
     flags->SetName(vtkDataSetAttributes::GhostArrayName());
     flags->SetNumberOfValues(grid->GetNumberOfCells());
     bool is_any_hidden = false;
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
-        unsigned flag = cells && i < cells->GetNumberOfValues() ? cells->GetValue(i) : 0;
+        unsigned flag = cells ? cells->GetValue(i) : 0;
         vtkIdType count = 0;
         const vtkIdType *ids = nullptr;
         grid->GetCellPoints(i, count, ids);
@@ -164,6 +166,31 @@ void hide_cells_of_hidden_points(vtkUnstructuredGrid *grid)
 }
 
 } // namespace
+
+vtkUnsignedCharArray *insitu_vtk_ghost_flags(vtkDataSetAttributes *data, int64_t count)
+{
+    const auto array_of = [&](const char *name) -> vtkDataArray * {
+        vtkDataArray *array = data->GetArray(name);
+        const bool fits = array && array->GetNumberOfTuples() == count && array->GetNumberOfComponents() == 1;
+        return fits ? array : nullptr;
+    };
+    vtkDataArray *own = array_of(vtkDataSetAttributes::GhostArrayName()), *zones = array_of("avtGhostZones");
+    auto *bytes = vtkUnsignedCharArray::SafeDownCast(own);
+    if ((!own && !zones) || (bytes && !zones)) {
+        if (bytes) bytes->Register(nullptr);
+        return bytes;
+    }
+    vtkNew<vtkUnsignedCharArray> flags;
+    flags->SetName(vtkDataSetAttributes::GhostArrayName());
+    flags->SetNumberOfValues(count);
+    for (vtkIdType i = 0; i < count; i++) {
+        unsigned flag = own ? static_cast<unsigned>(own->GetComponent(i, 0)) : 0;
+        if (zones && zones->GetComponent(i, 0) != 0) flag |= vtkDataSetAttributes::DUPLICATECELL;
+        flags->SetValue(i, static_cast<unsigned char>(flag));
+    }
+    flags->Register(nullptr);
+    return flags;
+}
 
 vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data)
 {

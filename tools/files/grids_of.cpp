@@ -24,6 +24,19 @@ namespace render_tool
 namespace
 {
 
+/* Gives a grid's cells ghost flags of VTK's own type where they have others. Returns a copy by reference then. */
+vtkSmartPointer<vtkUnstructuredGrid> with_ghost_bytes(vtkUnstructuredGrid *grid)
+{
+    const auto flags = vtkSmartPointer<vtkUnsignedCharArray>::Take(
+        insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells()));
+    if (!flags || flags == grid->GetCellGhostArray()) return grid;
+    auto copy = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    copy->ShallowCopy(grid);
+    copy->GetCellData()->RemoveArray("avtGhostZones");
+    copy->GetCellData()->AddArray(flags);
+    return copy;
+}
+
 /* An object that is no data set is returned as it is. */
 vtkSmartPointer<vtkDataObject> grid_of(vtkDataObject *leaf, const std::string &path)
 {
@@ -33,7 +46,7 @@ vtkSmartPointer<vtkDataObject> grid_of(vtkDataObject *leaf, const std::string &p
     if (!grid) grid.TakeReference(insitu_vtk_make_grid(data));
     const std::string bad = find_bad_cell(grid);
     if (!bad.empty()) throw std::runtime_error(path + ": " + bad);
-    return grid;
+    return with_ghost_bytes(grid);
 }
 
 template <typename Array>

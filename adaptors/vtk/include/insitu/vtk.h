@@ -24,7 +24,8 @@
  * Quadratic and higher-order cells: drawn by their corners as linear cells, and reported; copied. - What else is left,
  * polyhedra without their faces too: not drawn, and reported; so are lines and points. - Fields: float, double and 32-
  * or 64-bit signed integers borrowed; other types copied. - vtkGhostType of the cells: duplicate, hidden and refined
- * cells are not drawn, nor cells of structured grids with a hidden point. - Overlapping AMR: cells within a box of the
+ * cells are not drawn, nor cells of structured grids with a hidden point; nor those whose avtGhostZones, of VisIt, is
+ * not 0. Bytes are borrowed, flags of other types copied. - Overlapping AMR: cells within a box of the
  * next level are not drawn, whether or not vtkAMRUtilities::BlankCells() has flagged them, and whichever rank holds the
  * finer grid. Boxes, and spacings or ratios, are to be set for all levels on every rank, as VTK wants them; a warning
  * says where they do not fit the grids.

@@ -1,10 +1,14 @@
-/* Makes of any VTK data set the unstructured grid as which insitu_vtk_set() takes it. */
+/* Makes of any VTK data set the unstructured grid as which insitu_vtk_set() takes it, and reads ghost flags. */
 #ifndef INSITU_VTK_GRIDS_H
 #define INSITU_VTK_GRIDS_H
+
+#include <cstdint>
 
 #include "insitu/status.h"
 
 class vtkDataSet;
+class vtkDataSetAttributes;
+class vtkUnsignedCharArray;
 class vtkUnstructuredGrid;
 
 extern "C" {
@@ -16,6 +20,12 @@ extern "C" {
  * bytes each, or 12 if the axes are floats. A cell with a hidden point is flagged as hidden. The grid is the caller's,
  * to be given back by its Delete(). data is not changed. May throw std::bad_alloc. Local. */
 INSITU_API vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data);
+
+/* The ghost flags of cells or points as VTK has them: data's own vtkGhostType if that is of bytes, or a new array of
+ * that name from a vtkGhostType of other whole numbers, and from VisIt's avtGhostZones, where not 0, as duplicate
+ * cells. NULL where there are none for `count` cells or points. The caller gives it back by UnRegister(). data is not
+ * changed. May throw std::bad_alloc. Local. */
+INSITU_API vtkUnsignedCharArray *insitu_vtk_ghost_flags(vtkDataSetAttributes *data, int64_t count);
 
 } // extern "C"
 
