@@ -51,10 +51,11 @@ set_tests_properties(session_camera PROPERTIES TIMEOUT 60)
 
 # Decorations, tested below the C face of the image library.
 add_library(test_decorate OBJECT
-  ${PROJECT_SOURCE_DIR}/adaptors/image/decorate.cpp ${PROJECT_SOURCE_DIR}/adaptors/image/typeface.cpp)
+  ${PROJECT_SOURCE_DIR}/adaptors/image/decorate.cpp ${PROJECT_SOURCE_DIR}/adaptors/image/layout.cpp
+  ${PROJECT_SOURCE_DIR}/adaptors/image/typeface.cpp)
 target_include_directories(test_decorate PUBLIC ${PROJECT_SOURCE_DIR}/adaptors/image)
 target_link_libraries(test_decorate PUBLIC insitu_flags insitu_internal PkgConfig::FREETYPE PkgConfig::CMOCKA)
-foreach(test decorated_image random_decorations glyphs)
+foreach(test decorated_image random_decorations glyphs layout)
   add_executable(test_${test} test_${test}.cpp)
   target_link_libraries(test_${test} PRIVATE test_decorate)
 endforeach()
@@ -62,6 +63,8 @@ add_test(NAME decorated_image COMMAND test_decorated_image)
 set_tests_properties(decorated_image PROPERTIES TIMEOUT 60)
 add_test(NAME glyphs COMMAND test_glyphs)
 set_tests_properties(glyphs PROPERTIES TIMEOUT 60)
+insitu_add_split_test(layout test_layout)
+set_tests_properties(layout PROPERTIES TIMEOUT 60)
 insitu_add_split_test(random_decorations test_random_decorations)
 set_tests_properties(random_decorations PROPERTIES TIMEOUT 120)
 

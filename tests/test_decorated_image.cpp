@@ -175,26 +175,6 @@ void words_are_written_at_their_anchor(void **)
     }
 }
 
-/* Any blocks for which there is room are apart, and within the picture. */
-void blocks_do_not_overlap(void **)
-{
-    const insitu_image image{1000, 800, nullptr, nullptr, nullptr, 0, nullptr, nullptr};
-    std::srand(3);
-    for (int round = 0; round < 2000; round++) {
-        std::vector<area> taken;
-        for (int n = 0; n < 12; n++) {
-            const spot where{static_cast<insitu_anchor>(std::rand() % 8), 0};
-            place_block(image, where, 10 + std::rand() % 240, 8 + std::rand() % 40, 12, taken);
-        }
-        for (std::size_t i = 0; i < taken.size(); i++) {
-            assert_true(taken[i].x0 >= 0 && taken[i].y0 >= 0 && taken[i].x1 <= 1000 && taken[i].y1 <= 800);
-            for (std::size_t k = 0; k < i; k++)
-                assert_true(taken[i].x1 <= taken[k].x0 || taken[k].x1 <= taken[i].x0 || taken[i].y1 <= taken[k].y0 ||
-                            taken[k].y1 <= taken[i].y0);
-        }
-    }
-}
-
 } // namespace
 
 int main()
@@ -204,7 +184,6 @@ int main()
                                 cmocka_unit_test(slanted_strokes_are_as_bright_as_straight_ones),
                                 cmocka_unit_test(a_bar_has_the_colours_of_its_map),
                                 cmocka_unit_test(bands_are_of_equal_height),
-                                cmocka_unit_test(words_are_written_at_their_anchor),
-                                cmocka_unit_test(blocks_do_not_overlap)};
+                                cmocka_unit_test(words_are_written_at_their_anchor)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -1,8 +1,10 @@
 /* Everything is drawn in linear light on premultiplied colours, so that edges of lines and letters are smooth on any
  * background. Strokes that the picture hides are drawn under it, the background under these, and all else over it.
- * Sizes are shares of the picture's height: a picture of twice the size looks the same, only finer.
- */
+ * Sizes are shares of the picture's height: a picture of twice the size looks the same, only finer. Words have a rim in
+ * the background's colour, so that they can be read over any picture and hide little of it. Where everything stands
+ * says layout.cpp. */
 #include "decorate.h"
+#include "layout.h"
 #include "typeface.h"
 
 #include <algorithm>
@@ -17,9 +19,6 @@ struct sheet {
     const insitu_decorations &what;
     std::vector<float> &rgba;
     typeface *font; /* NULL where there are no words */
-    int size;       /* of words, pixels */
-    double margin;
-    std::vector<area> taken;
 };
 
 /* ---- pixels -------------------------------------------------------------------------------------------------- */
@@ -72,7 +71,7 @@ double distance_to(const insitu_stroke &line, double x, double y)
 }
 
 /* Goes row by row over the columns that the line may meet, so that lines cost their length, not their box. */
-void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float colour[3])
+void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float colour[3], double opacity = 1)
 {
     const double reach = 0.5 * width + 1, dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
     const double top = std::min(line.from[1], line.to[1]) - reach, bottom = std::max(line.from[1], line.to[1]) + reach;
@@ -88,7 +87,7 @@ void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float 
         const double end = std::min(static_cast<double>(s.image.width), high + reach);
         for (int x = first; x < end; x++) {
             const double inside = 0.5 + 0.5 * width - distance_to(line, x + 0.5, y + 0.5);
-            if (inside > 0) blend(pixel_at(s, x, y), colour, std::min(inside, 1.0), line.is_behind);
+            if (inside > 0) blend(pixel_at(s, x, y), colour, opacity * std::min(inside, 1.0), line.is_behind);
         }
     }
 }
@@ -106,46 +105,46 @@ void draw_strokes(sheet &s, bool behind)
 
 /* ---- words --------------------------------------------------------------------------------------------------- */
 
-int width_of(const sheet &s, const std::string &text, int size)
+/* The rim around words and their lines: in the background's colour, unless that is transparent. */
+const double rim_opacity = 0.75;
+
+double rim_of(int size)
 {
-    return s.font ? s.font->width_of(text, size) : 0;
+    return std::max(1.0, 0.1 * size);
 }
 
-/* Writes text from the left end of its baseline. */
-void write_text(sheet &s, const std::string &text, double x, double baseline, int size)
+bool find_rim_colour(const sheet &s, float colour[3])
 {
-    const int left = static_cast<int>(std::lround(x)), top = static_cast<int>(std::lround(baseline));
-    if (!s.font) return;
-    s.font->draw(text, size, 0, [&](int column, int row, double covered) {
-        const int px = left + column, py = top + row;
-        if (px >= 0 && py >= 0 && px < s.image.width && py < s.image.height)
-            blend(pixel_at(s, px, py), s.what.colour, covered, false);
+    const float alpha = s.what.background[3];
+    for (int c = 0; c < 3; c++) colour[c] = alpha > 0 ? s.what.background[c] / alpha : 0;
+    return alpha > 0;
+}
+
+void cover_words(sheet &s, const placed_line &line, int size, double rim, const float colour[3], double opacity)
+{
+    const int left = static_cast<int>(std::lround(line.x)), top = static_cast<int>(std::lround(line.baseline));
+    s.font->draw(line.text, size, rim, [&](int column, int row, double covered) {
+        const int x = left + column, y = top + row;
+        if (x >= 0 && y >= 0 && x < s.image.width && y < s.image.height)
+            blend(pixel_at(s, x, y), colour, opacity * covered, false);
     });
 }
 
-/* Draws a plate in the background's colour, so that words can be read on any picture. */
-void put_plate(sheet &s, const area &block)
+void write_line(sheet &s, const placed_line &line, int size)
 {
-    const float alpha = s.what.background[3];
-    if (!(alpha > 0)) return;
-    const float colour[3] = {s.what.background[0] / alpha, s.what.background[1] / alpha, s.what.background[2] / alpha};
-    const double pad = 0.25 * s.size;
-    fill(s, {block.x0 - pad, block.y0 - pad, block.x1 + pad, block.y1 + pad}, colour, 0.6 * static_cast<double>(alpha));
+    float rim[3];
+    if (!s.font || line.text.empty()) return;
+    if (find_rim_colour(s, rim))
+        cover_words(s, line, size, rim_of(size), rim, rim_opacity * static_cast<double>(s.what.background[3]));
+    cover_words(s, line, size, 0, s.what.colour, 1);
 }
 
-/* Words that are wider than the picture are made smaller. */
-void draw_words(sheet &s, const insitu_words &words)
+void draw_rimmed_stroke(sheet &s, const insitu_stroke &line, double width, int size, const float colour[3])
 {
-    int size = std::max(1, static_cast<int>(std::lround(s.size * static_cast<double>(words.size))));
-    const double room = std::max(1.0, s.image.width - 2 * s.margin);
-    int width = width_of(s, words.text, size);
-    if (width > room) {
-        size = std::max(1, static_cast<int>(size * room / width));
-        width = width_of(s, words.text, size);
-    }
-    const area block = place_block(s.image, {words.at, 0}, width, 1.2 * size, s.margin, s.taken);
-    put_plate(s, block);
-    write_text(s, words.text, block.x0, block.y0 + 0.95 * size, size);
+    float rim[3];
+    if (find_rim_colour(s, rim))
+        draw_stroke(s, line, width + 2 * rim_of(size), rim, rim_opacity * static_cast<double>(s.what.background[3]));
+    draw_stroke(s, line, width, colour);
 }
 
 /* ---- colour bars --------------------------------------------------------------------------------------------- */
@@ -183,116 +182,74 @@ void draw_frame(sheet &s, const area &a)
 }
 
 /* Draws small boxes beyond the ends, where values outside the range have colours of their own. */
-void draw_outside(sheet &s, const insitu_colour_bar &bar, const area &where)
+void draw_outside(sheet &s, const insitu_colour_bar &bar, const block &b)
 {
-    const double height = 0.45 * s.size;
-    const area below = {where.x0, where.y1, where.x1, where.y1 + height};
-    const area above = {where.x0, where.y0 - height, where.x1, where.y0};
+    const double height = 0.45 * b.size;
+    const area &g = b.gradient, below = {g.x0, g.y1, g.x1, g.y1 + height}, above = {g.x0, g.y0 - height, g.x1, g.y0};
     if (bar.below) fill(s, below, bar.below, 1), draw_frame(s, below);
     if (bar.above) fill(s, above, bar.above, 1), draw_frame(s, above);
 }
 
-void draw_ticks(sheet &s, const insitu_colour_bar &bar, const area &where)
+/* Draws the bar and its ticks on the right; their numbers and the label are lines of the block. */
+void draw_bar(sheet &s, const block &b)
 {
-    for (int i = 0; i < bar.tick_count; i++) {
-        const double y = where.y1 - bar.ticks[i].place * (where.y1 - where.y0), end = where.x1 + 0.3 * s.size;
-        draw_stroke(s, {{where.x1, y}, {end, y}, false}, line_width(s), s.what.colour);
-        write_text(s, bar.ticks[i].text, end + 0.2 * s.size, y + 0.36 * s.size, s.size);
+    const insitu_colour_bar &bar = s.what.bars[b.index];
+    draw_gradient(s, bar, b.gradient);
+    draw_frame(s, b.gradient);
+    draw_outside(s, bar, b);
+    for (const int i : b.ticks) {
+        const double y = tick_row(bar.ticks[i], b.gradient);
+        draw_rimmed_stroke(s, {{b.gradient.x1, y}, {b.gradient.x1 + 0.3 * b.size, y}, false}, line_width(s), b.size,
+                           s.what.colour);
     }
 }
 
-double width_of_bar(sheet &s, const insitu_colour_bar &bar, double thickness)
+/* ---- lengths and axes ------------------------------------------------------------------------------------------ */
+
+/* Draws the bar below its words. */
+void draw_scale_bar(sheet &s, const block &b)
 {
-    int words = 0;
-    for (int i = 0; i < bar.tick_count; i++) words = std::max(words, width_of(s, bar.ticks[i].text, s.size));
-    return std::max<double>(width_of(s, bar.label, s.size), thickness + 0.5 * s.size + words);
+    const double middle = 0.5 * (b.room.x0 + b.room.x1), half = 0.5 * s.what.scale_bar.length;
+    const double y = b.room.y1 - 0.45 * b.size, tick = 0.25 * b.size, width = 1.5 * line_width(s);
+    const insitu_stroke strokes[] = {{{middle - half, y}, {middle + half, y}, false},
+                                     {{middle - half, y - tick}, {middle - half, y + tick}, false},
+                                     {{middle + half, y - tick}, {middle + half, y + tick}, false}};
+    for (const insitu_stroke &stroke : strokes) draw_rimmed_stroke(s, stroke, width, b.size, s.what.colour);
+    for (const insitu_stroke &stroke : strokes) draw_stroke(s, stroke, width, s.what.colour);
 }
-
-/* Draws the label, a gap, and the bar with its ticks on the right. Bars of one side share its height and are as wide as
- * the widest, so that they stand in line. */
-void draw_bar(sheet &s, const insitu_colour_bar &bar)
-{
-    int sharing = 0, before = 0;
-    double width = 0;
-    const double thickness = 0.9 * s.size, head = 1.7 * s.size, foot = 0.5 * s.size;
-    for (int i = 0; i < s.what.bar_count; i++) {
-        if (s.what.bars[i].at != bar.at) continue;
-        sharing++;
-        before += &s.what.bars[i] < &bar;
-        width = std::max(width, width_of_bar(s, s.what.bars[i], thickness));
-    }
-    const double length = std::max(2.0 * s.size, 0.62 * s.image.height / sharing - head - foot);
-    const double height = head + length + foot, gap = 0.5 * s.margin;
-    const double above = (before - 0.5 * (sharing - 1)) * (height + gap); /* from the middle of the side */
-    const area block = place_block(s.image, {bar.at, above}, width, height, s.margin, s.taken);
-    const area gradient = {block.x0, block.y0 + head, block.x0 + thickness, block.y0 + head + length};
-    put_plate(s, block);
-    write_text(s, bar.label, block.x0, block.y0 + 0.95 * s.size, s.size);
-    draw_gradient(s, bar, gradient);
-    draw_frame(s, gradient);
-    draw_outside(s, bar, gradient);
-    draw_ticks(s, bar, gradient);
-}
-
-bool are_apart(const area &a, const area &b, double gap)
-{
-    return a.x1 + gap <= b.x0 || b.x1 + gap <= a.x0 || a.y1 + gap <= b.y0 || b.y1 + gap <= a.y0;
-}
-
-/* ---- lengths ------------------------------------------------------------------------------------------------- */
-
-/* Draws the bar with its words above it. */
-void draw_scale_bar(sheet &s)
-{
-    const insitu_scale_bar &bar = s.what.scale_bar;
-    if (!(bar.length > 0)) return;
-    const double words = width_of(s, bar.text, s.size), width = std::max(words, bar.length), tick = 0.25 * s.size;
-    const area block = place_block(s.image, {bar.at, 0}, width, 1.7 * s.size, s.margin, s.taken);
-    const double middle = 0.5 * (block.x0 + block.x1), y = block.y0 + 1.4 * s.size;
-    const double x0 = middle - 0.5 * bar.length, x1 = middle + 0.5 * bar.length;
-    put_plate(s, block);
-    write_text(s, bar.text, middle - 0.5 * words, block.y0 + 0.9 * s.size, s.size);
-    draw_stroke(s, {{x0, y}, {x1, y}, false}, 1.5 * line_width(s), s.what.colour);
-    draw_stroke(s, {{x0, y - tick}, {x0, y + tick}, false}, 1.5 * line_width(s), s.what.colour);
-    draw_stroke(s, {{x1, y - tick}, {x1, y + tick}, false}, 1.5 * line_width(s), s.what.colour);
-}
-
-/* Draws a number at an edge. The middle of the words is placed so that their box is a gap away from the point. */
-void draw_label(sheet &s, const insitu_label &label)
-{
-    const double width = width_of(s, label.text, s.size), height = 0.75 * s.size;
-    const double reach =
-        label.gap * s.size + 0.5 * (std::abs(label.away[0]) * width + std::abs(label.away[1]) * height);
-    const double x = label.at[0] + reach * label.away[0], y = label.at[1] + reach * label.away[1];
-    const area block = {x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height};
-    for (const area &other : s.taken)
-        if (!are_apart(block, other, 0.2 * s.size)) return;
-    s.taken.push_back(block);
-    write_text(s, label.text, block.x0, block.y1, s.size);
-}
-
-/* ---- axes ---------------------------------------------------------------------------------------------------- */
 
 /* Draws x, y and z in red, green and blue, beginning with the one that points away from the eye most. */
-void draw_axes(sheet &s)
+void draw_axes(sheet &s, const block &b)
 {
     static const float colours[3][3] = {{0.8F, 0.05F, 0.05F}, {0.05F, 0.5F, 0.05F}, {0.08F, 0.2F, 0.9F}};
-    const double arm = 2.2 * s.size, side = 2 * arm + 2 * s.size;
-    const area block = place_block(s.image, {INSITU_BOTTOM_LEFT, 0}, side, side, s.margin, s.taken);
-    const double middle[2] = {0.5 * (block.x0 + block.x1), 0.5 * (block.y0 + block.y1)};
+    const double arm = 2.2 * b.size, to_name = arm + 0.6 * b.size;
+    const double middle[2] = {0.5 * (b.room.x0 + b.room.x1), 0.5 * (b.room.y0 + b.room.y1)};
     int order[3] = {0, 1, 2};
-    std::sort(order, order + 3, [&](int a, int b) { return s.what.axes[a][2] < s.what.axes[b][2]; });
+    std::sort(order, order + 3, [&](int a, int c) { return s.what.axes[a][2] < s.what.axes[c][2]; });
     for (const int axis : order) {
         const double *d = s.what.axes[axis];
         const double tip[2] = {middle[0] + arm * d[0], middle[1] - arm * d[1]};
         const std::string name(1, static_cast<char>('x' + axis));
-        draw_stroke(s, {{middle[0], middle[1]}, {tip[0], tip[1]}, false}, 1.5 * line_width(s), colours[axis]);
-        write_text(s, name, middle[0] + (arm + 0.6 * s.size) * d[0] - 0.3 * s.size,
-                   middle[1] - (arm + 0.6 * s.size) * d[1] + 0.3 * s.size, s.size);
+        draw_rimmed_stroke(s, {{middle[0], middle[1]}, {tip[0], tip[1]}, false}, 1.5 * line_width(s), b.size,
+                           colours[axis]);
+        write_line(s, {name, middle[0] + to_name * d[0] - 0.3 * b.size, middle[1] - to_name * d[1] + 0.3 * b.size},
+                   b.size);
     }
 }
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+void draw_block(sheet &s, const block &b)
+{
+    switch (b.kind) {
+    case block_kind::bar: draw_bar(s, b); break;
+    case block_kind::scale_bar: draw_scale_bar(s, b); break;
+    case block_kind::axes: draw_axes(s, b); break;
+    case block_kind::words:
+    case block_kind::label: break;
+    }
+    for (const placed_line &line : b.lines) write_line(s, line, b.size);
+}
 
 bool has_words(const insitu_decorations &what)
 {
@@ -300,67 +257,35 @@ bool has_words(const insitu_decorations &what)
            what.scale_bar.length > 0;
 }
 
-bool is_at_right(insitu_anchor at)
+std::string describe_left_out(const insitu_image &image, const std::vector<std::string> &left_out)
 {
-    return at == INSITU_TOP_RIGHT || at == INSITU_RIGHT || at == INSITU_BOTTOM_RIGHT;
-}
-
-bool is_at_bottom(insitu_anchor at)
-{
-    return at == INSITU_BOTTOM_LEFT || at == INSITU_BOTTOM || at == INSITU_BOTTOM_RIGHT;
-}
-
-area block_at(const insitu_image &image, const spot &where, double width, double height, double margin)
-{
-    const insitu_anchor at = where.at;
-    const bool is_centred = at == INSITU_TOP || at == INSITU_BOTTOM,
-               is_middle = at == INSITU_LEFT || at == INSITU_RIGHT;
-    const double x = is_centred ? 0.5 * (image.width - width) : is_at_right(at) ? image.width - margin - width : margin;
-    const double y = is_middle          ? 0.5 * (image.height - height)
-                     : is_at_bottom(at) ? image.height - margin - height
-                                        : margin;
-    return {x, y + where.down, x + width, y + where.down + height};
+    std::string names;
+    if (left_out.empty()) return names;
+    for (const std::string &name : left_out)
+        names += (names.empty() ? "" : &name == &left_out.back() ? " and " : ", ") + name;
+    return "no room in " + std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels for " + names +
+           ", which is left out; a smaller \"size\" of decorations or a larger picture has more";
 }
 
 } // namespace
 
-area place_block(const insitu_image &image, const spot &where, double width, double height, double margin,
-                 std::vector<area> &taken)
-{
-    const area first = block_at(image, where, width, height, margin);
-    area block = first;
-    const double gap = 0.5 * margin;
-    const auto is_in_way = [&](const area &a) { return !are_apart(block, a, 0.999 * gap); };
-    /* Each area moves the block at most once, to where it is apart but for rounding. */
-    for (std::size_t moves = 0; moves < taken.size(); moves++) {
-        const auto other = std::find_if(taken.begin(), taken.end(), is_in_way);
-        if (other == taken.end()) break;
-        const double y = is_at_bottom(where.at) ? other->y0 - gap - height : other->y1 + gap;
-        block = {block.x0, y, block.x1, y + height};
-    }
-    if (block.y0 < 0 || block.y1 > image.height) block = first;
-    taken.push_back(block);
-    return block;
-}
-
 void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &warning)
 {
     const insitu_decorations &what = *image.decorations;
-    sheet s{image, what, rgba, nullptr, 0, 0, {}};
-    s.size = std::max(1, static_cast<int>(std::lround(what.size * image.height)));
-    s.margin = 0.7 * s.size;
+    sheet s{image, what, rgba, nullptr};
     std::optional<typeface> font;
     if (has_words(what)) s.font = &font.emplace();
-    if (font && !font->found())
-        warning = "no font was found, so its words are left out; expected DejaVuSans in the system's fonts or in a "
-                  "folder that OPENIMAGEIO_FONTS names";
     draw_strokes(s, true);
     put_background(s);
     draw_strokes(s, false);
-    for (int i = 0; i < what.words_count; i++) draw_words(s, what.words[i]);
-    for (int i = 0; i < what.bar_count; i++) draw_bar(s, what.bars[i]);
-    draw_scale_bar(s);
-    if (what.has_axes) draw_axes(s);
-    for (int i = 0; i < what.label_count; i++) draw_label(s, what.labels[i]);
-    if (font && font->found()) warning = font->missing();
+    const layout places =
+        make_layout(image, [&](const std::string &text, int size) { return font ? font->width_of(text, size) : 0; });
+    for (const block &b : places.blocks) draw_block(s, b);
+    warning = describe_left_out(image, places.left_out);
+    const std::string letters =
+        !font           ? ""
+        : font->found() ? font->missing()
+                        : "no font was found, so its words are left out; expected DejaVuSans in the system's fonts or "
+                          "in a folder that OPENIMAGEIO_FONTS names";
+    warning += (warning.empty() || letters.empty() ? "" : "; ") + letters;
 }

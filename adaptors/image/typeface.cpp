@@ -112,19 +112,29 @@ int kerning(FT_Face face, FT_UInt before, FT_UInt glyph)
     return static_cast<int>(step.x >> 6);
 }
 
+bool set_size(FT_Face face, int size)
+{
+    return face->size->metrics.y_ppem == size || is_done(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(size)));
+}
+
+int advance_of_loaded(FT_Face face)
+{
+    return static_cast<int>((face->glyph->advance.x + 32) >> 6);
+}
+
 /* Calls visit(x) with each glyph loaded, x being where the pen is; returns where it ends. */
 template <typename visitor>
 int walk(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int32 flags, visitor visit)
 {
     int x = 0;
     FT_UInt before = 0;
-    if (!is_done(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(size)))) return 0;
+    if (!set_size(face, size)) return 0;
     for (const char32_t character : characters) {
         const FT_UInt glyph = glyph_of(face, character);
         x += kerning(face, before, glyph);
         before = glyph;
         if (!is_done(FT_Load_Glyph(face, glyph, flags))) continue;
-        const int advance = static_cast<int>((face->glyph->advance.x + 32) >> 6);
+        const int advance = advance_of_loaded(face);
         visit(x);
         x += advance;
     }
@@ -186,7 +196,25 @@ typeface::~typeface()
 int typeface::width_of(const std::string &text, int size) const
 {
     bool is_bad = false;
-    return face_ ? walk(face_, decode_utf8(text, is_bad), size, FT_LOAD_DEFAULT, [](int) {}) : 0;
+    int x = 0;
+    FT_UInt before = 0;
+    if (!face_ || !set_size(face_, size)) return 0;
+    for (const char32_t character : decode_utf8(text, is_bad)) {
+        const FT_UInt glyph = glyph_of(face_, character);
+        x += kerning(face_, before, glyph) + advance_of(glyph, size);
+        before = glyph;
+    }
+    return x;
+}
+
+/* The size is set. */
+int typeface::advance_of(unsigned glyph, int size) const
+{
+    const auto known = advances_.find({size, glyph});
+    if (known != advances_.end()) return known->second;
+    const int advance = is_done(FT_Load_Glyph(face_, glyph, FT_LOAD_DEFAULT)) ? advance_of_loaded(face_) : 0;
+    advances_[{size, glyph}] = advance;
+    return advance;
 }
 
 void typeface::draw(const std::string &text, int size, double halo, const cover_pixel &cover)

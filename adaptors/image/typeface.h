@@ -4,8 +4,10 @@
 #define ADAPTORS_TYPEFACE_H
 
 #include <functional>
+#include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 struct FT_LibraryRec_;
@@ -33,9 +35,12 @@ class typeface
     std::string missing() const;
 
   private:
+    int advance_of(unsigned glyph, int size) const;
+
     FT_LibraryRec_ *library_ = nullptr;
     FT_FaceRec_ *face_ = nullptr;
     std::string name_;
+    mutable std::map<std::pair<int, unsigned>, int> advances_; /* by size and glyph */
     std::set<char32_t> missing_;
     bool has_bad_bytes_ = false;
 };

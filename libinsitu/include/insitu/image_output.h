@@ -21,7 +21,8 @@ typedef enum insitu_image_format {
     INSITU_DEEP_EXR = 3 /* deep: any number of samples a pixel, each float R, G, B, A, Z and ZBack */
 } insitu_image_format;
 
-/* Where in the picture a decoration stands. Decorations of one place are stacked, and none covers another. */
+/* Where in the picture a decoration stands. Decorations of one place are stacked, and none covers another: what is too
+ * large is wrapped or made smaller, and what has no room at all is left out and named by a warning. */
 typedef enum insitu_anchor {
     INSITU_TOP_LEFT,
     INSITU_TOP,
@@ -133,7 +134,7 @@ typedef struct insitu_image {
  * picture that a process writes to a folder removes the temporary files that killed runs of the same user left there.
  * It is an error if path is a pipe, a device or a directory. On an error, message (size bytes) says what went wrong,
  * with the path. Otherwise message is empty, or warns: no font was found and the picture has no words, or the font
- * lacks characters of words, which are boxes, or words are not UTF-8. Local. */
+ * lacks characters of words, which are boxes, or words are not UTF-8, or decorations had no room. Local. */
 typedef insitu_status insitu_image_write_function(const insitu_image *image, insitu_image_format format,
                                                   const char *path, char *message, size_t size);
 

@@ -1,0 +1,441 @@
+/* Words at the top and the bottom come first, since they need their borders most. Bars share what these leave of their
+ * side. All else takes the free place that is nearest to its own: its corners are at edges of other blocks, so that few
+ * places have to be tried, and their number has a bound. */
+#include "layout.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace
+{
+
+/* Shares of the size of words. */
+const double border = 0.55, pad = 0.15, line_height = 1.2, baseline = 0.95, thickness = 0.9;
+const double label_width = 7, foot = 0.5, shortest_bar = 4, tick_distance = 1.2;
+const double shrinking[] = {1, 0.85, 0.7, 0.55, 0.45};
+enum { SMALLEST = 6, MOST_LINES = 3, MOST_LABEL_LINES = 4 }; /* letters of 6 pixels can just be read */
+
+struct sheet {
+    const insitu_image &image;
+    const insitu_decorations &what;
+    const word_measure &measure;
+    int size;
+    double x0, y0, x1, y1; /* the picture within its border */
+    layout out;
+};
+
+double pixels(double share, int size)
+{
+    return std::ceil(share * size);
+}
+
+/* The sizes that are tried, from the given one on; none is too small to be read unless that one is. */
+std::vector<int> sizes_from(double size)
+{
+    std::vector<int> out;
+    for (const double factor : shrinking) {
+        const int next = std::max(static_cast<int>(std::lround(factor * size)),
+                                  std::min<int>(SMALLEST, std::max(1, static_cast<int>(size))));
+        if (out.empty() || next < out.back()) out.push_back(next);
+    }
+    return out;
+}
+
+/* ---- free places ----------------------------------------------------------------------------------------------- */
+
+bool are_apart(const area &a, const area &b)
+{
+    return a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
+}
+
+bool is_free(const sheet &s, const area &room)
+{
+    if (!(room.x0 >= s.x0 && room.y0 >= s.y0 && room.x1 <= s.x1 && room.y1 <= s.y1)) return false;
+    return std::all_of(s.out.blocks.begin(), s.out.blocks.end(),
+                       [&](const block &b) { return are_apart(room, b.room); });
+}
+
+bool is_left(insitu_anchor at)
+{
+    return at == INSITU_TOP_LEFT || at == INSITU_LEFT || at == INSITU_BOTTOM_LEFT;
+}
+
+bool is_right(insitu_anchor at)
+{
+    return at == INSITU_TOP_RIGHT || at == INSITU_RIGHT || at == INSITU_BOTTOM_RIGHT;
+}
+
+bool is_at_side(insitu_anchor at)
+{
+    return at == INSITU_LEFT || at == INSITU_RIGHT;
+}
+
+area room_at(const sheet &s, insitu_anchor at, double width, double height)
+{
+    const double middle_x = std::floor(0.5 * (s.image.width - width)),
+                 middle_y = std::floor(0.5 * (s.image.height - height));
+    const double x = is_left(at) ? s.x0 : is_right(at) ? s.x1 - width : middle_x;
+    const double y = is_at_side(at) ? middle_y : at <= INSITU_TOP_RIGHT ? s.y0 : s.y1 - height;
+    return {x, y, x + width, y + height};
+}
+
+/* Finds the free place for a room of this size that is nearest to its anchor; a step aside counts thrice, so that
+ * blocks of one anchor stack. */
+bool find_room(const sheet &s, insitu_anchor at, double width, double height, area &room)
+{
+    const area wanted = room_at(s, at, width, height);
+    std::vector<double> xs{wanted.x0}, ys{wanted.y0};
+    for (const block &b : s.out.blocks) {
+        xs.insert(xs.end(), {b.room.x1, b.room.x0 - width});
+        ys.insert(ys.end(), {b.room.y1, b.room.y0 - height});
+    }
+    double least = HUGE_VAL;
+    for (const double x : xs)
+        for (const double y : ys) {
+            const double way = 3 * std::abs(x - wanted.x0) + std::abs(y - wanted.y0);
+            if (!(way < least) || !is_free(s, {x, y, x + width, y + height})) continue;
+            least = way;
+            room = {x, y, x + width, y + height};
+        }
+    return least < HUGE_VAL;
+}
+
+/* ---- lines of words -------------------------------------------------------------------------------------------- */
+
+/* Returns how many bytes of a word's begin fit, at whole characters, at least one. */
+std::size_t bytes_that_fit(const sheet &s, const std::string &word, int size, double room)
+{
+    const double width = s.measure(word, size);
+    auto bytes = static_cast<std::size_t>(static_cast<double>(word.size()) * room / std::max(1.0, width));
+    const auto is_within = [&](std::size_t i) { return (static_cast<unsigned char>(word[i]) & 0xC0) == 0x80; };
+    for (bytes = std::min(bytes, word.size()); bytes > 0; bytes--)
+        if (bytes == word.size() || (!is_within(bytes) && s.measure(word.substr(0, bytes), size) <= room)) return bytes;
+    for (bytes = 1; bytes < word.size() && is_within(bytes);) bytes++;
+    return bytes;
+}
+
+/* Breaks text at blanks, and words that are wider than the room within, where no blank helps. */
+std::vector<std::string> wrap(const sheet &s, const std::string &text, int size, double room)
+{
+    std::vector<std::string> lines;
+    if (s.measure(text, size) <= room) return {text};
+    std::string line;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = std::min(text.find(' ', at), text.size());
+        std::string word = text.substr(at, end - at);
+        at = end + 1;
+        const std::string longer = line.empty() ? word : line + " " + word;
+        if (s.measure(longer, size) <= room) {
+            line = longer;
+            continue;
+        }
+        if (!line.empty()) lines.push_back(line);
+        while (s.measure(word, size) > room && !word.empty()) { /* each turn takes a character at least */
+            const std::size_t bytes = bytes_that_fit(s, word, size, room);
+            lines.push_back(word.substr(0, bytes));
+            word.erase(0, bytes);
+        }
+        line = word;
+    }
+    if (!line.empty()) lines.push_back(line);
+    return lines;
+}
+
+double width_of(const sheet &s, const std::vector<std::string> &lines, int size)
+{
+    int width = 0;
+    for (const std::string &line : lines) width = std::max(width, s.measure(line, size));
+    return width;
+}
+
+/* Tells whether blanks alone broke the text. */
+bool is_whole(const std::string &text, const std::vector<std::string> &lines)
+{
+    std::string joined;
+    for (const std::string &line : lines) joined += (joined.empty() ? "" : " ") + line;
+    return joined == text || lines.size() == 1;
+}
+
+/* Puts lines into the block's room, at the side of the anchor. */
+void put_lines(const sheet &s, const std::vector<std::string> &lines, insitu_anchor at, block &b)
+{
+    double y = b.room.y0 + pixels(pad, b.size) + baseline * b.size;
+    for (const std::string &line : lines) {
+        const double left = b.room.x0 + pixels(pad, b.size),
+                     over = b.room.x1 - pixels(pad, b.size) - left - s.measure(line, b.size);
+        b.lines.push_back({line, left + (is_left(at) ? 0 : is_right(at) ? over : 0.5 * over), y});
+        y += line_height * b.size;
+    }
+}
+
+bool place_words(sheet &s, int index)
+{
+    static const double shares[] = {1, 0.5, 0.3};
+    const insitu_words &words = s.what.words[index];
+    const std::vector<int> sizes = sizes_from(s.size * static_cast<double>(words.size));
+    for (const int size : sizes)
+        for (const double share : shares) {
+            const double pads = 2 * pixels(pad, size), room = share * (s.x1 - s.x0) - pads;
+            if (!(room > size)) continue;
+            const std::vector<std::string> lines = wrap(s, words.text, size, room);
+            const bool is_last = size == sizes.back();
+            if (!is_last && (lines.size() > MOST_LINES || !is_whole(words.text, lines))) continue;
+            block b{block_kind::words, index, size, {}, {}, {}, {}};
+            const double height = std::ceil(static_cast<double>(lines.size()) * line_height * size) + pads;
+            if (!find_room(s, words.at, width_of(s, lines, size) + pads, height, b.room)) continue;
+            put_lines(s, lines, words.at, b);
+            s.out.blocks.push_back(b);
+            return true;
+        }
+    return false;
+}
+
+/* ---- colour bars ----------------------------------------------------------------------------------------------- */
+
+/* The bars of a side, in letters of one size. All are as wide as the widest, and have labels as high as the highest. */
+struct bar_group {
+    std::vector<int> bars;
+    insitu_anchor at;
+    int size;
+    double width, head;
+    std::vector<std::vector<std::string>> labels;
+    bool is_readable; /* labels have few lines and whole words */
+};
+
+bar_group make_group(const sheet &s, const std::vector<int> &bars, insitu_anchor at, int size)
+{
+    bar_group g{bars, at, size, 0, 0, {}, true};
+    std::size_t lines = 0;
+    for (const int i : bars) {
+        const insitu_colour_bar &bar = s.what.bars[i];
+        int numbers = 0;
+        for (int k = 0; k < bar.tick_count; k++) numbers = std::max(numbers, s.measure(bar.ticks[k].text, size));
+        const double body = (thickness + 0.5) * size + numbers;
+        const double most = std::min(std::max(body, label_width * size), s.x1 - s.x0 - 2 * pixels(pad, size));
+        g.labels.push_back(wrap(s, bar.label, size, most));
+        g.is_readable =
+            g.is_readable && g.labels.back().size() <= MOST_LABEL_LINES && is_whole(bar.label, g.labels.back());
+        g.width = std::max({g.width, body, width_of(s, g.labels.back(), size)});
+        lines = std::max(lines, g.labels.back().size());
+    }
+    g.width = std::ceil(g.width) + 2 * pixels(pad, size);
+    g.head = std::ceil(line_height * static_cast<double>(lines) * size + 0.5 * size) + pixels(pad, size);
+    return g;
+}
+
+/* Chooses every so many ticks that their numbers do not touch; of such choices the one with the shortest numbers, which
+ * are the roundest. */
+std::vector<int> choose_ticks(const insitu_colour_bar &bar, double length, int size)
+{
+    for (int every = 1; every < bar.tick_count; every++) {
+        std::vector<int> best;
+        double best_length = HUGE_VAL;
+        for (int first = 0; first < every; first++) {
+            std::vector<int> chosen;
+            bool is_apart = true;
+            double letters = 0;
+            for (int i = first; i < bar.tick_count; i += every) {
+                const double way =
+                    chosen.empty() ? HUGE_VAL : (bar.ticks[i].place - bar.ticks[chosen.back()].place) * length;
+                is_apart = is_apart && way >= tick_distance * size;
+                letters += static_cast<double>(std::string(bar.ticks[i].text).size());
+                chosen.push_back(i);
+            }
+            letters /= static_cast<double>(std::max<std::size_t>(1, chosen.size()));
+            if (is_apart && letters < best_length) best = chosen, best_length = letters;
+        }
+        if (!best.empty()) return best;
+    }
+    return bar.tick_count ? std::vector<int>{0} : std::vector<int>{};
+}
+
+block make_bar(const sheet &s, const bar_group &g, std::size_t n, const area &room)
+{
+    const insitu_colour_bar &bar = s.what.bars[g.bars[n]];
+    const double left = room.x0 + pixels(pad, g.size), edge = pixels(foot + pad, g.size);
+    block b{block_kind::bar, g.bars[n], g.size, room, {}, {}, {}};
+    put_lines(s, g.labels[n], INSITU_LEFT, b);
+    const double spare = std::floor(g.head - pixels(pad, g.size) - 0.5 * g.size -
+                                    line_height * g.size * static_cast<double>(b.lines.size()));
+    for (placed_line &line : b.lines)
+        line.baseline += spare; /* labels of fewer lines than the highest stand at the bar */
+    b.gradient = {left, room.y0 + g.head, left + thickness * g.size, room.y1 - edge};
+    b.ticks = choose_ticks(bar, b.gradient.y1 - b.gradient.y0, g.size);
+    for (const int i : b.ticks)
+        b.lines.push_back(
+            {bar.ticks[i].text, b.gradient.x1 + 0.5 * g.size, tick_row(bar.ticks[i], b.gradient) + 0.36 * g.size});
+    return b;
+}
+
+/* Finds what other blocks leave of the strip's height, from its middle on. */
+void free_height(const sheet &s, double x0, double x1, double &top, double &bottom)
+{
+    top = s.y0, bottom = s.y1;
+    for (const block &b : s.out.blocks) {
+        if (b.room.x1 <= x0 || b.room.x0 >= x1) continue;
+        if (b.room.y0 + b.room.y1 < s.image.height)
+            top = std::max(top, b.room.y1);
+        else
+            bottom = std::min(bottom, b.room.y0);
+    }
+}
+
+/* Stacks the group's bars from `first` on in the column. False: they would be too short. */
+bool fill_column(const sheet &s, const bar_group &g, std::size_t first, std::size_t count, int column,
+                 std::vector<block> &out)
+{
+    const double x0 = g.at == INSITU_LEFT ? s.x0 + column * g.width : s.x1 - (column + 1) * g.width;
+    double top = 0, bottom = 0;
+    free_height(s, x0, x0 + g.width, top, bottom);
+    const double share = count == 1 ? 0.62 : count == 2 ? 0.8 : 1;
+    const double total = std::min(bottom - top, share * s.image.height);
+    const double height = std::floor(total / static_cast<double>(count));
+    if (height - g.head - pixels(foot + pad, g.size) < shortest_bar * g.size) return false;
+    const double middle = std::floor(0.5 * (s.image.height - height * static_cast<double>(count)));
+    double y = std::clamp(middle, top, std::max(top, bottom - height * static_cast<double>(count)));
+    for (std::size_t n = first; n < first + count; n++, y += height) {
+        const area room = {x0, y, x0 + g.width, y + height};
+        if (!is_free(s, room)) return false;
+        out.push_back(make_bar(s, g, n, room));
+    }
+    return true;
+}
+
+/* Places all bars of the group in as few columns as they can stand in, over half of the picture's width at most, but
+ * in one column over all of it. */
+bool place_group(sheet &s, const bar_group &g)
+{
+    const std::size_t count = g.bars.size();
+    for (std::size_t columns = 1; columns <= count; columns++) {
+        if (columns > 1 && static_cast<double>(columns) * g.width > 0.5 * s.image.width) return false;
+        std::vector<block> bars;
+        const std::size_t rows = (count + columns - 1) / columns;
+        bool is_placed = true;
+        const std::size_t used = (count + rows - 1) / rows;
+        for (std::size_t i = 0; i < used && is_placed; i++) { /* the first column is the one at the left */
+            const std::size_t column = g.at == INSITU_LEFT ? i : used - 1 - i;
+            is_placed = fill_column(s, g, i * rows, std::min(rows, count - i * rows), static_cast<int>(column), bars);
+        }
+        if (!is_placed) continue;
+        s.out.blocks.insert(s.out.blocks.end(), bars.begin(), bars.end());
+        return true;
+    }
+    return false;
+}
+
+bool place_at_any_size(sheet &s, const std::vector<int> &bars, insitu_anchor at)
+{
+    const std::vector<int> sizes = sizes_from(s.size);
+    for (const int size : sizes) {
+        const bar_group g = make_group(s, bars, at, size);
+        if ((g.is_readable || size == sizes.back()) && place_group(s, g)) return true;
+    }
+    return false;
+}
+
+std::string named(const char *what, const char *text)
+{
+    enum { NAMED = 60 };
+    std::string name = text;
+    if (name.size() > NAMED) {
+        name.erase(std::size_t{NAMED});
+        while (!name.empty() && (static_cast<unsigned char>(name.back()) & 0xC0) == 0x80) name.pop_back();
+        if (!name.empty()) name.pop_back(); /* its begin, or one letter */
+        name += "...";
+    }
+    return std::string(what) + " \"" + name + "\"";
+}
+
+/* Leaves out the last bars of a side that has no room for all. */
+void place_bars(sheet &s, insitu_anchor at)
+{
+    std::vector<int> bars;
+    for (int i = 0; i < s.what.bar_count; i++)
+        if ((s.what.bars[i].at == INSITU_LEFT) == (at == INSITU_LEFT)) bars.push_back(i);
+    while (!bars.empty() && !place_at_any_size(s, bars, at)) {
+        s.out.left_out.push_back(named("the colour bar", s.what.bars[bars.back()].label));
+        bars.pop_back();
+    }
+}
+
+/* ---- the others ------------------------------------------------------------------------------------------------ */
+
+bool place_scale_bar(sheet &s)
+{
+    const insitu_scale_bar &bar = s.what.scale_bar;
+    for (const int size : sizes_from(s.size)) {
+        const double pads = 2 * pixels(pad, size),
+                     width = std::ceil(std::max<double>(s.measure(bar.text, size), bar.length));
+        block b{block_kind::scale_bar, 0, size, {}, {}, {}, {}};
+        if (!find_room(s, bar.at, width + pads, pixels(1.8, size) + pads, b.room)) continue;
+        put_lines(s, {bar.text}, INSITU_TOP, b);
+        s.out.blocks.push_back(b);
+        return true;
+    }
+    return false;
+}
+
+bool place_axes(sheet &s)
+{
+    for (const int size : sizes_from(s.size)) {
+        block b{block_kind::axes, 0, size, {}, {}, {}, {}};
+        if (!find_room(s, INSITU_BOTTOM_LEFT, pixels(6.8, size), pixels(6.8, size), b.room)) continue;
+        s.out.blocks.push_back(b);
+        return true;
+    }
+    return false;
+}
+
+/* The middle of the words is placed so that their box is a gap away from the point. */
+void place_label(sheet &s, int index)
+{
+    const insitu_label &label = s.what.labels[index];
+    const double width = s.measure(label.text, s.size), height = 0.75 * s.size;
+    const double reach =
+        label.gap * s.size + 0.5 * (std::abs(label.away[0]) * width + std::abs(label.away[1]) * height);
+    const double x = label.at[0] + reach * label.away[0], y = label.at[1] + reach * label.away[1];
+    const double gap = pad * s.size;
+    const area room = {std::floor(x - 0.5 * width - gap), std::floor(y - 0.5 * height - gap),
+                       std::ceil(x + 0.5 * width + gap), std::ceil(y + 0.5 * height + gap)};
+    const area all = {s.x0, s.y0, s.x1, s.y1};
+    s.x0 = s.y0 = 0, s.x1 = s.image.width, s.y1 = s.image.height;
+    if (is_free(s, room))
+        s.out.blocks.push_back(
+            {block_kind::label, index, s.size, room, {{label.text, x - 0.5 * width, y + 0.5 * height}}, {}, {}});
+    s.x0 = all.x0, s.y0 = all.y0, s.x1 = all.x1, s.y1 = all.y1;
+}
+
+void place_all_words(sheet &s, bool at_sides)
+{
+    for (int i = 0; i < s.what.words_count; i++)
+        if (*s.what.words[i].text && is_at_side(s.what.words[i].at) == at_sides && !place_words(s, i))
+            s.out.left_out.push_back(named("the words", s.what.words[i].text));
+}
+
+} // namespace
+
+int word_size(const insitu_image &image)
+{
+    return std::max(1, static_cast<int>(std::lround(image.decorations->size * image.height)));
+}
+
+double tick_row(const insitu_tick &tick, const area &gradient)
+{
+    return gradient.y1 - tick.place * (gradient.y1 - gradient.y0);
+}
+
+layout make_layout(const insitu_image &image, const word_measure &measure)
+{
+    const int size = word_size(image);
+    const double edge = pixels(border, size);
+    sheet s{image, *image.decorations, measure, size, edge, edge, image.width - edge, image.height - edge, {}};
+    place_all_words(s, false);
+    place_bars(s, INSITU_RIGHT);
+    place_bars(s, INSITU_LEFT);
+    place_all_words(s, true);
+    if (s.what.scale_bar.length > 0 && !place_scale_bar(s))
+        s.out.left_out.push_back(named("the scale bar", s.what.scale_bar.text));
+    if (s.what.has_axes && !place_axes(s)) s.out.left_out.emplace_back("the axes");
+    for (int i = 0; i < s.what.label_count; i++) place_label(s, i);
+    return s.out;
+}

@@ -1,0 +1,183 @@
+/* Where decorations stand: random ones in pictures of 200 x 200 to 8192 x 4320, and the cases that a person would try.
+ * Rectangles are checked, no pixels. */
+#include <algorithm>
+#include <cmath>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "layout.h"
+#include "random_decorations.h"
+#include "typeface.h"
+
+extern "C" {
+#include "test_effort.h"
+#include <cmocka.h>
+}
+
+namespace
+{
+
+int measure(const std::string &text, int size)
+{
+    static const typeface font;
+    return font.width_of(text, size);
+}
+
+insitu_image image_of(int width, int height, const insitu_decorations &what)
+{
+    return {width, height, nullptr, nullptr, &what, 0, nullptr, nullptr};
+}
+
+bool are_apart(const area &a, const area &b)
+{
+    return a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
+}
+
+/* Capitals reach 0.73 of the size above the baseline, in DejaVuSans; digits as high. */
+area box_of(const placed_line &line, int size)
+{
+    return {line.x, line.baseline - 0.73 * size, line.x + measure(line.text, size), line.baseline};
+}
+
+void check_lines(const block &b)
+{
+    for (std::size_t i = 0; i < b.lines.size(); i++) {
+        const area box = box_of(b.lines[i], b.size);
+        assert_true(box.x0 >= b.room.x0 && box.y0 >= b.room.y0 && box.x1 <= b.room.x1 && box.y1 <= b.room.y1);
+        for (std::size_t k = 0; k < i; k++) assert_true(are_apart(box, box_of(b.lines[k], b.size)));
+        if (b.kind == block_kind::bar) assert_true(are_apart(box, b.gradient));
+    }
+}
+
+void check_bar(const block &b)
+{
+    const area &g = b.gradient;
+    assert_true(g.x0 >= b.room.x0 && g.x1 <= b.room.x1 && g.y0 >= b.room.y0 && g.y1 <= b.room.y1);
+    assert_true(g.y1 - g.y0 >= 3.9 * b.size);
+}
+
+/* All is placed once or named; labels may be missing. */
+void check_all_are_told(const layout &places, const insitu_decorations &what)
+{
+    int wanted = what.bar_count + (what.scale_bar.length > 0) + what.has_axes;
+    for (int i = 0; i < what.words_count; i++) wanted += *what.words[i].text != 0;
+    const auto is_label = [](const block &b) { return b.kind == block_kind::label; };
+    const auto labels = std::count_if(places.blocks.begin(), places.blocks.end(), is_label);
+    assert_int_equal(static_cast<std::ptrdiff_t>(places.blocks.size()) - labels +
+                         static_cast<std::ptrdiff_t>(places.left_out.size()),
+                     wanted);
+}
+
+void check_layout(const layout &places, const insitu_image &image)
+{
+    for (std::size_t i = 0; i < places.blocks.size(); i++) {
+        const block &b = places.blocks[i];
+        assert_true(b.room.x0 >= 0 && b.room.y0 >= 0 && b.room.x1 <= image.width && b.room.y1 <= image.height);
+        for (std::size_t k = 0; k < i; k++) assert_true(are_apart(b.room, places.blocks[k].room));
+        check_lines(b);
+        if (b.kind == block_kind::bar) check_bar(b);
+    }
+    check_all_are_told(places, *image.decorations);
+}
+
+void random_blocks_neither_overlap_nor_leave_the_picture(void **)
+{
+    random_decorations random(2);
+    const int most[2] = {test_effort(1000, 8192), test_effort(1000, 4320)};
+    for (int i = 0; i < test_effort(150, 500); i++) {
+        const int width = static_cast<int>(std::exp(random.real(std::log(200), std::log(most[0] + 0.5))));
+        const int height = static_cast<int>(std::exp(random.real(std::log(200), std::log(most[1] + 0.5))));
+        const insitu_image image = image_of(width, height, random.make(width, height));
+        check_layout(make_layout(image, measure), image);
+    }
+}
+
+/* ---- what a person would try ------------------------------------------------------------------------------------ */
+
+const float colours[] = {0, 0, 0, 1, 1, 1};
+const insitu_tick ticks[] = {{0, "0"}, {0.2, "0.2"}, {0.4, "0.4"}, {0.6, "0.6"}, {0.8, "0.8"}, {1, "1"}};
+
+insitu_colour_bar bar_named(const char *label)
+{
+    return {label, colours, 2, false, nullptr, nullptr, INSITU_RIGHT, 6, ticks};
+}
+
+insitu_decorations bars_of(const std::vector<insitu_colour_bar> &bars)
+{
+    insitu_decorations what{};
+    what.size = 0.03;
+    what.bars = bars.data();
+    what.bar_count = static_cast<int>(bars.size());
+    return what;
+}
+
+void four_bars_have_room_for_numbers(void **)
+{
+    const std::vector<insitu_colour_bar> bars = {bar_named("Equivalent (von-Mises) stress / MPa"), bar_named("b"),
+                                                 bar_named("c"), bar_named("d")};
+    const insitu_decorations what = bars_of(bars);
+    for (const int height : {200, 480, 720, 4320}) {
+        const insitu_image image = image_of(height * 16 / 9, height, what);
+        const layout places = make_layout(image, measure);
+        check_layout(places, image);
+        assert_int_equal(places.blocks.size(), 4);
+        for (const block &b : places.blocks) assert_true(b.ticks.size() >= 2);
+    }
+}
+
+/* The bar stays in the right third. */
+void a_label_of_many_letters_is_wrapped(void **)
+{
+    const std::string word(60, 'w');
+    for (const std::string &label : {std::string("A label of fifty letters and more, with blanks in it"), word}) {
+        const std::vector<insitu_colour_bar> bars = {bar_named(label.c_str())};
+        const insitu_decorations what = bars_of(bars);
+        const insitu_image image = image_of(640, 480, what);
+        const layout places = make_layout(image, measure);
+        check_layout(places, image);
+        assert_int_equal(places.blocks.size(), 1);
+        assert_true(places.blocks[0].room.x0 > 640 * 2 / 3);
+    }
+}
+
+void words_at_right_stand_beside_the_bar(void **)
+{
+    const std::vector<insitu_colour_bar> bars = {bar_named("f")};
+    const insitu_words words[] = {{"a text at right", INSITU_RIGHT, 1}};
+    insitu_decorations what = bars_of(bars);
+    what.words = words;
+    what.words_count = 1;
+    const insitu_image image = image_of(640, 480, what);
+    const layout places = make_layout(image, measure);
+    check_layout(places, image);
+    assert_int_equal(places.blocks.size(), 2);
+}
+
+/* 20 bars with letters of a fifth of the height. */
+void what_has_no_room_is_named(void **)
+{
+    const std::vector<insitu_colour_bar> bars(20, bar_named("pressure"));
+    insitu_decorations what = bars_of(bars);
+    what.size = 0.2;
+    const insitu_image image = image_of(200, 200, what);
+    const layout places = make_layout(image, measure);
+    check_layout(places, image);
+    assert_false(places.left_out.empty());
+    assert_string_equal(places.left_out[0].c_str(), "the colour bar \"pressure\"");
+}
+
+} // namespace
+
+int main()
+{
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(random_blocks_neither_overlap_nor_leave_the_picture),
+        cmocka_unit_test(four_bars_have_room_for_numbers), cmocka_unit_test(a_label_of_many_letters_is_wrapped),
+        cmocka_unit_test(words_at_right_stand_beside_the_bar), cmocka_unit_test(what_has_no_room_is_named)};
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}
