@@ -191,14 +191,13 @@ static void blend_mixed(blend *b, const fragment *items, int64_t count, float fr
     for (int64_t i = 0; i < count; i++) {
         const fragment *f = &items[i];
         const double absorbed = 1 - (double)f->transmittance;
-        if (!(absorbed > 0)) continue;
         const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
         const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
-        for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] / absorbed * own;
+        const double emitted = absorbed > 0 ? own / absorbed : share; /* transmittances near 1 round to it */
+        for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] * emitted;
         depth += own;
     }
-    if (!(depth > 0)) return;
-    const double light = -expm1(-depth) / depth;
+    const double light = depth > 0 ? -expm1(-depth) / depth : 1;
     for (int c = 0; c < 3; c++) b->colour[c] += b->transmittance * light * colour[c];
     b->transmittance *= exp(-depth);
 }

@@ -74,11 +74,6 @@ static void shorten(const render_folding *folding, fragment *items, int64_t coun
         items[i].t_out -= error_at(items[i].t_out);
 }
 
-static bool shows(const fragment *f)
-{
-    return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
-}
-
 /* Folds one run, stretch by stretch; returns the end of what it wrote. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
@@ -97,7 +92,7 @@ static fragment *fold_run(const render_folding *folding, fragment *run, int64_t 
         const int64_t made = fragment_fold_between(run + i, n, begin, end, run + i);
         shorten(folding, run + i, made);
         for (int64_t k = i; k < i + made; k++)
-            if (shows(&run[k])) *out++ = run[k];
+            if (fragment_shows(&run[k])) *out++ = run[k];
     }
     return out;
 }

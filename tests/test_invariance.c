@@ -4,8 +4,9 @@
  *     x hexes, tets, polyhedra, mixed cells x the images below
  *
  * Each part lists its cells' vertices and faces its own way. Rank 0 draws the whole mesh alone and compares. Surfaces
- * are the same to the bit, in depth and colour, and so are volumes that are to be reproducible; other volumes to 1e-6,
- * which is what compositing promises. Of all, how often they are the same to the bit and what they are off by is told.
+ * are the same to the bit, in depth and colour, and so are volumes that are to be reproducible, faint ones too; other
+ * volumes to 1e-6, which is what compositing promises. Of all, how often they are the same to the bit and what they are
+ * off by is told.
  */
 #include <math.h>
 #include <stdio.h>
@@ -37,7 +38,7 @@ typedef struct image_case {
 #define OTHER "      - volume: {field: f, map: plasma, opacity: [[0, 0.4], [1, 0]]}\n"
 #define LIT "    shadows: true\n    ambient_occlusion: {samples: 8}\n"
 
-static const image_case cases[] = {
+static const image_case listed[] = {
     {"gradient", TO_THE_BIT, "      - isosurface: {field: f, values: [0.1]}\n", "", NULL},
     {"vertex normals", TO_THE_BIT, "      - isosurface: {field: f, values: [0.1], normals: vertex}\n", "", NULL},
     {"differences", TO_THE_BIT, DIFFER, "", NULL},
@@ -69,14 +70,50 @@ static const image_case cases[] = {
     {"two volumes, reproducible", TO_THE_BIT, VOLUME OTHER, "method: samples, reproducible: true", NULL},
     {"two volumes, max_error, reproducible", TO_THE_BIT, VOLUME OTHER, "max_error: 0.01, reproducible: true", NULL},
 };
-enum { CASES = sizeof cases / sizeof *cases };
+enum { LISTED = sizeof listed / sizeof *listed, MOST_FAINT = 20, MOST_CASES = LISTED + MOST_FAINT };
+
+/* Those listed and, from LISTED on, volumes of random faint opacities. */
+static image_case cases[MOST_CASES];
+static int case_count;
+
+/* Opacities from 1e-9 to 1e-3 a cell at five random values: the transmittance of most segments rounds to 1, and what
+ * they emit shows all the same. */
+static const char *faint_layer(int which)
+{
+    static char texts[MOST_FAINT][256];
+    char *text = texts[which];
+    const uint64_t of = 100 + (uint64_t)which;
+    size_t size = (size_t)snprintf(text, sizeof *texts, "      - volume: {field: f, opacity: [");
+    for (int knot = 0; knot < 5; knot++) {
+        const double inner = 0.25 * (knot + test_uniform_in(of, (uint64_t)knot, -0.3, 0.3));
+        const double at = knot == 0 ? 0 : knot == 4 ? 1 : inner;
+        size += (size_t)snprintf(text + size, sizeof *texts - size, "%s[%.3f, %.3g]", knot ? ", " : "", at,
+                                 pow(10, test_uniform_in(of, 10 + (uint64_t)knot, -9, -3)));
+    }
+    snprintf(text + size, sizeof *texts - size, "]}\n");
+    return text;
+}
+
+static void make_cases(void)
+{
+    static const char *const samplings[] = {
+        "method: samples, reproducible: true", "method: segments, reproducible: true",
+        "max_error: 0.01, reproducible: true", "max_error: 1e-4, reproducible: true"};
+    static const char *const names[] = {"faint, samples", "faint, segments", "faint, max_error",
+                                        "faint, max_error 1e-4"};
+    memcpy(cases, listed, sizeof listed);
+    case_count = LISTED + test_effort(4, MOST_FAINT);
+    for (int i = 0; i + LISTED < case_count; i++)
+        cases[LISTED + i] = (image_case){names[i % 4], TO_THE_BIT, faint_layer(i), samplings[i % 4], NULL};
+}
 
 static const char *scene_of_all(void)
 {
-    static char text[16384];
+    static char text[32768];
     size_t size = 0;
+    make_cases();
     size += (size_t)snprintf(text, sizeof text, "images:\n");
-    for (int i = 0; i < CASES; i++)
+    for (int i = 0; i < case_count; i++)
         size += (size_t)snprintf(text + size, sizeof text - size,
                                  "  - name: i%d\n    size: [%d, %d]\n    layers:\n%s    sampling: {%s}\n%s"
                                  "    outputs: [{path: i%d.exr}]\n",
@@ -275,7 +312,7 @@ typedef struct tally {
     int64_t codes[2]; /* 8-bit channels of a PNG that are off by one, by more */
 } tally;
 
-static tally tallies[CASES];
+static tally tallies[MOST_CASES];
 
 static int code_of(const float *rgba, int channel)
 {
@@ -305,7 +342,7 @@ static bool compare(const caught_picture *a, const caught_picture *b, const imag
 
 static bool are_the_same(const caught_picture *whole, const char *what)
 {
-    bool are_well = caught_count == CASES;
+    bool are_well = caught_count == case_count;
     for (int i = 0; i < caught_count; i++) {
         const double before = tallies[i].worst;
         tallies[i].worst = 0;
@@ -359,8 +396,8 @@ static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture 
     assert_int_equal(hand_over(session, &whole.vertices), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &whole.cells), INSITU_OK);
     assert_int_equal(insitu_step(session, cycle++, 0), INSITU_OK);
-    assert_int_equal(caught_count, CASES);
-    memcpy(out, caught, CASES * sizeof *caught);
+    assert_int_equal(caught_count, case_count);
+    memcpy(out, caught, (size_t)case_count * sizeof *caught);
     caught_count = 0;
     insitu_destroy(&session);
     free_input(&whole);
@@ -375,15 +412,15 @@ static void pictures_do_not_depend_on_the_partition(void **state)
     bool are_well = true;
     for (int kind = 0; kind < KINDS; kind++) {
         test_mesh mesh;
-        caught_picture whole[CASES] = {{0}};
+        caught_picture whole[MOST_CASES] = {{0}};
         test_mesh_lattice(kinds[kind], side, 0.2, test_wave, &mesh);
         if (own_rank == 0) draw_whole(scene, &mesh, whole);
         are_well = judge_mesh(session, kind, side, &mesh, whole) && are_well;
-        for (int i = 0; i < CASES && own_rank == 0; i++) free_caught(&whole[i]);
+        for (int i = 0; i < case_count && own_rank == 0; i++) free_caught(&whole[i]);
         test_mesh_free(&mesh);
     }
     insitu_destroy(&session);
-    for (int i = 0; i < CASES && own_rank == 0; i++)
+    for (int i = 0; i < case_count && own_rank == 0; i++)
         printf(
             "%d ranks, %s: %d of %d to the bit, %d depths differ, off by %.2g; PNG channels off by one: %lld, by more: "
             "%lld\n",

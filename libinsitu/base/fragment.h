@@ -26,6 +26,13 @@ typedef struct fragment {
  */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
+/* Tells whether a fragment changes the picture. Its transmittance rounds to 1 where it is faint, and its light is seen
+ * all the same: a rank that left it out would draw another picture than one that has folded it with others. */
+static inline bool fragment_shows(const fragment *f)
+{
+    return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
+}
+
 /* A growing list, memory from memory.h. */
 typedef struct fragment_list {
     fragment *items;

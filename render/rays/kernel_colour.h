@@ -133,6 +133,14 @@ typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;
 
+/* fragment_shows() of each ray. */
+SIMD_INLINE vm kernel_shows(const vf colour[3], vf transmittance)
+{
+    const vf zero = vf_set(0);
+    const vm black = vm_and(vf_eq(colour[0], zero), vm_and(vf_eq(colour[1], zero), vf_eq(colour[2], zero)));
+    return vm_or(vf_lt(transmittance, vf_set(1)), vm_not(black));
+}
+
 /* Write the fragments of the rays in mask. */
 SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const kernel_fragments *f)
 {

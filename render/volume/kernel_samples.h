@@ -163,22 +163,19 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     if (!vm_any(closing)) return;
     const kernel_fragments ended = {
         b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
-    kernel_emit(p, vm_and(closing, vf_lt(b->transmittance, vf_set(1))), FRAGMENT_VOLUME, &ended);
+    kernel_emit(p, vm_and(closing, kernel_shows(b->colour, b->transmittance)), FRAGMENT_VOLUME, &ended);
     b->open = vm_andnot(b->open, closing);
 }
 
 /* Emits each sample or segment as a fragment for the fold, and says where something may come between it and the one
- * before. The open fragment then has no transmittance of its own, so that closing it emits nothing. */
-SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out,
-                                    const vf colour[3], vf clear)
+ * before. The open fragment then has no light of its own, so that closing it emits nothing. */
+SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
+                                    vf clear)
 {
     const vm fresh = vm_andnot(has, b->open);
-    const kernel_fragments own = {t_in,
-                                  t_out,
-                                  {colour[0], colour[1], colour[2]},
-                                  clear,
-                                  vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
-    kernel_emit(p, vm_and(has, vm_or(fresh, vf_lt(clear, vf_set(1)))), FRAGMENT_VOLUME, &own);
+    const kernel_fragments own = {
+        t_in, t_out, {colour[0], colour[1], colour[2]}, clear, vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
+    kernel_emit(p, vm_and(has, vm_or(fresh, kernel_shows(colour, clear))), FRAGMENT_VOLUME, &own);
     const vf stretch = vf_floor(t_in * (float)FRAGMENT_STRETCHES);
     const vm next = vm_andnot(has, vf_eq(stretch, b->stretch));
     b->light = vf_select(next, b->within, b->light);

@@ -117,7 +117,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         else
             kernel_blend_light(b, has, t_in, t_out, &light);
     }
-    const vm heaped = vf_lt(list->heap.transmittance, vf_set(1));
+    const vm heaped = kernel_shows(list->heap.colour, list->heap.transmittance);
     if (!vm_any(heaped)) return;
     if (p->frame->job->reproducible)
         kernel_blend_apart(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);
@@ -137,8 +137,8 @@ SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 SIMD_INLINE kernel_blend kernel_blend_begin(void)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    return (kernel_blend){
-        vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one, zero, one};
+    return (kernel_blend){vm_none(),          zero, zero, zero, zero, {zero, zero, zero}, one, zero,
+                          {zero, zero, zero}, one,  zero, one};
 }
 
 #endif
