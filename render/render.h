@@ -99,7 +99,8 @@ typedef struct render_light {
     float colour[3];     /* linear, intensity included */
 } render_light;
 
-/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, n towards the eye. */
+/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, n towards the eye, the
+ * sums over the lights with n.l > 0. */
 typedef struct render_material {
     float ambient, diffuse, specular, shininess;
 } render_material;

@@ -491,7 +491,7 @@ static void shade(const render_job *job, const render_material *m, const hit_pla
         if (!(lights >> i & 1)) continue;
         const double length = sqrt(hit_dot(half, half)), nl = fmax(hit_dot(n, l), 0);
         const double nh = length > 0 ? fmax(hit_dot(n, half) / length, 0) : 0;
-        const double shine = nh > 0 ? exp2(log2(fmax(nh, 1e-20)) * (double)m->shininess) : 0;
+        const double shine = nl > 0 && nh > 0 ? exp2(log2(fmax(nh, 1e-20)) * (double)m->shininess) : 0;
         for (int a = 0; a < 3; a++) {
             diffuse[a] += nl * (double)m->diffuse * (double)c[a];
             specular[a] += shine * (double)m->specular * (double)c[a];

@@ -115,8 +115,10 @@ static void shade(const trace *t, const render_material *m, const double base[3]
         double half[3];
         for (int axis = 0; axis < 3; axis++) half[axis] = light->direction[axis] + view[axis];
         normalize(half);
-        const double facing = fmax(0, reference_dot(normal, light->direction));
-        const double shine = pow(fmax(0, reference_dot(normal, half)), (double)m->shininess);
+        const double cosine = reference_dot(normal, light->direction), facing = fmax(0, cosine);
+        const double shine = cosine > 0 ? pow(fmax(0, reference_dot(normal, half)), (double)m->shininess) : 0;
+        const bool has_normal = reference_dot(normal, normal) > 0; /* else the ray is ambiguous */
+        if (m->specular > 0 && has_normal) lessen(&t->out->light_margin, fabs(cosine));
         for (int c = 0; c < 3; c++) {
             diffuse[c] += (double)light->colour[c] * (double)m->diffuse * facing;
             specular[c] += (double)light->colour[c] * (double)m->specular * shine;
@@ -628,7 +630,7 @@ void reference_trace(const reference_scene *scene, int x, int y, const float bac
 {
     trace t = {.scene = scene, .out = out};
     memset(out, 0, sizeof *out);
-    out->edge_margin = out->value_margin = out->sample_margin = out->eye_margin = (double)INFINITY;
+    out->edge_margin = out->value_margin = out->sample_margin = out->eye_margin = out->light_margin = (double)INFINITY;
     begin_ray(&t, scene, x, y);
     for (int part = 0; part < scene->job->part_count; part++)
         for (int64_t cell = 0; cell < scene->job->parts[part].cells->cell_count; cell++) cross_cell(&t, part, cell);

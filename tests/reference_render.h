@@ -32,6 +32,7 @@ typedef struct reference_ray {
     double value_margin;  /* between a face's value and an isovalue */
     double sample_margin; /* between a sample and the cell interval's ends, or a hit and a sample */
     double eye_margin;    /* between a hit and the eye's plane */
+    double light_margin;  /* between a hit's surface and the direction of a light; no length: a cosine */
     bool ambiguous;       /* the ray met a cell with more than one root, or one whose interpolant at a face is on the
                              other side of the isovalue than the face, so that the first hit depends on the root finder;
                              or a polyhedron's face whose bilinear map is folded there */

@@ -81,6 +81,28 @@ static void transparent_surfaces_before_an_opaque_one_are_the_reference(void **s
     }
 }
 
+/* Lights behind the scene shine along surfaces that turn away from them: half way between the eye and such a light
+ * there are normals all the same, but no highlight. */
+static void lights_behind_surfaces_leave_them_dark(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
+            render_fixture f;
+            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_look(&f, camera, 33, 29);
+            fixture_add_surface(&f, one_value, 1, 1);
+            f.surfaces[0].material = (render_material){.ambient = 0.1f, .diffuse = 0.3f, .specular = 1, .shininess = 4};
+            for (int a = 0; a < 3; a++) {
+                const double side = 0.6 * f.job.camera.right[a], ahead = 0.8 * f.job.camera.forward[a];
+                f.lights[0].direction[a] = ahead + side;
+                f.lights[1].direction[a] = ahead - side;
+            }
+            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "lights behind"));
+            fixture_free(&f);
+        }
+}
+
 static void volume_is_the_reference_for_every_kind_and_camera(void **state)
 {
     (void)state;
@@ -541,6 +563,7 @@ int main(void)
         cmocka_unit_test(surface_is_the_reference_for_every_kind_and_camera),
         cmocka_unit_test(surfaces_of_several_values_are_the_reference),
         cmocka_unit_test(transparent_surfaces_before_an_opaque_one_are_the_reference),
+        cmocka_unit_test(lights_behind_surfaces_leave_them_dark),
         cmocka_unit_test(volume_is_the_reference_for_every_kind_and_camera),
         cmocka_unit_test(volume_and_surfaces_are_the_reference_together),
         cmocka_unit_test(linear_surface_is_a_plane_in_every_kind),

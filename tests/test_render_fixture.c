@@ -295,10 +295,12 @@ typedef struct comparison {
     fixture_outcome outcome;
 } comparison;
 
+/* A highlight ends at once where its light goes below the surface, and which side that is on is known to a normal's
+ * error, the rounding of float32. */
 static bool is_excluded(const reference_ray *ray, double margin)
 {
-    return ray->edge_margin < margin || ray->value_margin < margin || ray->sample_margin < margin ||
-           ray->eye_margin < margin;
+    return ray->light_margin < margin || ray->edge_margin < margin || ray->value_margin < margin ||
+           ray->sample_margin < margin || ray->eye_margin < margin;
 }
 
 /* The pixel's surface fragments up to the first opaque one. */

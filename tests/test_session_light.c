@@ -142,7 +142,14 @@ static void disks_throw_ellipses(void **context)
     }
 }
 
-/* A transparent disk, a disk that is cut away, a light that casts none. */
+/* Half way between the eye and this light is the floor's normal, but the light is below the floor. */
+#define BELOW(more) "    lights: [{direction: [-3, -0.3, -4], in: world" more "}]\n"
+#define GLOSSY                                                                                                         \
+    "      - slice: {field: f, planes: [{normal: [0, 1, 0], point: [0, -0.5, 0]}],\n"                                  \
+    "                material: {ambient: 0.2, diffuse: 0.4, specular: 1, shininess: 2}}\n"
+
+/* A transparent disk, a disk that is cut away, a light that casts none, one below that casts none and has no highlight.
+ */
 static void what_casts_no_shadow_casts_none(void **context)
 {
     static const char *const scenes[][2] = {
@@ -153,6 +160,8 @@ static void what_casts_no_shadow_casts_none(void **context)
         {IMAGE(LIGHT("") "    shadows: true\n    clip: {planes: [{normal: [0, 1, 0], point: [0, 0, 0]}]}\n",
                FLOOR DISK("")),
          IMAGE(LIGHT("") "    clip: {planes: [{normal: [0, 1, 0], point: [0, 0, 0]}]}\n", FLOOR DISK(""))},
+        {IMAGE(BELOW(", shadows: false") "    shadows: true\n    ambient_occlusion: {radius: 1e-3}\n", GLOSSY),
+         IMAGE(BELOW(", intensity: 0"), GLOSSY)},
     };
     (void)context;
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {

@@ -119,7 +119,7 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
         vf nh = ((unit[0] * half[0] + unit[1] * half[1]) + unit[2] * half[2]) * scale;
         nh = vf_select(opposite, vf_set(0), vf_max(nh, vf_set(0)));
         vf shine = vf_exp2(vf_log2(vf_max(nh, vf_set(1e-20f))) * m->shininess);
-        shine = vf_select(vf_lt(vf_set(0), nh), shine, vf_set(0));
+        shine = vf_select(vm_and(vf_lt(vf_set(0), nh), vf_lt(vf_set(0), nl)), shine, vf_set(0));
         for (int a = 0; a < 3; a++) {
             diffuse[a] += nl * (m->diffuse * c[a]);
             specular[a] += shine * (m->specular * c[a]);
