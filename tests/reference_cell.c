@@ -226,7 +226,7 @@ static int polyhedron_crossings(const reference_cell *cell, const reference_line
             found[of_face].face = face;
             found[of_face++].triangle = next;
         }
-        if (p->face_size[face] == 4) of_face = move_to_patch(cell, line, p->faces[face], found, of_face, &is_folded);
+        if (p->is_patch[face]) of_face = move_to_patch(cell, line, p->faces[face], found, of_face, &is_folded);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     for (int i = 0; i < count && is_folded; i++) crossings[i].is_folded = true;
@@ -270,7 +270,7 @@ double reference_face_value(const reference_cell *cell, const reference_line *li
 {
     const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
     const int *face = is_polyhedron ? cell->poly.faces[crossing->face] : faces_of(cell->type)->vertices[crossing->face];
-    const bool is_quad = is_polyhedron ? cell->poly.face_size[crossing->face] == 4 : face[3] >= 0;
+    const bool is_quad = is_polyhedron ? cell->poly.is_patch[crossing->face] : face[3] >= 0;
     *is_folded = crossing->is_folded;
     if (!is_quad)
         return triangle_value(cell, line, is_polyhedron ? cell->poly.triangles[crossing->triangle] : face, values);
@@ -369,8 +369,8 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
     /* On triangles the profile is the sum itself. */
-    const bool is_first = next == 1 && cell->poly.face_size[ends[0].face] == 4;
-    const bool is_last = next == count - 1 && cell->poly.face_size[ends[1].face] == 4;
+    const bool is_first = next == 1 && cell->poly.is_patch[ends[0].face];
+    const bool is_last = next == count - 1 && cell->poly.is_patch[ends[1].face];
     if (!is_first && !is_last) {
         const double inner = 1e-9 * length, held = fmin(fmax(z, ends[0].z + inner), ends[1].z - inner);
         if (sum_on_line(cell, line, held, values, value)) return true;

@@ -12,6 +12,7 @@ typedef struct reference_polyhedron {
     int face_count;
     int face_size[REFERENCE_MAX_FACES];
     int faces[REFERENCE_MAX_FACES][REFERENCE_MAX_SIDES]; /* numbers of the cell's vertices, around */
+    bool is_patch[REFERENCE_MAX_FACES];                  /* a quad that is met on its bilinear patch */
     int triangle_count;
     int triangles[REFERENCE_MAX_TRIANGLES][3]; /* the canonical ones */
     int face_of[REFERENCE_MAX_TRIANGLES];

@@ -1,11 +1,13 @@
-/* A polyhedron in double, by the letter of its definition: every face is a fan from its smallest vertex, every triangle
- * makes a tet with the centre, and the field at a point is the sum, over the tets that hold it, of sign times linear
- * field.
+/* A polyhedron in double, by the letter of its definition: every face is cut as reference_polygon.h says, every
+ * triangle makes a tet with the centre, and the field at a point is the sum, over the tets that hold it, of sign times
+ * linear field.
  *
  * The signs come from faces turned alike: one face is taken as it is, and any face that shares a directed edge with it
  * in the same direction is turned over, and so on until nothing changes. Then each connected piece is turned to have a
  * positive volume, or a negative one if its first vertex is inside the rest. */
 #include "reference_polyhedron.h"
+
+#include "reference_polygon.h"
 #include <stdlib.h>
 
 #include <stdio.h>
@@ -14,13 +16,6 @@
 #include <string.h>
 
 #include "grid.h"
-
-static bool comes_before(const double *a, const double *b)
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis];
-    return false;
-}
 
 static double determinant(const double *a, const double *b, const double *c)
 {
@@ -69,15 +64,20 @@ static void add_triangles(reference_cell *cell)
     reference_polyhedron *p = &cell->poly;
     p->triangle_count = 0;
     for (int face = 0; face < p->face_count; face++) {
-        const int size = p->face_size[face], *loop = p->faces[face];
-        int least = 0;
-        for (int i = 1; i < size; i++)
-            if (comes_before(cell->world[loop[i]], cell->world[loop[least]])) least = i;
-        for (int i = 1; i + 1 < size; i++) {
-            int *t = p->triangles[p->triangle_count];
-            t[0] = loop[least];
-            t[1] = loop[(least + i) % size];
-            t[2] = loop[(least + i + 1) % size];
+        double corners[REFERENCE_MAX_SIDES][3];
+        int cut[REFERENCE_MAX_SIDES][3], size = 0, loop[REFERENCE_MAX_SIDES];
+        for (int i = 0; i < p->face_size[face]; i++) { /* a vertex that follows itself counts once */
+            const int vertex = p->faces[face][i],
+                      before = p->faces[face][(i + p->face_size[face] - 1) % p->face_size[face]];
+            if (vertex == before) continue;
+            loop[size] = vertex;
+            memcpy(corners[size++], cell->world[vertex], sizeof corners[0]);
+        }
+        p->is_patch[face] =
+            p->face_size[face] == 4 && !(size == 4 && reference_is_concave_quad((const double(*)[3])corners));
+        const int count = size < 3 ? 0 : reference_polygon_cut((const double(*)[3])corners, size, cut);
+        for (int i = 0; i < count; i++) {
+            for (int k = 0; k < 3; k++) p->triangles[p->triangle_count][k] = loop[cut[i][k]];
             p->face_of[p->triangle_count++] = face;
         }
     }

@@ -70,6 +70,8 @@ insitu_add_mpi_test(session_light test_session_light 1 2 3 7 TIMEOUT 240 ARGS ${
 insitu_session_program(test_session_outline)
 insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_concave)
+insitu_add_mpi_test(session_concave test_session_concave 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_shells)
 insitu_add_mpi_test(session_shells test_session_shells 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

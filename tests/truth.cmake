@@ -10,6 +10,6 @@ target_include_directories(test_meshes PUBLIC ${here} ${PROJECT_SOURCE_DIR}/libi
 target_link_libraries(test_meshes PUBLIC m PRIVATE insitu_flags)
 
 add_library(test_truth STATIC
-  ${here}/reference_base.c ${here}/reference_cell.c ${here}/reference_integral.c ${here}/reference_polyhedron.c
+  ${here}/reference_base.c ${here}/reference_cell.c ${here}/reference_integral.c ${here}/reference_polygon.c ${here}/reference_polyhedron.c
   ${here}/reference_render.c)
 target_link_libraries(test_truth PUBLIC test_meshes insitu_internal PRIVATE insitu_flags)

@@ -1,8 +1,8 @@
 /* Polyhedra taken apart.
  *
- * The caller's mesh says cells -> faces -> vertices. A ray wants the canonical triangles of the surface (each face a
- * fan from its smallest vertex), the unique edges, and the centre, which with the triangles spans the tets on which the
- * field is linear. All of this is made when a ray of a tile first meets the cell, and forgotten with the tile: no
+ * The caller's mesh says cells -> faces -> vertices. A ray wants the canonical triangles of the surface (each
+ * face is cut as polygon.h says), the unique edges, and the centre, which with the triangles spans the tets on which
+ * the field is linear. All of this is made when a ray of a tile first meets the cell, and forgotten with the tile: no
  * copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes about 200 v
  * bytes here, some 6 KB for a Voronoi cell of 27 vertices; a store holds STORE_LIMIT of them at most (then it forgets
  * all, and begins again) and one cell more.
@@ -143,6 +143,7 @@ typedef struct work {
     const grid_field *field;
     closed_faces faces;
     int *rank; /* of a vertex as met */
+    double (*positions)[3];
     work_vertex *vertices;
 } work;
 
@@ -182,6 +183,7 @@ static size_t lay_out(work *w, char *buffer)
 {
     base_carving at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
     w->rank = base_carve(&at, (size_t)w->faces.entry_count * sizeof(int));
+    w->positions = base_carve(&at, (size_t)w->faces.entry_count * sizeof *w->positions);
     w->vertices = base_carve(&at, (size_t)w->faces.entry_count * sizeof *w->vertices);
     return at.used;
 }
@@ -199,7 +201,10 @@ static void read_faces(work *w, int64_t cell)
         v->as_met = i;
     }
     sort_vertices(w->vertices, c->vertex_count);
-    for (int i = 0; i < c->vertex_count; i++) w->rank[w->vertices[i].as_met] = i;
+    for (int i = 0; i < c->vertex_count; i++) {
+        w->rank[w->vertices[i].as_met] = i;
+        memcpy(w->positions[i], w->vertices[i].position, sizeof w->positions[i]);
+    }
     for (int i = 0; i < c->entry_count; i++) c->entry[i] = w->rank[c->entry[i]];
 }
 
@@ -244,7 +249,7 @@ static void keep_vertices(const work *w, int64_t cell, polyhedron *c)
 static bool collapses(const work *w, const int *around)
 {
     const double *corners[4];
-    for (int i = 0; i < 4; i++) corners[i] = w->vertices[around[i]].position;
+    for (int i = 0; i < 4; i++) corners[i] = w->positions[around[i]];
     return quad_collapses(corners);
 }
 
@@ -253,7 +258,8 @@ static void keep_quads(const work *w, polyhedron *c, int *quad_of)
     int count = 0;
     for (int face = 0; face < w->faces.face_count; face++) {
         const int first = w->faces.first[face];
-        const bool is_quad = w->faces.first[face + 1] - first == 4 && !collapses(w, &w->faces.entry[first]);
+        const bool is_quad = closed_face_is_patch(&w->faces, face, (const double(*)[3])w->positions) &&
+                             !collapses(w, &w->faces.entry[first]);
         quad_of[face] = is_quad ? count : -1;
         if (quad_of[face] >= 0) memcpy(c->quads[count++], &w->faces.entry[first], 4 * sizeof(int));
     }
@@ -321,7 +327,7 @@ static polyhedron *take_apart(polyhedron_store *store, const grid *g, const grid
     lay_out(&w, buffer);
     read_faces(&w, index);
     closed_faces_turn(&w.faces);
-    closed_faces_cut(&w.faces);
+    closed_faces_cut(&w.faces, (const double(*)[3])w.positions);
     sort_facets(w.faces.triangles, w.faces.triangle_count);
     return keep(store, &w, index);
 }

@@ -66,9 +66,9 @@ typedef enum insitu_cell_type {
      * lies on the face of another cell is shown instead of that face. Isosurfaces, volumes, slices and statistics pass
      * shells over. When cell values are averaged at a vertex (insitu_centring), those of shells count too. */
     INSITU_TRIANGLE = 5, /* 3 vertices */
-    INSITU_POLYGON = 7,  /* 3 vertices or more around it; offsets tell how many. It is drawn as triangles from the
-                            vertex that is least by x, then y, then z, so it should be flat. */
-    INSITU_QUAD = 9      /* 4 vertices around it; may be warped */
+    INSITU_POLYGON = 7,  /* 3 vertices or more around it; offsets tell how many. It is drawn as triangles, which
+                            cover it once, convex or not; it should be flat. */
+    INSITU_QUAD = 9      /* 4 vertices around it; may be warped. Two triangles where it is concave */
 } insitu_cell_type;
 
 /* The order of a cell's vertices in connectivity. Cell types that an order does not name are in VTK's order. Mirrored

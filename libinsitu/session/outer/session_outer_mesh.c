@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "polygon.h"
 #include "session_agree.h"
 #include "session_cell_faces.h"
 #include "session_scalars.h"
@@ -25,13 +26,11 @@ static int compare_places(const double a[3], const double b[3])
     return 0;
 }
 
-static void add_corner(corner_loop *loop, const grid *g, int64_t vertex)
+static void add_corner(corner_loop *loop, int64_t vertex, const double place[3])
 {
-    double place[3];
-    grid_vertex(g, vertex, place);
     for (int i = 0; i < loop->count; i++)
         if (compare_places(loop->places[i], place) == 0) return;
-    memcpy(loop->places[loop->count], place, sizeof place);
+    memcpy(loop->places[loop->count], place, 3 * sizeof *place);
     loop->vertices[loop->count++] = vertex;
 }
 
@@ -82,8 +81,12 @@ static double perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* Puts the apex above the middle of the corners, half a mean side away, on the side of inside. False where the face's
- * area is no more than rounding. */
+/* The share of a face's width by which a point must be off the face's plane to be on one of its sides. The middle of a
+ * shell is in its plane, and rounding must not decide, since it depends on where the list of vertices begins. */
+static const double side_slack = 1e-9;
+
+/* Puts the apex above the middle of the corners, half a mean side away, on the side of inside, or on that of the loop's
+ * own normal. False where the face's area is no more than rounding. */
 static bool find_apex(const corner_loop *loop, const double inside[3], double apex[3])
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
@@ -93,7 +96,8 @@ static bool find_apex(const corner_loop *loop, const double inside[3], double ap
     for (int i = 0; i < loop->count; i++)
         for (int axis = 0; axis < 3; axis++) middle[axis] += loop->places[i][axis] / loop->count;
     subtract(inside, middle, towards);
-    const double height = 0.5 * around / loop->count * (dot(towards, normal) < 0 ? -1 : 1);
+    const bool is_below = dot(towards, normal) < -side_slack * around * length;
+    const double height = 0.5 * around / loop->count * (is_below ? -1 : 1);
     for (int axis = 0; axis < 3; axis++) apex[axis] = middle[axis] + height * normal[axis] / length;
     return true;
 }
@@ -113,6 +117,17 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 
 /* ---- the mesh ------------------------------------------------------------------------------------------------ */
 
+/* A face of more than four corners, or a concave quad, which is drawn as its triangles (polygon.h). Corners that follow
+ * themselves are left out. */
+typedef struct face_polygon {
+    int count;
+    int64_t *vertices;
+    double (*places)[3];
+    int (*triangles)[3];
+    void *room;
+    double normal[3]; /* towards the apexes */
+} face_polygon;
+
 /* The mesh while it is made, in arrays of the most that the faces can take. */
 typedef struct outer_work {
     const grid *cells;
@@ -120,7 +135,8 @@ typedef struct outer_work {
     int64_t *places; /* the place among the new vertices of each of the whole mesh's; -1: it has none yet */
     float *heights;
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
-    int64_t loop_end; /* the end of what is filled of the loops of polygons */
+    face_polygon polygon; /* with room for the largest */
+    int64_t loop_end;     /* the end of what is filled of the loops of polygons */
 } outer_work;
 
 static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
@@ -159,79 +175,38 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
     if (find_apex(loop, inside, apex)) add_cell_below(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
 }
 
-/* Adds the loop of the polygon that the cells from first on are of. */
-static void add_loop(outer_work *w, const session_face_loop *face, int64_t first)
+/* Makes a triangle and its own apex; false where it has no area. */
+static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, double apex[3])
 {
-    int64_t *loops = w->out->loops;
-    for (int64_t cell = first; cell < w->cell_count; cell++) loops[cell] = w->loop_end;
-    loops[w->loop_end++] = face->size;
-    for (int64_t i = 0; i < face->size; i++) {
-        double place[3];
-        const int64_t vertex = session_face_vertex(face, i);
-        grid_vertex(w->cells, vertex, place);
-        loops[w->loop_end++] = place_vertex(w, vertex, place);
+    double inside[3];
+    *out = (corner_loop){.count = 3};
+    for (int k = 0; k < 3; k++) {
+        out->vertices[k] = p->vertices[p->triangles[i][k]];
+        memcpy(out->places[k], p->places[p->triangles[i][k]], sizeof out->places[k]);
     }
-}
-
-/* A polygon's triangles, from its least vertex on, towards the lesser of that one's neighbours. */
-typedef struct face_fan {
-    const session_face_loop *face;
-    int64_t least, step;
-} face_fan;
-
-static int64_t fan_vertex(const face_fan *fan, int64_t i)
-{
-    const int64_t size = fan->face->size;
-    return session_face_vertex(fan->face, (fan->least + (fan->step > 0 ? i : size - i)) % size);
-}
-
-static face_fan make_fan(const grid *g, const session_face_loop *face)
-{
-    face_fan fan = {face, 0, 1};
-    double least[3], place[3], after[3], before[3];
-    grid_vertex(g, session_face_vertex(face, 0), least);
-    for (int64_t i = 1; i < face->size; i++) {
-        grid_vertex(g, session_face_vertex(face, i), place);
-        if (compare_places(place, least) >= 0) continue;
-        memcpy(least, place, sizeof place);
-        fan.least = i;
-    }
-    grid_vertex(g, fan_vertex(&fan, 1), after);
-    grid_vertex(g, fan_vertex(&fan, face->size - 1), before);
-    if (compare_places(before, after) < 0) fan.step = -1;
-    return fan;
-}
-
-/* Makes a triangle of the fan and its own apex; false where it has no area. */
-static bool fan_triangle(const grid *g, const face_fan *fan, int64_t i, const double inside[3], corner_loop *out,
-                         double apex[3])
-{
-    *out = (corner_loop){0};
-    add_corner(out, g, fan_vertex(fan, 0));
-    add_corner(out, g, fan_vertex(fan, i));
-    add_corner(out, g, fan_vertex(fan, i + 1));
-    if (out->count < 3) return false;
     order_corners(out);
+    for (int axis = 0; axis < 3; axis++)
+        inside[axis] = (out->places[0][axis] + out->places[1][axis] + out->places[2][axis]) / 3 + p->normal[axis];
     return find_apex(out, inside, apex);
 }
 
 /* Finds an apex for all triangles, the mean of their own. Their tets then share faces, and a ray along the line between
  * two triangles goes from one tet into the other; between separate tets it might hit neither. False where the apex is
  * not well above each triangle, because they are too far from a plane. */
-static bool find_common_apex(const grid *g, const face_fan *fan, const double inside[3], double out[3])
+static bool find_common_apex(const face_polygon *p, double out[3])
 {
     corner_loop loop;
     double own[3], height[3], normal[3];
     int count = 0;
     out[0] = out[1] = out[2] = 0;
-    for (int64_t i = 1; i + 1 < fan->face->size; i++) {
-        if (!fan_triangle(g, fan, i, inside, &loop, own)) continue;
+    for (int i = 0; i + 2 < p->count; i++) {
+        if (!polygon_triangle(p, i, &loop, own)) continue;
         for (int axis = 0; axis < 3; axis++) out[axis] += own[axis];
         count++;
     }
     for (int axis = 0; axis < 3 && count; axis++) out[axis] /= count;
-    for (int64_t i = 1; i + 1 < fan->face->size; i++) {
-        if (!fan_triangle(g, fan, i, inside, &loop, own)) continue;
+    for (int i = 0; i + 2 < p->count; i++) {
+        if (!polygon_triangle(p, i, &loop, own)) continue;
         find_normal(&loop, normal);
         subtract(own, loop.places[0], height);
         const double most = dot(height, normal);
@@ -241,55 +216,144 @@ static bool find_common_apex(const grid *g, const face_fan *fan, const double in
     return count > 0;
 }
 
-static void add_fan(outer_work *w, const session_face_loop *face, const double inside[3], int64_t origin)
+/* Finds the polygon's normal on the side of inside, or where its largest component is positive; it is about as long as
+ * the polygon is wide. */
+static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
-    const face_fan fan = make_fan(w->cells, face);
+    double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
+    for (int i = 0; i + 2 < p->count; i++) {
+        double a[3], b[3];
+        subtract(p->places[p->triangles[i][1]], p->places[p->triangles[i][0]], a);
+        subtract(p->places[p->triangles[i][2]], p->places[p->triangles[i][0]], b);
+        for (int axis = 0; axis < 3; axis++) {
+            const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+            sum[axis] += a[next] * b[last] - a[last] * b[next];
+        }
+    }
+    for (int i = 0; i < p->count; i++)
+        for (int axis = 0; axis < 3; axis++) middle[axis] += p->places[i][axis] / p->count;
+    subtract(inside, middle, towards);
+    const double length = sqrt(dot(sum, sum)), width = sqrt(length), side = dot(towards, sum);
+    int largest = 0;
+    for (int axis = 1; axis < 3; axis++)
+        if (fabs(sum[axis]) > fabs(sum[largest])) largest = axis;
+    const double sign = (fabs(side) > side_slack * length * width ? side : sum[largest]) < 0 ? -1 : 1;
+    for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
+}
+
+/* Adds the loop of the polygon that the cells from first on are of. */
+static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
+{
+    int64_t *loops = w->out->loops;
+    for (int64_t cell = first; cell < w->cell_count; cell++) loops[cell] = w->loop_end;
+    loops[w->loop_end++] = p->count;
+    for (int i = 0; i < p->count; i++) loops[w->loop_end++] = place_vertex(w, p->vertices[i], p->places[i]);
+}
+
+static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], int64_t origin)
+{
     const int64_t first = w->cell_count;
     double common[3], own[3];
     corner_loop loop;
-    const bool is_shared = find_common_apex(w->cells, &fan, inside, common);
-    const int64_t apex = is_shared ? add_vertex(w, common, fan_vertex(&fan, 0), -1) : -1;
-    for (int64_t i = 1; i + 1 < face->size; i++) {
-        if (!fan_triangle(w->cells, &fan, i, inside, &loop, own)) continue;
+    polygon_cut((const double(*)[3])p->places, p->count, p->room, p->triangles);
+    find_polygon_normal(p, inside);
+    const bool is_shared = find_common_apex(p, common);
+    const int64_t apex = is_shared ? add_vertex(w, common, p->vertices[p->triangles[0][0]], -1) : -1;
+    for (int i = 0; i + 2 < p->count; i++) {
+        if (!polygon_triangle(p, i, &loop, own)) continue;
         add_cell_below(w, &loop, is_shared ? apex : add_vertex(w, own, loop.vertices[0], -1), origin);
     }
-    add_loop(w, face, first);
+    add_loop(w, p, first);
+}
+
+/* Tells whether a face is a concave quad. Faces of hexes, wedges and pyramids are patches, whatever their form. */
+static bool is_concave(const session_face_loop *face, const double (*places)[3], int count)
+{
+    return count == 4 && !face->places && polygon_is_concave_quad(places);
+}
+
+/* Reads the corners around a face. */
+static void read_polygon(const grid *g, const session_face_loop *face, face_polygon *p)
+{
+    p->count = 0;
+    for (int64_t i = 0; i < face->size; i++) {
+        p->vertices[p->count] = session_face_vertex(face, i);
+        grid_vertex(g, p->vertices[p->count], p->places[p->count]);
+        if (p->count && compare_places(p->places[p->count], p->places[p->count - 1]) == 0) continue;
+        p->count++;
+    }
+    while (p->count > 1 && compare_places(p->places[p->count - 1], p->places[0]) == 0) p->count--;
 }
 
 static void add_face(outer_work *w, const session_face *face)
 {
     const session_cell_faces faces = session_faces_of_cell(w->cells, face->cell);
     const session_face_loop of = session_face_of(&faces, face->face);
+    face_polygon *p = &w->polygon;
     double inside[3];
     find_inside(w->cells, face->cell, inside);
-    if (of.size > 4) {
-        add_fan(w, &of, inside, face->cell);
+    read_polygon(w->cells, &of, p);
+    if (p->count > 4 || is_concave(&of, (const double(*)[3])p->places, p->count)) {
+        add_polygon(w, p, inside, face->cell);
         return;
     }
     corner_loop loop = {0};
-    for (int64_t i = 0; i < of.size; i++) add_corner(&loop, w->cells, session_face_vertex(&of, i));
+    for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->places[i]);
     add_cell(w, &loop, inside, face->cell);
 }
 
-/* Counts the most cells and entries of connectivity that there can be, and the entries of polygons' loops. */
-static void count_most(const grid *g, const session_outer *outer, int64_t *cells, int64_t *entries, int64_t *loops)
+/* The most that the faces can take. */
+typedef struct outer_counts {
+    int64_t cells, entries; /* entries of connectivity */
+    int64_t loops;          /* entries of polygons' loops */
+    int64_t corners;        /* of one face */
+} outer_counts;
+
+static outer_counts count_most(const grid *g, const session_outer *outer)
 {
-    *cells = *entries = *loops = 0;
+    outer_counts most = {0};
     for (int64_t i = 0; i < outer->face_count; i++) {
         const session_face *face = &outer->faces[i];
         const session_cell_faces faces = session_faces_of_cell(g, face->cell);
-        const int64_t size = session_face_of(&faces, face->face).size;
-        *cells += size > 4 ? size - 2 : 1;
-        *loops += size > 4 ? size + 1 : 0;
-        *entries += size > 4 ? 4 * (size - 2) : size + 1;
+        const session_face_loop loop = session_face_of(&faces, face->face);
+        const int64_t size = loop.size;
+        double places[4][3];
+        for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), places[k]);
+        const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])places, (int)size);
+        most.cells += is_polygon ? size - 2 : 1;
+        most.loops += is_polygon ? size + 1 : 0;
+        most.entries += is_polygon ? 4 * (size - 2) : size + 1;
+        most.corners = size > most.corners ? size : most.corners;
     }
+    return most;
+}
+
+static bool make_polygon_room(face_polygon *p, int64_t corners)
+{
+    const size_t count = (size_t)corners;
+    p->vertices = base_alloc(count * sizeof *p->vertices);
+    p->places = base_alloc(count * sizeof *p->places);
+    p->triangles = base_alloc(count * sizeof *p->triangles);
+    p->room = base_alloc(polygon_room((int)corners));
+    return p->vertices && p->places && p->triangles && p->room;
+}
+
+static void work_free(outer_work *w)
+{
+    base_free(w->places);
+    base_free(w->heights);
+    base_free(w->polygon.vertices);
+    base_free(w->polygon.places);
+    base_free(w->polygon.triangles);
+    base_free(w->polygon.room);
 }
 
 static bool work_create(const grid *g, session_outer *out, outer_work *w)
 {
-    int64_t cells, entries, loops;
-    count_most(g, out, &cells, &entries, &loops);
+    const outer_counts most = count_most(g, out);
+    const int64_t cells = most.cells, entries = most.entries, loops = most.loops;
     *w = (outer_work){.cells = g, .out = out};
+    if (most.corners > INT32_MAX / 64) return false;
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
     if (loops) out->bytes += (cells + loops) * (int64_t)sizeof *out->loops;
     out->bytes += out->face_count * (int64_t)sizeof *out->faces;
@@ -305,7 +369,8 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
     w->heights = base_alloc((size_t)entries * sizeof *w->heights);
     w->places = base_alloc((size_t)g->vertex_count * sizeof *w->places);
     return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
-           (out->loops || !loops) && out->cell_origins && w->heights && w->places;
+           (out->loops || !loops) && out->cell_origins && w->heights && w->places &&
+           make_polygon_room(&w->polygon, most.corners);
 }
 
 /* Cells of one type are handed over without types and offsets, so that kernels for many cells at once take them. */
@@ -356,8 +421,7 @@ insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *
         outer->offsets[work.cell_count] = work.entry_count;
         is_made = finish(whole, &work);
     }
-    base_free(work.places);
-    base_free(work.heights);
+    work_free(&work);
     if (is_made) return INSITU_OK;
     session_drop_outer(outer, false);
     return session_no_memory(error, outer->face_count * 250, "the mesh of outer faces");

@@ -98,25 +98,24 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
     static const double origin[3] = {0, 0, 0};
     closed_faces c = {0};
     if (!closed_faces_count(&c, g, cell)) return NAN;
-    const size_t places = 3 * (size_t)c.entry_count * sizeof(double);
-    if (!make_room(room, closed_faces_lay_out(&c, NULL) + places)) return NAN;
-    double(*positions)[3] = (double(*)[3])(void *)(room->bytes + closed_faces_lay_out(&c, room->bytes));
+    const size_t bytes = 3 * (size_t)c.entry_count * sizeof(double);
+    if (!make_room(room, closed_faces_lay_out(&c, NULL) + bytes)) return NAN;
+    double(*places)[3] = (double(*)[3])(void *)(room->bytes + closed_faces_lay_out(&c, room->bytes));
+    const double(*positions)[3] = (const double(*)[3])places;
     closed_faces_read(&c, g, cell);
     room->vertices = c.vertices;
     room->vertex_count = c.vertex_count;
     if (!c.vertex_count) return 0;
-    take_positions(g, &c, positions);
+    take_positions(g, &c, places);
     closed_faces_turn(&c);
-    closed_faces_cut(&c);
-    closed_faces_turn_outward(&c, (const double(*)[3])positions, origin);
+    closed_faces_cut(&c, positions);
+    closed_faces_turn_outward(&c, positions, origin);
     double volume = 0;
-    for (int i = 0; i < c.triangle_count; i++) {
-        const int face = c.triangles[i].face;
-        if (c.first[face + 1] - c.first[face] != 4) volume += c.triangles[i].volume;
-    }
+    for (int i = 0; i < c.triangle_count; i++)
+        if (!closed_face_is_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;
     for (int face = 0; face < c.face_count; face++)
-        if (c.first[face + 1] - c.first[face] == 4)
-            volume += c.turn[face] * patch_cone((const double(*)[3])positions, c.entry + c.first[face]);
+        if (closed_face_is_patch(&c, face, positions))
+            volume += c.turn[face] * patch_cone(positions, c.entry + c.first[face]);
     return fabs(volume) / 6;
 }
 

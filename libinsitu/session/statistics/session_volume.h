@@ -19,7 +19,8 @@ typedef struct volume_room {
 void session_volume_free(volume_room *room);
 
 /* The volume of a good cell, without a sign, whatever its shape: quads are bilinear patches, other faces of polyhedra
- * their triangles. NaN where memory ran out, as only a polyhedron larger than all before may find. */
+ * and concave quads of theirs their triangles. NaN where memory ran out, as only a polyhedron larger than all before
+ * may find. */
 double session_cell_volume(const grid *g, int64_t cell, volume_room *room);
 
 #endif

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "polygon.h"
 
 bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell)
 {
@@ -39,6 +40,9 @@ size_t closed_faces_lay_out(closed_faces *c, char *room)
     c->seen_number = base_carve(&at, table * sizeof(int));
     c->edges = base_carve(&at, 2 * table * sizeof *c->edges);
     c->triangles = base_carve(&at, entries * sizeof *c->triangles);
+    c->corners = base_carve(&at, entries * sizeof *c->corners);
+    c->cuts = base_carve(&at, entries * sizeof *c->cuts);
+    c->polygon = base_carve(&at, polygon_room((int)entries));
     return at.used;
 }
 
@@ -158,26 +162,35 @@ static void swap_pair(closed_triangle *t, int i, int j)
     t->turn = -t->turn;
 }
 
-static void cut_face(closed_faces *c, int face)
+static void add_triangle(closed_faces *c, int face, const int corners[3])
 {
-    const int first = c->first[face], count = c->first[face + 1] - first;
-    int least = 0;
-    for (int i = 1; i < count; i++)
-        if (c->entry[first + i] < c->entry[first + least]) least = i;
-    for (int i = 1; i + 1 < count; i++) {
-        closed_triangle t = {.face = face, .turn = c->turn[face]};
-        for (int k = 0; k < 3; k++) t.vertex[k] = c->entry[first + (least + (k == 0 ? 0 : i + k - 1)) % count];
-        swap_pair(&t, 0, 1);
-        swap_pair(&t, 1, 2);
-        swap_pair(&t, 0, 1);
-        if (t.vertex[0] != t.vertex[1] && t.vertex[1] != t.vertex[2]) c->triangles[c->triangle_count++] = t;
+    closed_triangle t = {.face = face, .turn = c->turn[face]};
+    for (int k = 0; k < 3; k++) t.vertex[k] = c->entry[c->first[face] + corners[k]];
+    swap_pair(&t, 0, 1);
+    swap_pair(&t, 1, 2);
+    swap_pair(&t, 0, 1);
+    if (t.vertex[0] != t.vertex[1] && t.vertex[1] != t.vertex[2]) c->triangles[c->triangle_count++] = t;
+}
+
+void closed_faces_cut(closed_faces *c, const double (*positions)[3])
+{
+    c->triangle_count = 0;
+    for (int face = 0; face < c->face_count; face++) {
+        const int first = c->first[face], count = c->first[face + 1] - first;
+        if (count < 3) continue;
+        for (int i = 0; i < count; i++) memcpy(c->corners[i], positions[c->entry[first + i]], sizeof c->corners[i]);
+        polygon_cut((const double(*)[3])c->corners, count, c->polygon, c->cuts);
+        for (int i = 0; i + 2 < count; i++) add_triangle(c, face, c->cuts[i]);
     }
 }
 
-void closed_faces_cut(closed_faces *c)
+bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3])
 {
-    c->triangle_count = 0;
-    for (int face = 0; face < c->face_count; face++) cut_face(c, face);
+    double corners[4][3];
+    const int first = c->first[face];
+    if (c->first[face + 1] - first != 4) return false;
+    for (int i = 0; i < 4; i++) memcpy(corners[i], positions[c->entry[first + i]], sizeof corners[i]);
+    return !polygon_is_concave_quad((const double(*)[3])corners);
 }
 
 /* ---- turning outward ------------------------------------------------------------------------------------------ */

@@ -36,6 +36,9 @@ typedef struct closed_faces {
     closed_triangle *triangles;
     closed_edge *edges; /* 2 * table_size, by hash */
     /* For the functions below. */
+    double (*corners)[3];
+    int (*cuts)[3];
+    void *polygon;
     int *edge_of, *stack, *seen_number;
     int64_t *seen;
     double *piece_volume;
@@ -54,12 +57,16 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell);
 /* Turns each piece's faces as its first is listed. */
 void closed_faces_turn(closed_faces *c);
 
-/* Cuts the faces into fans, each from its vertex of least number. A triangle with two corners in one vertex bounds
+/* Cuts the faces into triangles (polygon.h). Positions by number. A triangle with two corners in one vertex bounds
  * nothing and is left out. */
-void closed_faces_cut(closed_faces *c);
+void closed_faces_cut(closed_faces *c, const double (*positions)[3]);
 
-/* Finds the triangles' volumes, and turns pieces outward. Positions by number. */
+/* Finds the triangles' volumes, and turns pieces outward. */
 void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], const double centre[3]);
+
+/* Tells whether the face is met on a bilinear patch: it has four vertices, and none of them points inwards. Else it is
+ * its triangles. */
+bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3]);
 
 /* Empties the table of edges, and finds an edge's place in it; a new one has no sides. */
 void closed_edges_empty(closed_faces *c);

@@ -1,0 +1,289 @@
+#include "polygon.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The share of the polygon's area by which a triangle of the fan may be turned over, and still count as rounding of
+ * corners in a line: some rounding of coordinates in float32. */
+static const double fan_slack = 0x1p-20;
+
+/* The area, of a polygon about 1 wide, below which three corners are in a line. Projected places are off by few 2^-53;
+ * an area by some ten of them. */
+static const double line_slack = 0x1p-46;
+
+/* Corners by their rank in the order of cutting. */
+typedef struct polygon_work {
+    int count;
+    int step; /* 1 where the order runs as the list does, else -1 */
+    int *order;
+    double (*places)[3]; /* from the least corner, about 1 wide */
+    double (*flat)[2];   /* seen along the normal, around which the order runs counterclockwise */
+    int *next, *before;  /* of those that are left */
+    char *is_ear;
+    int (*triangles)[3];
+    int triangle_count;
+} polygon_work;
+
+size_t polygon_room(int count)
+{
+    return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int) + 1) + 8;
+}
+
+static polygon_work lay_out(int count, char *room, int (*triangles)[3])
+{
+    const size_t n = (size_t)count;
+    polygon_work w = {.count = count, .triangles = triangles};
+    w.places = (double(*)[3])(void *)room;
+    w.flat = (double(*)[2])(void *)(room + 3 * n * sizeof(double));
+    w.order = (int *)(void *)(room + 5 * n * sizeof(double));
+    w.next = w.order + n;
+    w.before = w.next + n;
+    w.is_ear = (char *)(w.before + n);
+    return w;
+}
+
+/* ---- the order ------------------------------------------------------------------------------------------------ */
+
+static int compare_places(const double a[3], const double b[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
+    return 0;
+}
+
+static int at(int start, int step, int i, int count)
+{
+    return (start + (step > 0 ? i : count - i)) % count;
+}
+
+static bool is_less(const double (*p)[3], int count, const int one[2], const int other[2])
+{
+    for (int i = 0; i < count; i++) {
+        const int sign = compare_places(p[at(one[0], one[1], i, count)], p[at(other[0], other[1], i, count)]);
+        if (sign) return sign < 0;
+    }
+    return false;
+}
+
+static void find_order(polygon_work *w, const double (*p)[3])
+{
+    int best[2] = {0, 1};
+    for (int i = 0; i < w->count; i++) {
+        if (compare_places(p[i], p[best[0]]) > 0) continue;
+        for (int step = 1; step >= -1; step -= 2)
+            if (is_less(p, w->count, (const int[2]){i, step}, best)) best[0] = i, best[1] = step;
+    }
+    for (int i = 0; i < w->count; i++) w->order[i] = at(best[0], best[1], i, w->count);
+    w->step = best[1];
+}
+
+/* Scales by a power of two, which rounds nothing. False where all corners are in one place. */
+static bool find_places(polygon_work *w, const double (*p)[3])
+{
+    double widest = 0;
+    int exponent;
+    for (int i = 0; i < w->count; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            w->places[i][axis] = p[w->order[i]][axis] - p[w->order[0]][axis];
+            widest = fmax(widest, fabs(w->places[i][axis]));
+        }
+    if (!(widest > 0)) return false;
+    frexp(widest, &exponent);
+    for (int i = 0; i < w->count; i++)
+        for (int axis = 0; axis < 3; axis++) w->places[i][axis] = ldexp(w->places[i][axis], -exponent);
+    return true;
+}
+
+/* ---- fans ----------------------------------------------------------------------------------------------------- */
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The normal's length is twice the area. */
+static bool is_fan(const polygon_work *w, double normal[3])
+{
+    double area[3];
+    normal[0] = normal[1] = normal[2] = 0;
+    for (int i = 1; i + 1 < w->count; i++) {
+        cross(w->places[i], w->places[i + 1], area);
+        for (int axis = 0; axis < 3; axis++) normal[axis] += area[axis];
+    }
+    const double least = -fan_slack * dot(normal, normal);
+    for (int i = 1; i + 1 < w->count; i++) {
+        cross(w->places[i], w->places[i + 1], area);
+        if (dot(area, normal) < least) return false;
+    }
+    return true;
+}
+
+/* Of four corners: exactly one points inwards. */
+static bool is_concave_quad(const polygon_work *w)
+{
+    double areas[4][3], normal[3] = {0, 0, 0}, sides[4][3];
+    int inward = 0;
+    for (int i = 0; i < 4; i++)
+        for (int axis = 0; axis < 3; axis++) sides[i][axis] = w->places[(i + 1) & 3][axis] - w->places[i][axis];
+    for (int i = 0; i < 4; i++) {
+        cross(sides[(i + 3) & 3], sides[i], areas[i]);
+        for (int axis = 0; axis < 3; axis++) normal[axis] += areas[i][axis] / 2;
+    }
+    for (int i = 0; i < 4; i++) inward += dot(areas[i], normal) < -fan_slack * dot(normal, normal);
+    return inward == 1;
+}
+
+static void add_triangle(polygon_work *w, int a, int b, int c)
+{
+    int *t = w->triangles[w->triangle_count++];
+    t[0] = w->order[a];
+    t[1] = w->order[w->step > 0 ? b : c];
+    t[2] = w->order[w->step > 0 ? c : b];
+}
+
+static void add_fan(polygon_work *w, int first)
+{
+    for (int i = w->next[first]; w->next[i] != first; i = w->next[i]) add_triangle(w, first, i, w->next[i]);
+}
+
+/* ---- ears ----------------------------------------------------------------------------------------------------- */
+
+static void flatten(polygon_work *w, const double normal[3])
+{
+    const double size = sqrt(dot(normal, normal));
+    double up[3], right[3], across[3] = {0, 0, 0};
+    int largest = 0;
+    for (int axis = 1; axis < 3; axis++)
+        if (fabs(normal[axis]) > fabs(normal[largest])) largest = axis;
+    across[(largest + 1) % 3] = 1;
+    cross(across, normal, right);
+    const double length = sqrt(dot(right, right));
+    for (int axis = 0; axis < 3; axis++) right[axis] /= length;
+    cross(normal, right, up);
+    for (int i = 0; i < w->count; i++) {
+        w->flat[i][0] = dot(w->places[i], right);
+        w->flat[i][1] = dot(w->places[i], up) / size;
+    }
+}
+
+/* Twice the area of a triangle, positive where it runs counterclockwise. */
+static double area_of(const polygon_work *w, int a, int b, int c)
+{
+    const double *p = w->flat[a], *q = w->flat[b], *r = w->flat[c];
+    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+}
+
+static bool are_together(const polygon_work *w, int a, int b)
+{
+    return memcmp(w->places[a], w->places[b], sizeof w->places[a]) == 0;
+}
+
+/* Tells whether the polygon, where it passes the tip's place once more, comes from or goes into the tip's corner. */
+static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
+{
+    const int ends[2] = {w->before[again], w->next[again]};
+    for (int i = 0; i < 2; i++)
+        if (area_of(w, a, tip, ends[i]) > line_slack && area_of(w, tip, c, ends[i]) > line_slack) return true;
+    return false;
+}
+
+static bool is_blocked(const polygon_work *w, int a, int tip, int c, int by)
+{
+    if (are_together(w, by, a) || are_together(w, by, c)) return false;
+    if (are_together(w, by, tip)) return enters_corner(w, a, tip, c, by);
+    return area_of(w, a, tip, by) >= -line_slack && area_of(w, tip, c, by) >= -line_slack &&
+           area_of(w, c, a, by) >= -line_slack;
+}
+
+static bool is_ear(const polygon_work *w, int tip)
+{
+    const int a = w->before[tip], c = w->next[tip];
+    if (!(area_of(w, a, tip, c) > line_slack)) return false;
+    for (int by = w->next[c]; by != a; by = w->next[by])
+        if (is_blocked(w, a, tip, c, by)) return false;
+    return true;
+}
+
+/* The first ear behind the first corner, which comes last; -1: there is none. */
+static int find_ear(const polygon_work *w, int first)
+{
+    int i = first;
+    do {
+        i = w->next[i];
+        if (w->is_ear[i]) return i;
+    } while (i != first);
+    return -1;
+}
+
+/* Finds all ears anew: a corner may be one now because what blocked it is cut off. */
+static int find_ear_anew(polygon_work *w, int first)
+{
+    int i = first;
+    do w->is_ear[i] = (char)is_ear(w, i);
+    while ((i = w->next[i]) != first);
+    return find_ear(w, first);
+}
+
+/* A corner in a line with its neighbours. */
+static int find_straight(const polygon_work *w, int first)
+{
+    int i = first;
+    do {
+        i = w->next[i];
+        if (fabs(area_of(w, w->before[i], i, w->next[i])) <= line_slack) return i;
+    } while (i != first);
+    return -1;
+}
+
+static void cut_ears(polygon_work *w)
+{
+    int first = 0, left = w->count;
+    find_ear_anew(w, first);
+    for (; left > 3; left--) {
+        int ear = find_ear(w, first);
+        if (ear < 0) ear = find_ear_anew(w, first);
+        if (ear < 0) ear = find_straight(w, first);
+        if (ear < 0) break;
+        const int a = w->before[ear], c = w->next[ear];
+        add_triangle(w, a, ear, c);
+        w->next[a] = c;
+        w->before[c] = a;
+        if (ear == first) first = c;
+        w->is_ear[a] = (char)is_ear(w, a);
+        w->is_ear[c] = (char)is_ear(w, c);
+    }
+    add_fan(w, first);
+}
+
+void polygon_cut(const double (*corners)[3], int count, void *room, int (*triangles)[3])
+{
+    polygon_work w = lay_out(count, room, triangles);
+    double normal[3];
+    find_order(&w, corners);
+    for (int i = 0; i < count; i++) {
+        w.next[i] = (i + 1) % count;
+        w.before[i] = (i + count - 1) % count;
+    }
+    const bool may_be_concave = count > 3 && find_places(&w, corners) && (count > 4 || is_concave_quad(&w));
+    if (!may_be_concave || is_fan(&w, normal)) {
+        add_fan(&w, 0);
+        return;
+    }
+    flatten(&w, normal);
+    cut_ears(&w);
+}
+
+bool polygon_is_concave_quad(const double (*corners)[3])
+{
+    double room[4 * 8];
+    polygon_work w = lay_out(4, (char *)room, NULL);
+    find_order(&w, corners);
+    return find_places(&w, corners) && is_concave_quad(&w);
+}
