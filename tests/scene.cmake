@@ -9,6 +9,11 @@ target_link_libraries(test_scene_colour PRIVATE insitu_flags insitu_internal Pkg
 add_test(NAME scene_colour COMMAND test_scene_colour)
 set_tests_properties(scene_colour PROPERTIES TIMEOUT 60)
 
+add_executable(test_scene_shorthand test_scene_shorthand.c)
+target_link_libraries(test_scene_shorthand PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME scene_shorthand COMMAND test_scene_shorthand)
+set_tests_properties(scene_shorthand PROPERTIES TIMEOUT 60)
+
 add_executable(test_scene_series test_scene_series.c)
 target_link_libraries(test_scene_series PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA m)
 add_test(NAME scene_series COMMAND test_scene_series)

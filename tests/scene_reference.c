@@ -31,7 +31,21 @@ static const char introduction[] =
     "\n"
     "More stand in [examples](../examples). Colours are sRGB, from 0 to 1. Lengths are those of the mesh's "
     "coordinates.\n"
-    "This page is printed from the schema that the library reads scene files by.\n";
+    "This page is printed from the schema that the library reads scene files by.\n"
+    "\n"
+    "## Short forms\n"
+    "\n"
+    "| may be written | instead of |\n"
+    "|---|---|\n"
+    "| `colour: orange`, `colour: \"#ffa500\"` (in quotes, because `#` begins a comment) | a list of three numbers; "
+    "so too `background`, `below`, `above`, `nan` and the entries of `colours`. Names are those of CSS. |\n"
+    "| `normal: z`, `direction: -x` | a list of three numbers; so too `up` and `axis` |\n"
+    "| `colour_bar: true`, `colour_bar: false` | `colour_bar: {}`, or no such key; so too `scale_bar`, `edges`, "
+    "`ambient_occlusion` and `automatic` |\n"
+    "| `camera: automatic` | `camera: {automatic: {}}` |\n"
+    "| `values: 0.5` | `values: [0.5]` |\n"
+    "| one mapping at `planes`, `lights`, `outputs`, `text` | a list of it |\n"
+    "| `color`, `center` in a key | `colour`, `centre` |\n";
 
 static const scene_mapping *shown[32];
 static int shown_count;

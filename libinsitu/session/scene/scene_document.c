@@ -12,8 +12,9 @@
 #include <string.h>
 
 #include "memory.h"
+#include "scene_shorthand.h"
 
-enum { path_size = 256, quote_size = 48 };
+enum { path_size = 256, quote_size = 48, question_size = 96, most_words = 64 };
 
 /* Memory of the structs; what is behind it is aligned for anything. */
 struct scene_block {
@@ -115,6 +116,10 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, size);
     if (!yaml_parser_load(&parser, &d->yaml)) status = bad_syntax(d, &parser, text, size);
     yaml_parser_delete(&parser);
+    if (status == INSITU_OK && !scene_expand_shorthand(&d->yaml)) {
+        scene_document_close(d);
+        status = scene_no_memory(d);
+    }
     return status;
 }
 
@@ -268,13 +273,36 @@ insitu_status scene_bad(const scene_document *d, const char *parent, const char 
 
 /* ---- tree against schema ---- */
 
+/* Words a question for what was probably meant; nothing if no candidate is near. */
+static void ask_for_meant(const yaml_node_t *word, const char *const *candidates, int count,
+                          char question[question_size])
+{
+    const char *meant = word->type == YAML_SCALAR_NODE ? scene_nearest_word(text_of(word), candidates, count) : NULL;
+    question[0] = '\0';
+    if (meant) snprintf(question, question_size, " (did you mean %.64s?)", meant);
+}
+
+/* Lists the words that a value may be, of all its forms. Returns how many there are, at most `most`. */
+static int list_choices(const cyaml_schema_value_t *value, const scene_key *key, const char **words, int most)
+{
+    int count = 0;
+    if (value->type == CYAML_ENUM)
+        for (uint32_t i = 0; i < value->enumeration.count && count < most; i++)
+            words[count++] = value->enumeration.strings[i].str;
+    for (int i = 0; value->type == CYAML_IGNORE && i < key->form_count; i++)
+        count += list_choices(&key->forms[i].value, &key->forms[i].key, words + count, most - count);
+    return count;
+}
+
 static insitu_status bad_value(const scene_document *d, const char *path, const yaml_node_t *node,
                                const cyaml_schema_value_t *value, const scene_key *key)
 {
-    char quoted[quote_size], expected[SCENE_WORDS_SIZE];
+    const char *words[most_words];
+    char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
     quote(node, quoted);
     scene_value_words(value, key, expected);
-    return scene_bad(d, path, "", "%s is not allowed, expected %s", quoted, expected);
+    ask_for_meant(node, words, list_choices(value, key, words, most_words), question);
+    return scene_bad(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
 /* Reads a decimal number; 010 is refused, as it could mean 10 or 8. */
@@ -425,11 +453,15 @@ static insitu_status bad_key(scene_document *d, const char *path, const yaml_nod
 {
     const scene_key holder = {.child = mapping};
     const cyaml_schema_value_t value = {.type = CYAML_MAPPING};
-    char quoted[quote_size], expected[SCENE_WORDS_SIZE];
+    const char *words[most_words];
+    char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
+    int count = 0;
     quote(name, quoted);
     scene_value_words(&value, &holder, expected);
-    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s, expected %s", d->file_name,
-                     line_of(name), path, *path ? ": " : "", quoted, fault, expected);
+    for (const cyaml_schema_field_t *f = mapping->fields; f->key && count < most_words; f++) words[count++] = f->key;
+    ask_for_meant(name, words, count, question);
+    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s%s, expected %s", d->file_name,
+                     line_of(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
 
 /* Says why a key of earlier scenes is no longer there. NULL: there never was such a key. */
@@ -546,6 +578,13 @@ static void append_mapping(char words[SCENE_WORDS_SIZE], const scene_mapping *ma
     }
 }
 
+/* Lists of 3 or 4 numbers from 0 to 1 are colours, for which scene_shorthand.c takes names too. */
+static bool is_colour(const cyaml_schema_value_t *list, const scene_key *key)
+{
+    const cyaml_type_e type = list->sequence.entry->type;
+    return list->sequence.min == 3 && type == CYAML_FLOAT && key && key->low == 0 && key->high == 1;
+}
+
 static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *list, const scene_key *key)
 {
     const cyaml_schema_value_t *entry = list->sequence.entry;
@@ -558,6 +597,7 @@ static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t
     default: append(words, " numbers"); break;
     }
     append_range(words, key);
+    if (is_colour(list, key)) append(words, ", or the name of a colour, or \"#rrggbb\" in quotes");
 }
 
 static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)

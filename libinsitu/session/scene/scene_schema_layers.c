@@ -237,12 +237,12 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
     X(CHOICE("interpolate", scene_file_slice, interpolate, interpolation_words), .help = INTERPOLATE_HELP,             \
       .by_default = "`cell`")                                                                                          \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
-    X(CYAML_FIELD_SEQUENCE("planes", CYAML_FLAG_POINTER, scene_file_slice, planes, &plane, 1, 16),                     \
+    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_slice, planes, &plane, 1, 16),                                \
       .help = "The planes. At most 16 isovalues and planes in an image together. 4 bytes a vertex are held for each "  \
               "plane. A plane that lies in faces of cells is drawn once, by the cells that its normal points away "    \
               "from; so that one on the border of the data is seen too, it is taken into them where it lies within a " \
               "millionth of half the diagonal of their bounds from it.",                                               \
-      .child = &plane_mapping)                                                                                         \
+      .by_default = "one at right angles to z, through the middle of the data", .child = &plane_mapping)                                                                                         \
     COLOUR_MAP_KEYS(X, scene_file_slice)                                                                               \
     X(NUMBERS("nan", scene_file_slice, colours.nan, 3), .help = "Colour where the field is not a number, sRGB.",       \
       .by_default = "grey, `[0.6, 0.6, 0.6]`", .low = 0, .high = 1)                                                    \

@@ -1,0 +1,321 @@
+/* A short form is recognised by its key and its kind of value, wherever the key stands: no key of the schema means two
+ * things for which one short form could stand. Nodes are named by their numbers, because adding one may move all. */
+#include "scene_shorthand.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scene_colour_names.h"
+
+/* A document under change. */
+typedef struct rewrite {
+    yaml_document_t *document;
+    yaml_mark_t mark; /* the place of the value that is replaced */
+    bool has_memory;
+} rewrite;
+
+static yaml_node_t *node_of(const rewrite *r, int number)
+{
+    return yaml_document_get_node(r->document, number);
+}
+
+static const char *text_of(const rewrite *r, int number)
+{
+    const yaml_node_t *node = node_of(r, number);
+    return node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : NULL;
+}
+
+/* ---- new nodes: each function returns the node's number, 0 if memory ran out ------------------------------------ */
+
+static int made(rewrite *r, int number)
+{
+    if (number)
+        node_of(r, number)->start_mark = r->mark;
+    else
+        r->has_memory = false;
+    return number;
+}
+
+static int make_text(rewrite *r, const char *text)
+{
+    return made(r, yaml_document_add_scalar(r->document, NULL, (const yaml_char_t *)text, (int)strlen(text),
+                                            YAML_PLAIN_SCALAR_STYLE));
+}
+
+static int make_list(rewrite *r)
+{
+    return made(r, yaml_document_add_sequence(r->document, NULL, YAML_FLOW_SEQUENCE_STYLE));
+}
+
+static int make_mapping(rewrite *r)
+{
+    return made(r, yaml_document_add_mapping(r->document, NULL, YAML_FLOW_MAPPING_STYLE));
+}
+
+static void append(rewrite *r, int list, int item)
+{
+    if (!list || !item || !yaml_document_append_sequence_item(r->document, list, item)) r->has_memory = false;
+}
+
+static void append_pair(rewrite *r, int mapping, const char *key, int value)
+{
+    const int name = make_text(r, key);
+    if (!mapping || !name || !value || !yaml_document_append_mapping_pair(r->document, mapping, name, value))
+        r->has_memory = false;
+}
+
+static int make_vector(rewrite *r, const double v[3])
+{
+    const int list = make_list(r);
+    for (int i = 0; i < 3; i++) {
+        char text[32];
+        snprintf(text, sizeof text, "%.17g", v[i]);
+        append(r, list, make_text(r, text));
+    }
+    return list;
+}
+
+static int make_list_of(rewrite *r, int item)
+{
+    const int list = make_list(r);
+    append(r, list, item);
+    return list;
+}
+
+/* ---- colours and axes ------------------------------------------------------------------------------------------- */
+
+static int by_name(const void *name, const void *entry)
+{
+    return strcmp(name, ((const scene_colour_name *)entry)->name);
+}
+
+/* Reads "#rrggbb" or the name of a colour. */
+static bool read_colour(const char *text, double colour[3])
+{
+    unsigned long rgb;
+    if (text[0] == '#') {
+        if (strlen(text) != 7 || strspn(text + 1, "0123456789abcdefABCDEF") != 6) return false;
+        rgb = strtoul(text + 1, NULL, 16);
+    } else {
+        const scene_colour_name *named =
+            bsearch(text, scene_colour_names, sizeof scene_colour_names / sizeof *scene_colour_names,
+                    sizeof *scene_colour_names, by_name);
+        if (!named) return false;
+        rgb = named->rgb;
+    }
+    for (int i = 0; i < 3; i++) colour[i] = (double)(rgb >> (16 - 8 * i) & 0xff) / 255;
+    return true;
+}
+
+/* Reads "x", "+y" or "-z". */
+static bool read_axis(const char *text, double axis[3])
+{
+    const double sign = *text == '-' ? -1 : 1;
+    text += *text == '-' || *text == '+';
+    if (text[0] < 'x' || text[0] > 'z' || text[1]) return false;
+    for (int i = 0; i < 3; i++) axis[i] = i == text[0] - 'x' ? sign : 0;
+    return true;
+}
+
+static void expand_colour(rewrite *r, int *value)
+{
+    double colour[3];
+    const char *text = text_of(r, *value);
+    if (text && read_colour(text, colour)) *value = make_vector(r, colour);
+}
+
+/* Expands a list of colours, or one colour alone. */
+static void expand_colours(rewrite *r, int *value)
+{
+    double colour[3];
+    const char *text = text_of(r, *value);
+    if (text && read_colour(text, colour)) *value = make_list_of(r, make_vector(r, colour));
+    if (text || node_of(r, *value)->type != YAML_SEQUENCE_NODE) return;
+    yaml_node_item_t *items = node_of(r, *value)->data.sequence.items.start;
+    const yaml_node_item_t *end = node_of(r, *value)->data.sequence.items.top;
+    for (; items < end && r->has_memory; items++) expand_colour(r, items);
+}
+
+static void expand_axis(rewrite *r, int *value)
+{
+    double axis[3];
+    const char *text = text_of(r, *value);
+    if (text && read_axis(text, axis)) *value = make_vector(r, axis);
+}
+
+/* ---- other forms ------------------------------------------------------------------------------------------------ */
+
+/* true: all defaults; false: the pair goes, for which *value becomes 0. */
+static void expand_switch(rewrite *r, int *value)
+{
+    const char *text = text_of(r, *value);
+    if (!text) return;
+    if (strcmp(text, "true") == 0) *value = make_mapping(r);
+    if (strcmp(text, "false") == 0) *value = 0;
+}
+
+/* automatic: {automatic: {}}. */
+static void expand_camera(rewrite *r, int *value)
+{
+    const char *text = text_of(r, *value);
+    if (!text || strcmp(text, "automatic") != 0) return;
+    *value = make_mapping(r);
+    append_pair(r, *value, "automatic", make_mapping(r));
+}
+
+/* One number: a list of it. */
+static void expand_values(rewrite *r, int *value)
+{
+    const char *text = text_of(r, *value);
+    if (text && *text && !text[strspn(text, "+-.0123456789eE")]) *value = make_list_of(r, *value);
+}
+
+/* One mapping: a list of it. */
+static void expand_mappings(rewrite *r, int *value)
+{
+    if (node_of(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
+}
+
+/* Adds a plane at right angles to z to a slice that names none. */
+static void expand_slice(rewrite *r, int *value)
+{
+    static const double z[3] = {0, 0, 1};
+    const yaml_node_t *slice = node_of(r, *value);
+    if (slice->type != YAML_MAPPING_NODE) return;
+    for (const yaml_node_pair_t *p = slice->data.mapping.pairs.start; p < slice->data.mapping.pairs.top; p++) {
+        const char *key = text_of(r, p->key);
+        if (key && strcmp(key, "planes") == 0) return;
+    }
+    const int plane = make_mapping(r);
+    append_pair(r, plane, "normal", make_vector(r, z));
+    append_pair(r, *value, "planes", make_list_of(r, plane));
+}
+
+/* ---- all of a document ------------------------------------------------------------------------------------------ */
+
+static const struct {
+    const char *key;
+    void (*expand)(rewrite *r, int *value);
+} rules[] = {
+    {"colour", expand_colour},
+    {"background", expand_colour},
+    {"below", expand_colour},
+    {"above", expand_colour},
+    {"nan", expand_colour},
+    {"colours", expand_colours},
+    {"normal", expand_axis},
+    {"direction", expand_axis},
+    {"up", expand_axis},
+    {"axis", expand_axis},
+    {"colour_bar", expand_switch},
+    {"scale_bar", expand_switch},
+    {"ambient_occlusion", expand_switch},
+    {"edges", expand_switch},
+    {"automatic", expand_switch},
+    {"camera", expand_camera},
+    {"values", expand_values},
+    {"planes", expand_mappings},
+    {"lights", expand_mappings},
+    {"outputs", expand_mappings},
+    {"text", expand_mappings},
+    {"slice", expand_slice},
+};
+
+/* Replaces the first `from` in the text by the longer or equally long `to`. */
+static void respell(char *text, size_t size, const char *from, const char *to)
+{
+    char *at = strstr(text, from);
+    if (!at || strlen(text) + strlen(to) >= size) return;
+    memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
+    memcpy(at, to, strlen(to));
+}
+
+/* American spellings: color is colour, and center is centre. */
+static void expand_key(rewrite *r, int *key)
+{
+    char text[64];
+    const char *written = text_of(r, *key);
+    if (!written || strlen(written) >= sizeof text - 2) return;
+    snprintf(text, sizeof text, "%s", written);
+    respell(text, sizeof text, "color", "colour");
+    respell(text, sizeof text, "center", "centre");
+    r->mark = node_of(r, *key)->start_mark;
+    if (strcmp(text, written) != 0) *key = make_text(r, text);
+}
+
+static void expand_pair(rewrite *r, yaml_node_pair_t *pair)
+{
+    expand_key(r, &pair->key);
+    const char *key = r->has_memory ? text_of(r, pair->key) : NULL;
+    for (size_t i = 0; key && i < sizeof rules / sizeof *rules; i++) {
+        if (strcmp(key, rules[i].key) != 0) continue;
+        r->mark = node_of(r, pair->value)->start_mark;
+        rules[i].expand(r, &pair->value);
+        return;
+    }
+}
+
+static void expand_mapping(rewrite *r, int number)
+{
+    yaml_node_pair_t *kept = node_of(r, number)->data.mapping.pairs.start;
+    yaml_node_pair_t *pair = kept, *end = node_of(r, number)->data.mapping.pairs.top;
+    for (; pair < end && r->has_memory; pair++) {
+        expand_pair(r, pair);
+        if (pair->value) *kept++ = *pair;
+    }
+    if (r->has_memory) node_of(r, number)->data.mapping.pairs.top = kept;
+}
+
+bool scene_expand_shorthand(yaml_document_t *document)
+{
+    rewrite r = {.document = document, .has_memory = true};
+    const int count = (int)(document->nodes.top - document->nodes.start);
+    for (int number = 1; number <= count && r.has_memory; number++)
+        if (node_of(&r, number)->type == YAML_MAPPING_NODE) expand_mapping(&r, number);
+    return r.has_memory;
+}
+
+/* ---- words that are nearly right -------------------------------------------------------------------------------- */
+
+enum { LONGEST_WORD = 63 };
+
+static int least(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+/* Counts the edits between two words (optimal string alignment). */
+static int count_edits(const char *a, const char *b)
+{
+    int rows[3][LONGEST_WORD + 1];
+    const int m = (int)strlen(a), n = (int)strlen(b);
+    for (int j = 0; j <= n; j++) rows[0][j] = j;
+    for (int i = 1; i <= m; i++) {
+        int *row = rows[i % 3];
+        const int *above = rows[(i + 2) % 3], *second = rows[(i + 1) % 3];
+        row[0] = i;
+        for (int j = 1; j <= n; j++) {
+            row[j] = least(least(above[j], row[j - 1]) + 1, above[j - 1] + (a[i - 1] != b[j - 1]));
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                row[j] = least(row[j], second[j - 2] + 1);
+        }
+    }
+    return rows[m % 3][n];
+}
+
+const char *scene_nearest_word(const char *word, const char *const *candidates, int count)
+{
+    const int length = (int)strlen(word);
+    const char *nearest = NULL;
+    int fewest = length / 3 + 1;
+    if (length < 2 || length > LONGEST_WORD) return NULL;
+    for (int i = 0; i < count; i++) {
+        if (strlen(candidates[i]) > LONGEST_WORD) continue;
+        const int edits = count_edits(word, candidates[i]);
+        if (edits >= fewest) continue;
+        fewest = edits;
+        nearest = candidates[i];
+    }
+    return nearest;
+}
