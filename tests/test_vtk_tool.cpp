@@ -4,10 +4,12 @@
  *     test_vtk_tool <insitu-render> <mpiexec> */
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkDoubleArray.h>
+#include <vtkFieldData.h>
 #include <vtkFloatArray.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
@@ -210,6 +212,10 @@ void wrong_files_are_named_with_the_reason(void **)
     expect(run_tool("scene.yaml notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
     expect(run_tool("scene.yaml ."), 1, "is a directory");
     expect(run_tool("--info cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
+    expect(run_tool("missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect(run_tool("missing.vtu row.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect(run_tool("notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
+    expect(run_tool("."), 1, "insitu-render: .: is a directory");
     expect(run_tool("--info missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
 }
 
@@ -235,7 +241,8 @@ void wrong_options_are_named(void **)
     expect(run_tool("--size 3 row.vtu"), 1, "--size 3: expected WIDTHxHEIGHT");
     expect(run_tool("--size 0x9 row.vtu"), 1, "--size 0x9: expected WIDTHxHEIGHT");
     expect(run_tool("--camera 0,0,0 row.vtu"), 1, "--camera 0,0,0: expected X,Y,Z");
-    expect(run_tool("--field none row.vtu"), 1, "no mesh has the field \"none\"");
+    expect(run_tool("--field none row.vtu"), 1,
+           "insitu-render: --field none: no mesh has the field \"none\"; there are");
     expect(run_tool("--size 64x48 --camera 1,2,3 row.vtu"), 0, "1 step, 1 picture");
 }
 
@@ -313,6 +320,30 @@ void a_field_that_begins_later_leaves_out_the_first_steps(void **)
     expect(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1, "insitu-render: scene.yaml:6: no mesh has the field");
 }
 
+/* Without a scene a small step is drawn otherwise where a step of more and larger values follows, by the scale and the
+ * camera of both; on any ranks alike. Steps have one time, which the pictures show. */
+void a_series_has_one_scale_and_one_camera(void **)
+{
+    for (const auto &[name, count] : {std::pair{"grow_0.vtu", 2}, {"grow_1.vtu", 9}, {"grow_2.vtu", 2}}) {
+        auto row = row_of_tets(count);
+        vtkNew<vtkDoubleArray> time;
+        time->SetName("TimeValue");
+        time->InsertNextValue(1);
+        row->GetFieldData()->AddArray(time);
+        write_vtu(name, row);
+    }
+    const auto first_picture = [](const std::string &others, int ranks) {
+        std::filesystem::remove(path_of("grow_0_0000.png"));
+        expect(run_ranks(ranks, "--size 96x64 grow_0.vtu " + others), 0, " pictures");
+        const std::string picture = read_file(path_of("grow_0_0000.png"));
+        assert_false(picture.empty());
+        return picture;
+    };
+    const std::string same = first_picture("grow_2.vtu", 1), grown = first_picture("grow_1.vtu", 1);
+    assert_true(same != grown);
+    assert_true(grown == first_picture("grow_1.vtu grow_2.vtu", 2));
+}
+
 /* One piece has doubles, one no field, one a field that is not declared: the same picture and warnings on any ranks. */
 void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
 {
@@ -383,6 +414,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
         cmocka_unit_test(chosen_steps_keep_their_cycles),
         cmocka_unit_test(a_field_that_begins_later_leaves_out_the_first_steps),
+        cmocka_unit_test(a_series_has_one_scale_and_one_camera),
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(every_way_of_reading_gives_all_cells),
     };

@@ -218,4 +218,28 @@ void print_info(const std::string &title, vtkDataObject *data, const std::vector
     print_times(times);
 }
 
+data_extent::data_extent()
+{
+    std::fill(low, low + 4, std::numeric_limits<double>::infinity());
+    std::fill(high, high + 4, -std::numeric_limits<double>::infinity());
+}
+
+void add_extent(vtkDataObject *data, const std::string &field, data_extent &extent)
+{
+    const data_summary all = summarize(data);
+    for (int axis = 0; all.bounds.IsValid() && axis < 3; axis++) {
+        extent.low[axis] = std::min(extent.low[axis], all.bounds.GetMinPoint()[axis]);
+        extent.high[axis] = std::max(extent.high[axis], all.bounds.GetMaxPoint()[axis]);
+    }
+    for (const auto &fields : all.fields) {
+        const auto found = fields.find(field);
+        if (found == fields.end()) continue;
+        const field_info &info = found->second;
+        const auto &range = info.components > 1 ? info.ranges.back() : info.ranges[0];
+        extent.low[3] = std::min(extent.low[3], range.first);
+        extent.high[3] = std::max(extent.high[3], range.second);
+        return;
+    }
+}
+
 } // namespace render_tool

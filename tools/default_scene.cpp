@@ -1,14 +1,11 @@
 #include "default_scene.h"
 
-#include <cerrno>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <sstream>
-#include <stdexcept>
-
-#include <unistd.h>
 
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
@@ -76,7 +73,60 @@ std::string first_field_of(vtkDataObject *data)
     return at_points.empty() ? in_cells : at_points;
 }
 
-std::string chosen_field(const options &o)
+double dot(const std::array<double, 3> &a, const std::array<double, 3> &b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+std::array<double, 3> cross(const std::array<double, 3> &a, const std::array<double, 3> &b)
+{
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+std::array<double, 3> unit(const std::array<double, 3> &a)
+{
+    const double length = std::hypot(a[0], a[1], a[2]);
+    return {a[0] / length, a[1] / length, a[2] / length};
+}
+
+/* The camera from which the box of the extent fills about 0.8 of the picture: a title, numbers beside the colour bar
+ * and the text at the bottom have the rest. */
+std::string fixed_camera(const options &o, const data_extent &e)
+{
+    constexpr double angle = 40, filled = 0.8, pi = 3.14159265358979323846; // the scene's default angle, in degrees
+    std::array<double, 3> towards{};
+    if (std::sscanf(o.direction.c_str(), "%lf, %lf, %lf", &towards[0], &towards[1], &towards[2]) != 3) return "";
+    towards = unit(towards);
+    std::array<double, 3> up = {0, 1, 0};
+    if (std::hypot(towards[0], towards[2]) < 1e-6) up = {0, 0, 1};
+    const auto right = unit(cross(up, towards)), above = cross(towards, right);
+    const double high = filled * std::tan(angle * pi / 360), wide = high * o.width / o.height;
+    std::array<double, 3> middle{}, half{};
+    double distance = 0;
+    for (size_t i = 0; i < 3; i++) {
+        middle[i] = (e.low[i] + e.high[i]) / 2;
+        half[i] = (e.high[i] - e.low[i]) / 2;
+    }
+    for (int corner = 0; corner < 8; corner++) {
+        std::array<double, 3> at{};
+        for (size_t i = 0; i < 3; i++) at[i] = (corner >> i) & 1 ? half[i] : -half[i];
+        const double needed = std::max(std::fabs(dot(at, right)) / wide, std::fabs(dot(at, above)) / high);
+        distance = std::max(distance, dot(at, towards) + needed);
+    }
+    std::ostringstream text;
+    text.precision(17);
+    for (const char *key : {"position", "focal"}) {
+        const double out = key[0] == 'p' ? distance : 0;
+        text << (out > 0 ? "{" : ", ") << key << ": [" << middle[0] + out * towards[0] << ", "
+             << middle[1] + out * towards[1] << ", " << middle[2] + out * towards[2] << "]";
+    }
+    text << ", up: [" << up[0] << ", " << up[1] << ", " << up[2] << "]}";
+    return distance > 0 ? text.str() : "";
+}
+
+} // namespace
+
+std::string default_field(const options &o)
 {
     if (!o.field.empty()) return o.field;
     const auto file = open_data_file(o.files.front());
@@ -85,38 +135,22 @@ std::string chosen_field(const options &o)
     return first_field_of(grids_of(file->read(steps ? step : 0, 0, 1), o.files.front()));
 }
 
-} // namespace
-
-std::string default_scene(const options &o)
+std::string default_scene(const options &o, const std::string &field, const data_extent *extent)
 {
     const std::string name = std::filesystem::path(o.files.front()).stem().string().substr(0, 60);
-    const std::string field = chosen_field(o);
-    const std::string colour = field.empty() ? "" : "colour_by: {field: " + quoted(field) + "}";
+    std::string camera = extent && extent->has_bounds() ? fixed_camera(o, *extent) : "";
+    if (camera.empty()) camera = "{automatic: {fit: box, direction: [" + o.direction + "]}}";
     std::ostringstream scene;
+    scene.precision(17);
     scene << "images:\n  - name: " << quoted(name) << "\n    size: [" << o.width << ", " << o.height << "]\n"
-          << "    camera: {automatic: {fit: box, direction: [" << o.direction << "]}}\n"
-          << "    layers: [{surface: {" << colour << "}}]\n    decorations: {title: " << quoted(name)
+          << "    camera: " << camera << "\n    layers: [{surface: {";
+    if (!field.empty()) scene << "colour_by: {field: " << quoted(field);
+    if (!field.empty() && extent && extent->has_range())
+        scene << ", range: [" << extent->low[3] << ", " << extent->high[3] << "]";
+    scene << (field.empty() ? "" : "}") << "}}]\n    decorations: {title: " << quoted(name)
           << ", text: [{text: \"t = {time}\"}], outline: true, axes: true" << (field.empty() ? "" : ", colour_bar: {}")
           << "}\n    outputs: [{path: \"{name}_{cycle:04}.png\"}]\n";
     return scene.str();
-}
-
-temporary_file::temporary_file(const std::string &text)
-{
-    const char *folder = std::getenv("TMPDIR");
-    std::string pattern = std::string(folder && *folder ? folder : "/tmp") + "/insitu-render-XXXXXX.yaml";
-    const int file = mkstemps(pattern.data(), 5);
-    if (file < 0) throw std::runtime_error(pattern + ": cannot be made: " + std::strerror(errno));
-    path_ = pattern;
-    const ssize_t written = write(file, text.data(), text.size());
-    if (close(file) == 0 && written == static_cast<ssize_t>(text.size())) return;
-    unlink(path_.c_str());
-    throw std::runtime_error(path_ + ": cannot be written");
-}
-
-temporary_file::~temporary_file()
-{
-    unlink(path_.c_str());
 }
 
 } // namespace render_tool

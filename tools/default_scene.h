@@ -4,30 +4,19 @@
 
 #include <string>
 
+#include "data_info.h"
 #include "render_options.h"
 
 namespace render_tool
 {
 
-/* A scene of the data's outer surface, coloured by the field that the options name, else by the first file's first
- * field, at points before cells. Reads that file where no field is named. Throws std::runtime_error. */
-std::string default_scene(const options &o);
+/* The field that the options name, else the first file's first field, at points before cells; "" if it has none. Reads
+ * that file where no field is named. Throws std::runtime_error. */
+std::string default_field(const options &o);
 
-/* A file with a text, which exists as long as the object. */
-class temporary_file
-{
-  public:
-    /* Throws std::runtime_error. */
-    explicit temporary_file(const std::string &text);
-    ~temporary_file();
-    temporary_file(const temporary_file &) = delete;
-    temporary_file &operator=(const temporary_file &) = delete;
-
-    const std::string &path() const { return path_; }
-
-  private:
-    std::string path_;
-};
+/* A scene of the data's outer surface, coloured by the field unless that is "". With an extent, that of all steps, the
+ * scale of colours and the camera are the same at every step. */
+std::string default_scene(const options &o, const std::string &field, const data_extent *extent);
 
 } // namespace render_tool
 

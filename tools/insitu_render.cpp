@@ -77,10 +77,11 @@ template <typename Body> void all_do(const world &w, Body body)
 class stage
 {
   public:
-    stage(const world &w, const std::string &scene)
+    /* scene is a file's name, or the scene itself, which rank 0 alone needs to have. */
+    stage(const world &w, const std::string &scene, bool is_text)
     {
-        if (insitu_create(w.comm, scene.c_str(), &session_) != INSITU_OK)
-            throw std::runtime_error(insitu_error(nullptr));
+        const auto create = is_text ? insitu_create_from_text : insitu_create;
+        if (create(w.comm, scene.c_str(), &session_) != INSITU_OK) throw std::runtime_error(insitu_error(nullptr));
         (void)insitu_vtk_create(session_, &adaptor_);
     }
     ~stage()
@@ -146,6 +147,7 @@ std::vector<std::string> new_lines(const world &w, const std::string &text, std:
 
 /* The warnings that a run has shown, the number of its images, and of its steps that had all fields. */
 struct run_state {
+    const options &given;
     std::set<std::string> said;
     int images = 0;
     int whole_steps = 0;
@@ -215,6 +217,14 @@ std::string step_line(const world &w, const insitu_report &r, const std::string 
     return line.str();
 }
 
+/* The reason for which a step lacks a field, by the option that names it where there is no scene file. */
+std::string by_option(const options &o, const std::string &missing)
+{
+    const size_t reason = missing.find("no mesh has the field");
+    if (!o.scene.empty() || reason == std::string::npos) return missing;
+    return (o.field.empty() ? "" : "--field " + o.field + ": ") + missing.substr(reason);
+}
+
 void draw_step(const world &w, step_source &source, stage &on, size_t index, run_state &run, progress &bar)
 {
     const std::string name = source.name(index);
@@ -234,8 +244,8 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
     if (missing.empty()) {
         run.whole_steps++;
     } else {
-        run.missing = missing;
-        if (source.count() > 1 && w.is_root()) warnings += name + ": not drawn: " + missing + "\n";
+        run.missing = by_option(run.given, missing);
+        if (source.count() > 1 && w.is_root()) warnings += name + ": not drawn: " + run.missing + "\n";
     }
     if (done.warnings) warnings += done.warnings;
     run.images += done.images;
@@ -249,18 +259,43 @@ std::string working_folder()
     return getcwd(path, sizeof path) ? path : ".";
 }
 
+/* Collective: what all steps of the source span, on every rank. */
+data_extent extent_of(const world &w, step_source &source, const std::string &field)
+{
+    data_extent extent;
+    all_do(w, [&] {
+        for (size_t i = 0; i < source.count(); i++)
+            if (const auto data = source.read(i).data) add_extent(data, field, extent);
+    });
+    MPI_Allreduce(MPI_IN_PLACE, extent.low, 4, MPI_DOUBLE, MPI_MIN, w.comm);
+    MPI_Allreduce(MPI_IN_PLACE, extent.high, 4, MPI_DOUBLE, MPI_MAX, w.comm);
+    return extent;
+}
+
+/* Collective: the text of the default scene. All steps are read ahead, so that one range and one camera serve them. */
+std::string text_of_default(const world &w, const options &o, step_source &source)
+{
+    std::string field;
+    all_do(w, [&] {
+        if (w.is_root()) field = default_field(o);
+    });
+    int length = static_cast<int>(field.size());
+    MPI_Bcast(&length, 1, MPI_INT, 0, w.comm);
+    field.resize(static_cast<size_t>(length));
+    MPI_Bcast(field.data(), length, MPI_CHAR, 0, w.comm);
+    if (source.count() == 1) return default_scene(o, field, nullptr);
+    if (w.is_root()) std::printf("reading %zu steps ahead, for one range of colours and one camera\n", source.count());
+    const data_extent extent = extent_of(w, source, field);
+    return default_scene(o, field, &extent);
+}
+
 void draw(const world &w, const options &o)
 {
     std::unique_ptr<step_source> source;
     all_do(w, [&] { source = std::make_unique<step_source>(o, w.rank, w.ranks); });
-    std::unique_ptr<temporary_file> made;
-    std::string scene = o.scene;
-    all_do(w, [&] {
-        if (scene.empty() && w.is_root()) made = std::make_unique<temporary_file>(default_scene(o));
-    });
-    if (made) scene = made->path(); /* only rank 0 reads it */
-    stage on(w, scene.empty() ? "default scene" : scene);
-    run_state run;
+    const bool is_text = o.scene.empty();
+    stage on(w, is_text ? text_of_default(w, o, *source) : o.scene, is_text);
+    run_state run{o, {}, 0, 0, ""};
     progress bar(w.is_root(), source->count());
     for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);
     on.close();

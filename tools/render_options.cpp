@@ -187,7 +187,10 @@ options parse_options(int argc, char **argv)
     if (!o.info) {
         if (names.empty())
             throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
-        if (is_scene(names.front()) || why_not_data(names.front()) != "") {
+        const std::string why_not = why_not_data(names.front());
+        if (!is_scene(names.front()) && !why_not.empty() && (names.size() == 1 || has_known_ending(names.front())))
+            throw std::runtime_error(why_not);
+        if (!why_not.empty()) {
             o.scene = names.front();
             names.erase(names.begin());
         }

@@ -123,6 +123,11 @@ std::string known_endings()
     return all;
 }
 
+bool has_known_ending(const std::string &path)
+{
+    return kind_of(path) != nullptr;
+}
+
 bool may_hold_steps(const std::string &path)
 {
     const file_kind *kind = kind_of(path);

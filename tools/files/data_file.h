@@ -21,6 +21,9 @@ std::string why_not_data(const std::string &path);
 /* The endings that are read, for help texts: ".vtu .pvtu ...". */
 std::string known_endings();
 
+/* Tells whether a reader has the file's ending. */
+bool has_known_ending(const std::string &path);
+
 /* Tells whether files of this ending hold time steps, or name files that are steps. */
 bool may_hold_steps(const std::string &path);
 
