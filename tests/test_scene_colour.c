@@ -328,7 +328,7 @@ static const char *const bad_keys[][3] = {
     {", scale: symlog, threshold: 0", "threshold: \"0\" is not allowed, expected a number above 0", ""},
     {", scale: log, range: [0, 1]", "range: begins with 0, expected above 0 for scale: log", ""},
     {", scale: log, range: [1e-20, 1e20]", "range: [1e-20, 1e+20] is too wide for scale: log", ""},
-    {", below: blue", "below: \"blue\" is not allowed, expected a list of 3 numbers from 0 to 1", ""},
+    {", below: bleu", "below: \"bleu\" is not allowed, expected a list of 3 numbers from 0 to 1", ""},
     {", above: [1, 1, 2]", "above[2]: \"2\" is not allowed", "from 0 to 1"},
     {", nan: [1, 1]", "nan: a list of 2 is not allowed", "a list of 3 numbers"},
     {", range: [1, 1]", "range: [1, 1] does not rise", ""},
