@@ -70,9 +70,9 @@ double render_unscaled(render_scale scale, double threshold, double scaled);
 
 /* Colour and opacity of a value. A value's place is (s(value) - s(low)) / (s(high) - s(low)), s being the scale.
  * Colours are a table of linear RGB, evenly spaced over the places from 0 to 1, interpolated linearly by place (in
- * volumes with a scale, by value between entries), clamped outside. Opacity is piecewise linear through points of
- * rising value (two of the same value make a step), constant outside. Opacity is per unit_distance: extinction = -ln(1
- * - opacity) / unit_distance. */
+ * volumes with a scale, by value between entries), clamped outside. Opacity is piecewise linear by place through points
+ * of rising value (two of the same value make a step), constant outside; with a scale they are between low and high.
+ * Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
     int colour_count;     /* >= 2 */
@@ -99,8 +99,8 @@ typedef struct render_light {
     float colour[3];     /* linear, intensity included */
 } render_light;
 
-/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, n towards the eye, the
- * sums over the lights with n.l > 0. */
+/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, n towards the eye,
+ * the sums over the lights with n.l > 0. */
 typedef struct render_material {
     float ambient, diffuse, specular, shininess;
 } render_material;
@@ -184,9 +184,9 @@ typedef struct render_surface_layer {
     float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
                          of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
-    bool is_of_faces;     /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that
-                             meets the face in an edge alone, and so is in the cell for no length, hits it too */
-    uint32_t clips;       /* of the job's, a bit each */
+    bool is_of_faces; /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that
+                         meets the face in an edge alone, and so is in the cell for no length, hits it too */
+    uint32_t clips;   /* of the job's, a bit each */
     float contact; /* of rays from hits (render_light.h): what is nearer to the hit than so many sizes of the cell that
                       it is met in hides nothing; 0: all of it does */
 } render_surface_layer;
@@ -296,9 +296,9 @@ typedef struct render_job {
     const unsigned char *pixels;
     bool separate_samples; /* every cell's every sample of every volume becomes a fragment, of no length; every segment
                               one of its length, in parts that compositing may mix */
-    bool reproducible; /* fragments of a volume, of which there is one, are what the fold of this rank's samples or
-                          segments leaves (fragment_fold.h); not with separate_samples */
-    int threads;       /* >= 1; 0: as many as OpenMP would take */
+    bool reproducible;     /* fragments of a volume, of which there is one, are what the fold of this rank's samples or
+                              segments leaves (fragment_fold.h); not with separate_samples */
+    int threads;           /* >= 1; 0: as many as OpenMP would take */
 } render_job;
 
 typedef struct render_statistics {

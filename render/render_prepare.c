@@ -89,6 +89,15 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
                                 .shift = (float)((begin - low) * slope)};
 }
 
+/* Where a point of the opacity is, as kernel_colour_place() has it. */
+static double ramp_place(const kernel_transfer *out, const render_transfer *t, double value)
+{
+    if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
+    const double low = render_scaled(t->scale, t->threshold, t->low);
+    const double high = render_scaled(t->scale, t->threshold, t->high);
+    return high > low ? (render_scaled(t->scale, t->threshold, value) - low) / (high - low) : 0;
+}
+
 static void prepare_transfer(kernel_transfer *out, const render_transfer *t, double step)
 {
     render_transfer_domain(t, &out->low, &out->inverse_width);
@@ -101,8 +110,9 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
     out->ramp_count = t->opacity_count - 1;
     out->base_opacity = t->opacities[0];
     for (int i = 0; i < out->ramp_count; i++) {
-        const double along = (t->opacity_values[i + 1] - t->opacity_values[i]) * out->inverse_width;
-        out->ramp_start[i] = (float)((t->opacity_values[i] - out->low) * out->inverse_width);
+        const double start = ramp_place(out, t, t->opacity_values[i]);
+        const double along = ramp_place(out, t, t->opacity_values[i + 1]) - start;
+        out->ramp_start[i] = (float)start;
         out->ramp_inverse[i] = along > 1e-38 ? (float)(1 / along) : 3e38f;
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
     }

@@ -14,19 +14,6 @@ void *reference_reserve(void *block, size_t bytes)
     return p;
 }
 
-double reference_opacity(const render_transfer *t, double value)
-{
-    const int last = t->opacity_count - 1;
-    if (value < t->opacity_values[0]) return (double)t->opacities[0];
-    for (int i = 0; i < last; i++) {
-        const double low = t->opacity_values[i], high = t->opacity_values[i + 1];
-        if (value < high)
-            return (double)t->opacities[i] +
-                   (value - low) / (high - low) * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
-    }
-    return (double)t->opacities[last];
-}
-
 /* The scale's function, by its definition. */
 static double scaled(const render_transfer *t, double value)
 {
@@ -34,6 +21,20 @@ static double scaled(const render_transfer *t, double value)
     if (t->scale == RENDER_LOG) return value > 0 ? log10(value) : -INFINITY;
     if (t->scale == RENDER_SYMLOG && size > 1) return (value < 0 ? -1 : 1) * (1 + log10(size) / log10(exp(1)));
     return t->scale == RENDER_SYMLOG ? value / t->threshold : value;
+}
+
+double reference_opacity(const render_transfer *t, double value)
+{
+    const int last = t->opacity_count - 1;
+    if (value < t->opacity_values[0]) return (double)t->opacities[0];
+    for (int i = 0; i < last; i++) {
+        const double low = t->opacity_values[i], high = t->opacity_values[i + 1];
+        const double from = scaled(t, low), to = scaled(t, high);
+        if (value < high)
+            return (double)t->opacities[i] +
+                   (scaled(t, value) - from) / (to - from) * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
+    }
+    return (double)t->opacities[last];
 }
 
 double reference_place(const render_transfer *t, double value)

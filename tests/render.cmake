@@ -31,7 +31,7 @@ add_test(NAME render COMMAND test_render)
 set_tests_properties(render PROPERTIES TIMEOUT 180)
 
 insitu_render_program(test_colour_scales)
-add_test(NAME colour_scales COMMAND test_colour_scales)
+insitu_add_split_test(colour_scales $<TARGET_FILE:test_colour_scales>)
 set_tests_properties(colour_scales PROPERTIES TIMEOUT 60)
 
 insitu_render_program(test_slice)

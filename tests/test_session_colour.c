@@ -241,38 +241,6 @@ static void broken_file_of_ranges_is_told_to_all(void **state)
     }
 }
 
-/* ---- ramps of opacity by a scale --------------------------------------------------------------------------------- */
-
-static double opacity_by_value(const render_transfer *t, double value)
-{
-    int i = 0;
-    while (i + 2 < t->opacity_count && value >= t->opacity_values[i + 1]) i++;
-    const double low = t->opacity_values[i], share = (value - low) / (t->opacity_values[i + 1] - low);
-    return (double)t->opacities[i] + share * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
-}
-
-/* Returns how much the ramps, whose points are even along the scale, are off between low and 1e6. */
-static double ramps_are_off(scene_scale scale, double low, const scene_volume *volume)
-{
-    float colours[6] = {0};
-    const scene_colour_map map = {.count = 2, .colours = colours, .scale = scale, .threshold = 1};
-    const int ramps = volume->opacity_count - 1;
-    session_transfer made;
-    double worst = 0;
-    assert_true(session_make_transfer(1, &map, low, 1e6, volume, &made));
-    const render_transfer *t = &made.transfer;
-    const double from = render_scaled(t->scale, 1, low), to = render_scaled(t->scale, 1, 1e6);
-    for (int i = 0; i < 10000; i++) {
-        const double along = i / 10000.0 * ramps, share = along - (int)along;
-        const float *ends[2] = {&volume->opacity[(int)along].opacity, &volume->opacity[(int)along + 1].opacity};
-        const double value = render_unscaled(t->scale, 1, from + along / ramps * (to - from));
-        const double expected = (double)*ends[0] + share * ((double)*ends[1] - (double)*ends[0]);
-        worst = fmax(worst, fabs(opacity_by_value(t, value) - expected));
-    }
-    session_transfer_free(&made);
-    return worst;
-}
-
 /* ---- tables of volumes ---- */
 
 static void table_colour(const render_transfer *t, double value, double colour[3])
@@ -336,15 +304,23 @@ static void volumes_have_bands_and_colours_outside(void **state)
     }
 }
 
-static void ramps_by_a_scale_are_as_near_as_is_said(void **state)
+/* Render takes them as straight along the scale. */
+static void points_of_the_opacity_are_where_the_scale_has_them(void **state)
 {
     (void)state;
-    scene_opacity_point one[2] = {{0, 0}, {1, 1}}, seven[8];
-    for (int i = 0; i < 8; i++) seven[i] = (scene_opacity_point){i / 7.0, (float)(i % 2)};
-    const scene_volume by_one = {.opacity_count = 2, .opacity = one}, by_seven = {.opacity_count = 8, .opacity = seven};
-    assert_true(ramps_are_off(SCENE_LOG, 1, &by_one) < 0.002 && ramps_are_off(SCENE_LOG, 1, &by_seven) < 0.02);
-    assert_true(ramps_are_off(SCENE_SYMLOG, -1e6, &by_one) < 0.004);
-    assert_true(ramps_are_off(SCENE_SYMLOG, -1e6, &by_seven) < 0.04);
+    const scene_opacity_point points[3] = {{0, 0}, {0.25, 1}, {1, 0.5F}};
+    const scene_volume volume = {.opacity_count = 3, .opacity = (scene_opacity_point *)points};
+    float colours[6] = {0};
+    const scene_colour_map map = {.count = 2, .colours = colours, .scale = SCENE_LOG, .threshold = 1};
+    session_transfer made;
+    assert_true(session_make_transfer(1, &map, 1e-4, 1e4, &volume, &made));
+    const double values[3] = {1e-4, 1e-2, 1e4};
+    assert_int_equal(made.transfer.opacity_count, 3);
+    for (int i = 0; i < 3; i++) {
+        assert_true(fabs(made.transfer.opacity_values[i] / values[i] - 1) < 1e-12);
+        assert_true(made.transfer.opacities[i] == points[i].opacity);
+    }
+    session_transfer_free(&made);
 }
 
 /* ---- files ------------------------------------------------------------------------------------------------------- */
@@ -391,7 +367,7 @@ static int run(void)
         cmocka_unit_test(ranges_over_a_run_widen_and_outlive_it),
         cmocka_unit_test(every_kind_of_layer_has_a_range_over_a_run),
         cmocka_unit_test(volumes_have_bands_and_colours_outside),
-        cmocka_unit_test(ramps_by_a_scale_are_as_near_as_is_said),
+        cmocka_unit_test(points_of_the_opacity_are_where_the_scale_has_them),
         cmocka_unit_test(broken_file_of_ranges_is_told_to_all),
         cmocka_unit_test(maps_from_files_are_every_ranks),
         cmocka_unit_test(missing_and_broken_maps_are_told_to_all),

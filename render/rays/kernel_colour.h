@@ -73,9 +73,10 @@ SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 
 SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 {
+    const vf place = kernel_colour_place(t, x);
     vf a = vf_set(t->base_opacity);
     for (int i = 0; i < t->ramp_count; i++) {
-        const vf along = vf_clamp((x - t->ramp_start[i]) * t->ramp_inverse[i], vf_set(0), vf_set(1));
+        const vf along = vf_clamp((place - t->ramp_start[i]) * t->ramp_inverse[i], vf_set(0), vf_set(1));
         a += along * t->ramp_rise[i];
     }
     return vf_clamp(a, vf_set(0), vf_set(1));

@@ -148,7 +148,7 @@ typedef struct kernel_scale {
 
 /* A transfer function in its own domain, where low is 0 and 1 / inverse_width is 1: the range [low, high], or, with a
  * scale, what lies between 0 and the end that is farther from it, so that small values keep their digits. Opacity is
- * the first point's plus a sum of ramps (a ramp of infinite slope is a step). */
+ * the first point's plus a sum of ramps (a ramp of infinite slope is a step), by places in the colour table. */
 typedef struct kernel_transfer {
     double low, inverse_width; /* value -> domain */
     const float *colours;

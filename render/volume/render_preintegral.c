@@ -246,7 +246,9 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
 {
     kernel_pieces exact;
     if (has_negative_colours(t)) return INSITU_OK;
-    const insitu_status status = render_pieces_build(&exact, t, 0, error);
+    /* Along a scale no pieces are exact: their error takes the place of that of merged colours. */
+    const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
+    const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
     const int count = bin_count_for(max_error);
     bin_sums *bins = base_calloc((size_t)count + 2, sizeof *bins);

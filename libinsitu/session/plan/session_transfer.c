@@ -1,9 +1,7 @@
-/* A surface is coloured by the map as it is. A volume is integrated over transfer functions that are linear between
- * points of value, so other maps are made of such: each band has 16 entries of a table, so that colours change within
- * 1/16 of a band; colours outside of the range are one more entry at an end; and a ramp of opacity that is straight
- * along a scale becomes several pieces that are straight along the values. Pieces are equal along the scale, and are
- * cut until all 32 points are in use. Over six decades of a logarithm a single ramp is then off by less than 0.002 of
- * its height, and seven ramps by less than 0.02; with as many decades on both sides of 0, by twice that. */
+/* A surface is coloured by the map as it is. A volume is integrated over transfer functions whose colours are linear
+ * between entries, so other maps are made of such: each band has 16 entries of a table, so that colours change within
+ * 1/16 of a band; colours outside of the range are one more entry at an end. Opacity is straight along the map's scale,
+ * as render takes it. */
 #include "session_transfer.h"
 
 #include <float.h>
@@ -89,85 +87,13 @@ static bool expand_table(const scene_colour_map *map, session_transfer *out)
 
 /* ---- opacity --------------------------------------------------------------------------------------------------- */
 
-typedef struct opacity_points {
-    int count;
-    scene_opacity_point items[RENDER_MAX_OPACITY_POINTS];
-} opacity_points;
-
-/* Returns the largest difference, over 15 places between two points, between a ramp that is straight by value and one
- * that is straight by place. */
-static double chord_error(const render_transfer *t, const scene_opacity_point *a, const scene_opacity_point *b)
-{
-    enum { PARTS = 16 };
-    const double low = value_at(t, a->at), high = value_at(t, b->at);
-    double most = 0;
-    if (!(low < high) || a->opacity == b->opacity) return 0;
-    for (int i = 1; i < PARTS; i++) {
-        const double share = (double)i / PARTS, value = value_at(t, a->at + share * (b->at - a->at));
-        most = fmax(most, fabs((value - low) / (high - low) - share));
-    }
-    return most * fabs((double)b->opacity - (double)a->opacity);
-}
-
-static scene_opacity_point point_between(const scene_opacity_point *a, const scene_opacity_point *b, double share)
-{
-    return (scene_opacity_point){a->at + share * (b->at - a->at),
-                                 (float)(a->opacity + share * (b->opacity - a->opacity))};
-}
-
-/* The same difference for a ramp that is cut into pieces of equal length by place. */
-static double ramp_error(const render_transfer *t, const scene_opacity_point *ramp, int pieces)
-{
-    double most = 0;
-    for (int i = 0; i < pieces; i++) {
-        const scene_opacity_point a = point_between(ramp, ramp + 1, (double)i / pieces);
-        const scene_opacity_point b = point_between(ramp, ramp + 1, (double)(i + 1) / pieces);
-        most = fmax(most, chord_error(t, &a, &b));
-    }
-    return most;
-}
-
-static int worst_of(const double *errors, int count)
-{
-    int worst = 0;
-    for (int i = 1; i < count; i++)
-        if (errors[i] > errors[worst]) worst = i;
-    return worst;
-}
-
-/* Cuts the ramps that bend along the values. It cuts the worst one into one more piece at a time, until no ramp or no
- * point is left. */
-static void cut_ramps(const render_transfer *t, const scene_volume *volume, opacity_points *out)
-{
-    static const double good_enough = 1e-4;
-    const int ramps = volume->opacity_count - 1;
-    int pieces[RENDER_MAX_OPACITY_POINTS] = {0}, total = ramps;
-    double errors[RENDER_MAX_OPACITY_POINTS] = {0};
-    for (int i = 0; i < ramps; i++) errors[i] = ramp_error(t, &volume->opacity[i], pieces[i] = 1);
-    while (total + 1 < RENDER_MAX_OPACITY_POINTS) {
-        const int i = worst_of(errors, ramps);
-        if (errors[i] <= good_enough) break;
-        errors[i] = ramp_error(t, &volume->opacity[i], ++pieces[i]);
-        total++;
-    }
-    out->count = 0;
-    for (int i = 0; i < ramps; i++)
-        for (int piece = 0; piece < pieces[i]; piece++)
-            out->items[out->count++] =
-                point_between(&volume->opacity[i], &volume->opacity[i] + 1, (double)piece / pieces[i]);
-    out->items[out->count++] = volume->opacity[ramps];
-}
-
 static void set_opacity(const scene_volume *volume, double half_diagonal, session_transfer *out)
 {
     render_transfer *t = &out->transfer;
-    opacity_points points = {.count = volume->opacity_count};
-    memcpy(points.items, volume->opacity, (size_t)volume->opacity_count * sizeof *points.items);
-    if (t->scale != RENDER_LINEAR) cut_ramps(t, volume, &points);
-    t->opacity_count = points.count;
-    for (int i = 0; i < points.count; i++) {
-        out->opacity_values[i] = value_at(t, points.items[i].at);
-        out->opacities[i] = points.items[i].opacity;
+    t->opacity_count = volume->opacity_count;
+    for (int i = 0; i < t->opacity_count; i++) {
+        out->opacity_values[i] = value_at(t, volume->opacity[i].at);
+        out->opacities[i] = volume->opacity[i].opacity;
     }
     t->opacity_values = out->opacity_values;
     t->opacities = out->opacities;

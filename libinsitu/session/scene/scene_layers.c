@@ -8,8 +8,7 @@
 #include "colour_map.h"
 #include "memory.h"
 
-/* session_transfer.c puts further points between most_scaled_points. */
-enum { max_isovalues = 16, max_volumes = 4, most_scaled_points = 8 };
+enum { max_isovalues = 16, max_volumes = 4 };
 
 /* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
  * from green. */
@@ -87,9 +86,6 @@ static insitu_status convert_opacity(const scene_document *d, const char *path, 
 {
     static const double ramp[2][2] = {{0, 0}, {1, 0.9}};
     const int count = in->opacity ? in->opacity_count : 2;
-    if (count > most_scaled_points && out->colour_map.scale != SCENE_LINEAR)
-        return scene_bad(d, path, "opacity", "%d points, expected at most %d beside scale: %s", count,
-                         most_scaled_points, out->colour_map.scale == SCENE_LOG ? "log" : "symlog");
     const double(*points)[2] = in->opacity ? (const double(*)[2])in->opacity : ramp;
     out->opacity = base_alloc((size_t)count * sizeof *out->opacity);
     if (!out->opacity) return scene_no_memory(d);

@@ -220,8 +220,7 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
       .help =                                                                                                          \
           "Points `[at, opacity]`, joined by straight lines: `at` 0 is the low end of the range and 1 the high "       \
           "end, never falling (twice the same makes a step); opacity is that of `unit_distance`. By a `scale` the "    \
-          "lines are straight along it, to 0.002 of the height of one ramp over six decades and 0.02 of that of "      \
-          "seven (twice that by `symlog`), and there are at most 8 points.",                                           \
+          "lines are straight along it.",                                                                              \
       .by_default = "`[[0, 0], [1, 0.9]]`", .low = 0, .high = 1)                                                       \
     X(CYAML_FIELD_FLOAT_PTR("unit_distance", OPTIONAL, scene_file_volume, unit_distance),                              \
       .help = "The length in scene units that lets 1 - opacity of the light through.",                                 \
