@@ -43,6 +43,7 @@ typedef enum session_warning_kind {
     WARNING_ORDER,    /* the vertices of cells are in another order than VTK's, as far as volumes tell */
     WARNING_ISOVALUE, /* an isovalue lies outside of its field */
     WARNING_PLANE,    /* a plane lies outside of the meshes that it is drawn on */
+    WARNING_SAMPLES,  /* several volumes are sampled by default, to no error */
     WARNING_SCALE,    /* a field has no value that its logarithmic scale can show */
     WARNING_VIEW,     /* a camera sees no cell */
     WARNING_GREY,     /* a surface does not have the field that colours it */

@@ -52,6 +52,7 @@ static void choose_method(const scene_file_sampling *in, scene_image *out)
     static const double default_error = 0.01;
     const bool by_default = is_unsaid(in) && out->volume_count == 1;
     out->max_error = in->max_error ? *in->max_error : by_default ? default_error : 0;
+    out->has_default_samples = is_unsaid(in) && out->volume_count > 1;
     out->method = in->method ? (scene_sampling_method)*in->method : out->max_error > 0 ? SCENE_SEGMENTS : SCENE_SAMPLES;
 }
 

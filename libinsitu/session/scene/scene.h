@@ -335,6 +335,7 @@ typedef struct scene_image {
     double occlusion_radius;      /* how far they go, in scene units; 0: by the bounds */
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
     double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
+    bool has_default_samples;     /* several volumes are sampled because the scene does not say how */
     double step;                  /* sample distance in scene units; 0: by step_cells */
     double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
     bool jitter;                  /* true by default */

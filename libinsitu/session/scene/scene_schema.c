@@ -282,15 +282,18 @@ static const cyaml_schema_value_t statistics = {
           "The opaque isosurfaces, slices and surfaces of all ranks cast shadows on each other, and on transparent "   \
           "ones, by every light that does not say otherwise; the same picture on any partition. Transparent layers "   \
           "and volumes cast none, and volumes have none. A layer that takes no light, as slices by default, has "      \
-          "none either. What `clip` cuts away casts none, what the camera does not see casts its own.",                \
+          "none either. What `clip` cuts away casts none, what the camera does not see casts its own. Of "             \
+          "isosurfaces, "                                                                                              \
+          "what is nearer to a hit than half the size of its cell casts none.",                                        \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_MAPPING_PTR("ambient_occlusion", OPTIONAL, scene_file_image, ambient_occlusion, occlusion_fields),   \
       .help =                                                                                                          \
           "Darken what is hidden from the open sky, in corners and hollows: of rays from each hit into the "           \
           "hemisphere above it, spread as the cosine, the share that meets no opaque layer within `radius` is a "      \
           "factor on its ambient and diffuse light. By what casts shadows, on what has them. Which rays a pixel has "  \
-          "does not change from step to step. A core asks some 7 million rays a second in tetrahedra, 4 million in "   \
-          "hexahedra. `{}` takes all its defaults.",                                                                   \
+          "does not change from step to step. Of isosurfaces, what is nearer to a hit than half the size of its cell " \
+          "hides nothing: `radius` is to be several cells. A core asks some 7 million rays a second in tetrahedra, 4 " \
+          "million in hexahedra. `{}` takes all its defaults.",                                                        \
       .by_default = "none", .child = &occlusion_mapping)                                                               \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, scene_file_image, clip, scene_clip_fields),                            \
       .help = "Cuts parts of all layers away, exactly, and through the cells; volumes keep their `max_error`.",        \
@@ -299,7 +302,8 @@ static const cyaml_schema_value_t statistics = {
       .help = "The layers to draw. Each entry holds one of the keys of a layer.", .child = &scene_layer_mapping)       \
     X(CYAML_FIELD_MAPPING_PTR("sampling", OPTIONAL, scene_file_image, sampling, sampling_fields),                      \
       .help = "How volumes are integrated, and how finely.",                                                           \
-      .by_default = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered",            \
+      .by_default = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered, to no "     \
+                    "known error, of which a warning tells",                                                           \
       .child = &sampling_mapping)                                                                                      \
     X(CYAML_FIELD_INT_PTR("antialias", OPTIONAL, scene_file_image, antialias),                                         \
       .help =                                                                                                          \

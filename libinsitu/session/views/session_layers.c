@@ -321,6 +321,17 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
+/* One volume keeps an error by default. With a second one that takes longer, as their segments are mixed. */
+static void warn_of_samples(const session_layer_basis *basis, const scene_image *image)
+{
+    const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};
+    session_warn(basis->report, &warning, image->has_default_samples,
+                 "image \"%s\": its %d volumes are sampled half a cell apart, to no known error, and coarse cells may "
+                 "show it; sampling: {max_error: 0.01} bounds the error and takes longer, sampling: {step_cells: 0.5} "
+                 "asks for samples and silences this",
+                 image->name, image->volume_count);
+}
+
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error)
 {
@@ -330,6 +341,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     /* Where the scene asks for too much, the error is not one rank's. */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
+    warn_of_samples(basis, image);
     if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
