@@ -272,6 +272,34 @@ void surface_meshes_are_drawn(void **)
     }
 }
 
+/* Pictures without a scene: files of one name in several folders, or with several endings, and long names that begin
+ * alike. Drawn again, a file has the same names. */
+void default_pictures_of_two_files_are_two(void **)
+{
+    namespace fs = std::filesystem;
+    const fs::path here = path_of("names");
+    const std::string begin(70, 'n');
+    const char *const ways[] = {"one/sheet.vtp", "two/sheet.vtp", "sheet.vtp"};
+    fs::remove_all(here);
+    for (const char *way : {"one", "two", "three"}) fs::create_directories(here / way);
+    for (const char *way : ways) fs::copy_file(path_of("sheet.vtp"), here / way);
+    for (const char *end : {"a.vtp", "b.vtp"}) fs::copy_file(path_of("sheet.vtp"), here / (begin + end));
+    fs::copy_file(path_of("sheet.vtp"), here / "three/row.vtp");
+    fs::copy_file(path_of("row.vtu"), here / "three/row.vtu");
+    const auto count = [&] {
+        return std::count_if(fs::directory_iterator(here), fs::directory_iterator(),
+                             [](const fs::directory_entry &e) { return e.path().extension() == ".png"; });
+    };
+    int drawn = 0;
+    for (const std::string &file : {std::string(ways[0]), std::string(ways[1]), std::string(ways[2]), begin + "a.vtp",
+                                    begin + "b.vtp", std::string("three/row.vtp"), std::string("three/row.vtu")}) {
+        for (int turn = 0; turn < 2; turn++)
+            expect(run_in(here, shell_word(tool) + " --size 32x24 " + file), 0, "1 picture");
+        assert_int_equal(count(), ++drawn);
+    }
+    assert_true(fs::exists(here / "sheet_0000.png"));
+}
+
 void nothing_to_draw_is_an_error(void **)
 {
     expect(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
@@ -408,6 +436,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(wrong_options_are_named),
         cmocka_unit_test(one_rank_failing_ends_all),
         cmocka_unit_test(one_rank_failing_to_read_ends_all),
+        cmocka_unit_test(default_pictures_of_two_files_are_two),
         cmocka_unit_test(nothing_to_draw_is_an_error),
         cmocka_unit_test(surface_meshes_are_drawn),
         cmocka_unit_test(wrong_scenes_are_errors),

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <sstream>
+#include <system_error>
 
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
@@ -15,6 +17,7 @@
 #include <vtkPointData.h>
 
 #include "data_file.h"
+#include "file_kinds.h"
 #include "grids_of.h"
 
 namespace render_tool
@@ -124,6 +127,42 @@ std::string fixed_camera(const options &o, const data_extent &e)
     return distance > 0 ? text.str() : "";
 }
 
+/* Eight hexadecimal digits of a text (FNV-1a). */
+std::string digits_of(const std::string &text)
+{
+    uint32_t hash = 0x811c9dc5U;
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193U;
+    char digits[9];
+    std::snprintf(digits, sizeof digits, "%08x", static_cast<unsigned>(hash));
+    return digits;
+}
+
+/* Tells whether another file of data in the folder would give its pictures this name. */
+bool is_shared_name(const std::filesystem::path &file, const std::string &name)
+{
+    std::error_code code;
+    const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+    for (std::filesystem::directory_iterator at(folder, code), end; !code && at != end; at.increment(code)) {
+        const auto other = at->path().filename();
+        if (other != file.filename() && kind_of(other.string()) && (other.stem() == name || other == name)) return true;
+    }
+    return false;
+}
+
+/* The name that pictures of a file begin with, of at most 60 bytes. It is the file's without its ending, where that is
+ * no other file's. Digits of the ending, of a folder other than the working one, or of a long name tell files apart. */
+std::string picture_name(const std::filesystem::path &file)
+{
+    std::error_code code;
+    const std::string stem = file.stem().string();
+    const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(file, code).parent_path(), code);
+    const auto here = std::filesystem::weakly_canonical(std::filesystem::current_path(code), code);
+    std::string apart;
+    if (folder != here) apart = folder.string();
+    if (stem.size() > 60 || is_shared_name(file, stem)) apart += '/' + file.filename().string();
+    return apart.empty() ? stem : stem.substr(0, 51) + '_' + digits_of(apart);
+}
+
 } // namespace
 
 std::string default_field(const options &o)
@@ -137,17 +176,19 @@ std::string default_field(const options &o)
 
 std::string default_scene(const options &o, const std::string &field, const data_extent *extent)
 {
-    const std::string name = std::filesystem::path(o.files.front()).stem().string().substr(0, 60);
+    const std::filesystem::path file(o.files.front());
     std::string camera = extent && extent->has_bounds() ? fixed_camera(o, *extent) : "";
     if (camera.empty()) camera = "{automatic: {fit: box, direction: [" + o.direction + "]}}";
     std::ostringstream scene;
     scene.precision(17);
-    scene << "images:\n  - name: " << quoted(name) << "\n    size: [" << o.width << ", " << o.height << "]\n"
+    scene << "images:\n  - name: " << quoted(picture_name(file)) << "\n    size: [" << o.width << ", " << o.height
+          << "]\n"
           << "    camera: " << camera << "\n    layers: [{surface: {";
     if (!field.empty()) scene << "colour_by: {field: " << quoted(field);
     if (!field.empty() && extent && extent->has_range())
         scene << ", range: [" << extent->low[3] << ", " << extent->high[3] << "]";
-    scene << (field.empty() ? "" : "}") << "}}]\n    decorations: {title: " << quoted(name)
+    scene << (field.empty() ? "" : "}")
+          << "}}]\n    decorations: {title: " << quoted(file.stem().string().substr(0, 60))
           << ", text: [{text: \"t = {time}\"}], outline: true, axes: true" << (field.empty() ? "" : ", colour_bar: {}")
           << "}\n    outputs: [{path: \"{name}_{cycle:04}.png\"}]\n";
     return scene.str();

@@ -9,6 +9,7 @@
 #include "session_cinema.h"
 #include "session_events.h"
 #include "session_mesh.h"
+#include "session_overwrites.h"
 #include "session_picture.h"
 #include "session_report.h"
 #include "session_run_ranges.h"
@@ -31,6 +32,7 @@ struct insitu_session {
     session_kept_pictures kept;
     session_run_ranges run_ranges;
     session_cinema cinema; /* rank 0 */
+    session_overwrites overwrites;
     session_events events;
     session_report report;
     bool has_stepped;

@@ -37,6 +37,7 @@ static void reload_scene(insitu_session *s)
     session_writer_drop_memory(&s->writer);
     session_run_ranges_free(&s->run_ranges);
     session_cinema_free(&s->cinema);
+    session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
     session_forget_warnings(&s->report);
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
@@ -92,6 +93,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
                                      &s->kept,
                                      basis.scene,
                                      &s->cinema,
+                                     &s->overwrites,
                                      &s->writer,
                                      &s->catalogue,
                                      changes->writes_behind};

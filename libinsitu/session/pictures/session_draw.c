@@ -417,7 +417,9 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         base_error reason = {0};
         scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
-        draw_image(d, &placed, &reason);
+        if (draw_image(d, &placed, &reason) == INSITU_OK)
+            session_note_written(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,
+                                 d->report->numbers.time, d->report);
         if (first.status == INSITU_OK) first = reason;
     }
     write_tables(d, &first);

@@ -5,6 +5,7 @@
 #include "session_catalogue.h"
 #include "session_cinema.h"
 #include "session_mesh.h"
+#include "session_overwrites.h"
 #include "session_picture.h"
 #include "session_plan.h"
 #include "session_report.h"
@@ -26,6 +27,7 @@ typedef struct session_drawing {
     session_kept_pictures *kept;
     const scene *scene;
     session_cinema *cinema; /* rank 0's */
+    session_overwrites *overwrites;
     session_writer *writer; /* rank 0's */
     const session_catalogue *catalogue;
     bool writes_behind; /* pictures are written when the step is over */

@@ -1,0 +1,98 @@
+#include "session_overwrites.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_hash.h"
+
+/* Hashes a name without "./" and "//", which lead to the same file as without. Never 0. */
+static uint64_t hash_of(const char *path)
+{
+    uint64_t hash = SESSION_HASH_BEGIN;
+    bool is_part_begun = false;
+    if (path[0] == '/') session_hash_bytes(&hash, "/", 1);
+    while (*path) {
+        const size_t size = strcspn(path, "/");
+        const bool is_shown = size > 0 && !(size == 1 && path[0] == '.');
+        if (is_shown && is_part_begun) session_hash_bytes(&hash, "/", 1);
+        if (is_shown) session_hash_bytes(&hash, path, size);
+        is_part_begun = is_part_begun || is_shown;
+        path += size + (path[size] == '/');
+    }
+    return hash ? hash : 1;
+}
+
+static int outputs_before(const scene *scene, int image)
+{
+    int count = 0;
+    for (int i = 0; i < image; i++) count += scene->images[i].output_count;
+    return count;
+}
+
+/* The image of the scene that has this output. */
+static const scene_image *image_of(const scene *scene, int output)
+{
+    int image = 0;
+    while (output >= scene->images[image].output_count) output -= scene->images[image++].output_count;
+    return &scene->images[image];
+}
+
+/* The output whose last picture has this file; -1: none. A step that a run repeats under its cycle is no series. */
+static int find_written(const session_overwrites *all, uint64_t file, int output, long long cycle)
+{
+    for (int i = 0; i < all->count; i++)
+        if (all->last[i].file == file && (i != output || all->last[i].cycle != cycle)) return i;
+    return -1;
+}
+
+/* What mends it. */
+static const char *advice_for(const scene_image *image, const scene_image *before, bool is_same_output)
+{
+    if (is_same_output) return "put {cycle} into its path to keep a picture of each step";
+    if (image->variant.source != before->variant.source)
+        return "give each image's outputs paths of their own, as with {name} in them";
+    return "give each of its pictures a path of its own";
+}
+
+static void warn(const session_overwrites *all, const scene *scene, const scene_image *image, int output, int before,
+                 const char *path, long long cycle, session_report *report)
+{
+    const scene_image *earlier = image_of(scene, before);
+    session_warn(report, &(session_warning){WARNING_REPLACED, image->name, NULL, 0}, true,
+                 "image \"%s\": %.400s, written at cycle %lld by image \"%s\", is overwritten at cycle %lld; %s",
+                 image->name, path, all->last[before].cycle, earlier->name, cycle,
+                 advice_for(image, earlier, before == output));
+}
+
+static bool has_room(session_overwrites *all, const scene *scene)
+{
+    if (all->last) return true;
+    const int count = outputs_before(scene, scene->image_count);
+    all->last = base_calloc((size_t)count, sizeof *all->last);
+    all->count = all->last ? count : 0;
+    return all->last != NULL;
+}
+
+void session_note_written(session_overwrites *all, const scene *scene, int image, long long cycle, double time,
+                          session_report *report)
+{
+    const scene_image *drawn = &scene->images[image];
+    const scene_moment moment = scene_moment_of(drawn, cycle, time);
+    if (!has_room(all, scene)) return;
+    const int first = outputs_before(scene, image);
+    for (int i = 0; i < drawn->output_count; i++) {
+        char *path = scene_expand(drawn->outputs[i].path, &moment);
+        if (!path) continue;
+        const uint64_t file = hash_of(path);
+        const int before = find_written(all, file, first + i, cycle);
+        if (before >= 0) warn(all, scene, drawn, first + i, before, path, cycle, report);
+        all->last[first + i] = (session_written){file, cycle};
+        base_free(path);
+    }
+}
+
+void session_overwrites_free(session_overwrites *overwrites)
+{
+    base_free(overwrites->last);
+    *overwrites = (session_overwrites){0};
+}
