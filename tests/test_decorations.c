@@ -72,6 +72,32 @@ static void ticks_stand_where_their_numbers_are(void **state)
 
 /* ---- the box ------------------------------------------------------------------------------------------------- */
 
+/* A value i of 0 .. 3 in four bands falls into band i, [i / 4, (i + 1) / 4) of the bar, though its place is i / 3. */
+static void bands_of_ids_have_them_in_their_middle(void **state)
+{
+    (void)state;
+    static const struct {
+        double low, high;
+        int bands, count, first; /* count 0: no ids */
+    } cases[] = {{0, 3, 4, 4, 0}, {1, 5, 5, 5, 1},       {-0.5, 3.5, 4, 4, 0}, {7, 7 + 63, 64, 11, 7},
+                 {0, 3, 5, 0, 0}, {0.25, 3.25, 4, 0, 0}, {0, 4, 4, 0, 0},      {0, 1e-3, 4, 0, 0}};
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
+        const session_scale scale = {RENDER_LINEAR, 0, cases[n].low, cases[n].high};
+        insitu_tick ticks[SESSION_MAX_TICKS], plain[SESSION_MAX_TICKS];
+        const int count = session_make_band_ticks(&scale, cases[n].bands, 6, ticks);
+        if (!cases[n].count) {
+            assert_int_equal(count, session_make_ticks(&scale, 6, plain));
+            for (int i = 0; i < count; i++) assert_true(ticks[i].place == plain[i].place);
+            continue;
+        }
+        assert_int_equal(count, cases[n].count);
+        for (int i = 0; i < count; i++) {
+            const double band = atof(ticks[i].text) - cases[n].first;
+            assert_true(fabs(ticks[i].place - (band + 0.5) / cases[n].bands) < 1e-15);
+        }
+    }
+}
+
 /* Returns how far a point is from the renderer's ray through a place of the picture (continuous pixels). */
 static double off_ray(const render_camera *c, const double pixel[2], const double point[3])
 {
@@ -227,9 +253,12 @@ static void scale_bars_are_as_long_as_they_say(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ticks_are_at_round_numbers),           cmocka_unit_test(ticks_stand_where_their_numbers_are),
-        cmocka_unit_test(edges_are_where_rays_see_them),        cmocka_unit_test(edges_that_data_hides_are_told),
-        cmocka_unit_test(rulers_stand_where_their_numbers_are), cmocka_unit_test(scale_bars_are_as_long_as_they_say)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(ticks_are_at_round_numbers),
+                                       cmocka_unit_test(ticks_stand_where_their_numbers_are),
+                                       cmocka_unit_test(bands_of_ids_have_them_in_their_middle),
+                                       cmocka_unit_test(edges_are_where_rays_see_them),
+                                       cmocka_unit_test(edges_that_data_hides_are_told),
+                                       cmocka_unit_test(rulers_stand_where_their_numbers_are),
+                                       cmocka_unit_test(scale_bars_are_as_long_as_they_say)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -150,6 +150,54 @@ static void decorations_keep_their_room(void **state)
     }
 }
 
+/* The sphere around the bounds, seen from the eye, keeps off the room of bars and words, is as large as it can be, and
+ * leaves the middle only where it must. */
+static void a_sphere_keeps_off_decorations(void **state)
+{
+    (void)state;
+    srand(13);
+    static scene_slice slices[8];
+    for (int i = 0; i < 3000; i++) {
+        session_extent extent = random_extent();
+        scene_image image = random_image();
+        scene_decorations *d = &image.decorations;
+        scene_words words[2] = {{(char *)(uintptr_t) "word", SCENE_BOTTOM}, {(char *)(uintptr_t) "word", SCENE_TOP}};
+        render_camera camera;
+        if (!(extent.half_diagonal > 0)) continue;
+        image.camera.is_orthographic = i % 2;
+        *d = (scene_decorations){.is_given = i % 5, .size = 0.03, .has_bars = i % 3, .bars_at = SCENE_RIGHT};
+        d->words = words, d->words_count = i % 4 ? 2 : 0;
+        image.slices = slices, image.slice_count = i % 8;
+        if (!session_make_camera(&extent, &image, &camera)) continue;
+        /* By labels of one line, 4 bars stand in a column of a picture of 33 lines. */
+        const double columns = i % 5 && i % 3 ? 1 + (i % 8 > 4) : 0, lines = i % 5 && i % 4 ? 2 : 0;
+        const double bars = fmin(2 * 6.5 * columns * 0.03 * image.height / image.width, 0.5);
+        const double most[4] = {1 - bars, 1, 1 - 2 * lines * 0.03, 1 - 2 * lines * 0.03};
+        double centre[3] = {0, 0, 0}, ends[4];
+        for (int a = 0; a < 3; a++) {
+            const double offset = 0.5 * (extent.lower[a] + extent.upper[a]) - camera.eye[a];
+            centre[0] += offset * camera.right[a];
+            centre[1] += offset * camera.up[a];
+            centre[2] += offset * camera.forward[a];
+        }
+        double half[2] = {camera.half_height * camera.width / camera.height, camera.half_height};
+        bool is_filled[2];
+        for (int side = 0; side < 4; side++) {
+            /* The distance of the centre from the border's plane, over the radius. */
+            const double x = side % 2 ? -centre[side / 2] : centre[side / 2], edge = most[side] * half[side / 2];
+            ends[side] = camera.is_orthographic ? (edge - x) / extent.half_diagonal
+                                                : (edge * centre[2] - x) / hypot(1, edge) / extent.half_diagonal;
+            assert_true(ends[side] >= 1 - 1e-6);
+        }
+        for (int a = 0; a < 2; a++) {
+            is_filled[a] = ends[2 * a] < 1 + 1e-6 && ends[2 * a + 1] < 1 + 1e-6;
+            const bool is_moved = fabs(centre[a]) > 1e-6 * extent.half_diagonal;
+            assert_true(!is_moved || fmin(ends[2 * a], ends[2 * a + 1]) < 1 + 1e-6);
+        }
+        assert_true(is_filled[0] || is_filled[1]);
+    }
+}
+
 static void zoom_and_height_are_what_they_say(void **state)
 {
     (void)state;
@@ -178,6 +226,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_fills_the_frame), cmocka_unit_test(a_box_fills_an_orthographic_frame),
-        cmocka_unit_test(decorations_keep_their_room), cmocka_unit_test(zoom_and_height_are_what_they_say)};
+        cmocka_unit_test(decorations_keep_their_room), cmocka_unit_test(a_sphere_keeps_off_decorations),
+        cmocka_unit_test(zoom_and_height_are_what_they_say)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,7 +11,7 @@ namespace
 
 /* Shares of the size of words. */
 const double border = 0.55, pad = 0.15, line_height = 1.2, baseline = 0.95, thickness = 0.9;
-const double label_width = 7, foot = 0.5, shortest_bar = 4, tick_distance = 1.2;
+const double label_width = 7, foot = 0.5, shortest_bar = 4, tick_distance = 1.2, column_gap = 0.5;
 const double shrinking[] = {1, 0.85, 0.7, 0.55, 0.45};
 enum { SMALLEST = 6, MOST_LINES = 3, MOST_LABEL_LINES = 4 }; /* letters of 6 pixels can just be read */
 
@@ -284,7 +284,8 @@ void free_height(const sheet &s, double x0, double x1, double &top, double &bott
 bool fill_column(const sheet &s, const bar_group &g, std::size_t first, std::size_t count, int column,
                  std::vector<block> &out)
 {
-    const double x0 = g.at == INSITU_LEFT ? s.x0 + column * g.width : s.x1 - (column + 1) * g.width;
+    const double pitch = g.width + pixels(column_gap, g.size);
+    const double x0 = g.at == INSITU_LEFT ? s.x0 + column * pitch : s.x1 - column * pitch - g.width;
     double top = 0, bottom = 0;
     free_height(s, x0, x0 + g.width, top, bottom);
     const double share = count == 1 ? 0.62 : count == 2 ? 0.8 : 1;

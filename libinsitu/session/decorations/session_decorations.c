@@ -248,7 +248,7 @@ static bool is_repeated(const session_decorations *d, int bar)
 static void add_bar(session_decorations *d, const scene_decorations *scene, const scene_field *field,
                     const scene_colour_map *map, const session_transfer *transfer)
 {
-    const int i = d->all.bar_count;
+    const int i = d->all.bar_count, most = scene->tick_count;
     if (i == SESSION_MAX_BARS) return;
     const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high};
     d->fields[i] = field;
@@ -260,7 +260,9 @@ static void add_bar(session_decorations *d, const scene_decorations *scene, cons
                                      .below = map->has_below ? map->outside[0] : NULL,
                                      .above = map->has_above ? map->outside[1] : NULL,
                                      .at = (insitu_anchor)scene->bars_at,
-                                     .tick_count = session_make_ticks(&scale, scene->tick_count, d->ticks[i]),
+                                     .tick_count = map->is_banded
+                                                       ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
+                                                       : session_make_ticks(&scale, most, d->ticks[i]),
                                      .ticks = d->ticks[i]};
     if (!is_repeated(d, i)) d->all.bar_count++;
 }

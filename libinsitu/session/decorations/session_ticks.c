@@ -150,6 +150,28 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_multiples(s, most, ticks) : count;
 }
 
+/* A range that begins and ends at ids, or half a band beyond them, has as many of them as bands. */
+static int fill_ids(const session_scale *s, int bands, insitu_tick *ticks)
+{
+    const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;
+    const int every = (bands + SESSION_MAX_TICKS - 1) / SESSION_MAX_TICKS;
+    int count = 0;
+    if (s->kind != RENDER_LINEAR || s->high - s->low + 1 != bands + 2 * half) return 0;
+    if (first != floor(first) || fabs(first) > largest) return 0;
+    for (int band = 0; band < bands; band += every) {
+        ticks[count].place = (band + 0.5) / bands;
+        write_number(first + band, true, 0, ticks[count].text, sizeof ticks[count].text);
+        count++;
+    }
+    return count;
+}
+
+int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS])
+{
+    const int count = fill_ids(scale, bands, ticks);
+    return count ? count : session_make_ticks(scale, most, ticks);
+}
+
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS])
 {
     c_numbers numbers;

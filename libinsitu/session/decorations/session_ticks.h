@@ -20,4 +20,8 @@ typedef struct session_scale {
  * in the C locale's form. Returns how many there are. Local. */
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
+/* The same for a range of so many bands of equal width. Where each band has one whole number of a linear range, as
+ * those of ids have, the ticks stand in the bands' middles: all of them, or every so many. Local. */
+int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
+
 #endif

@@ -86,7 +86,8 @@ static const scene_form range_forms[] = {
     X(CYAML_FIELD_BOOL_PTR("reversed", OPTIONAL, type, colours.reversed), .help = "The map from its high end.",        \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_INT_PTR("discrete", OPTIONAL, type, colours.discrete),                                               \
-      .help = "So many bands of equal width, each in one colour: those of the map at even places, ends included.",     \
+      .help = "So many bands of equal width, each in one colour: those of the map at even places, ends included. If "  \
+              "the range has a whole number for each, as of ids, colour bars show them in the bands' middles.",        \
       .by_default = "smooth", .low = 1, .high = 64)                                                                    \
     X(CHOICE("scale", type, colours.scale, scale_words),                                                               \
       .help = "The spacing of values along the map: as they are, by their logarithm (values of 0 and less are below "  \

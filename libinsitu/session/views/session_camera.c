@@ -1,13 +1,16 @@
-/* An automatic camera looks along a given direction, and its place is computed: for the sphere around the bounds, on
- * the line through their middle; for the box, where its corners just fill the part of the frame that decorations leave.
+/* An automatic camera looks along a given direction, and its place is computed, so that the sphere around the bounds,
+ * or their corners, just fit the part of the frame that decorations leave.
  *
  * A corner at (x, y) across and w towards the eye, seen from a place s to the right and D towards the eye, is within
  * the right border if x - s <= r (D - w), r being its tangent; and within the left one, of tangent l, if s - x <= l (D
- * - w). So with a = max(x + r w) and b = max(l w - x), D is at least (a + b) / (r + l), and s = (a - b + (l - r) D) / 2
- * does for every such D. The same holds for up and down; the larger D serves both. */
+ * - w). So with a = max(x + r w) and b = max(l w - x), s is between a - r D and l D - b, which meet where D is (a + b)
+ * / (r + l). The same holds for up and down; the larger D serves both. A sphere of radius R has a = R sqrt(1 + r^2) and
+ * b = R sqrt(1 + l^2). A box stands in the middle of what it may, a sphere as near to the middle of the frame as it
+ * may. */
 #include "session_camera.h"
 
 #include <math.h>
+#include <string.h>
 
 /* The share of the half frame that the data fills at most. */
 static const double filled = 0.95;
@@ -37,13 +40,6 @@ static void choose_up(const double direction[3], const double up[3], double out[
 
 /* ---- where it stands ------------------------------------------------------------------------------------------- */
 
-/* The camera's place, from the middle of the bounds: right and up, and how much more for each length towards the eye;
- * back, towards the eye; and for an orthographic picture half its height, and how much right and up for each length of
- * that. */
-typedef struct camera_stand {
-    double right, up, right_slope, up_slope, back, half_height, right_share, up_share;
-} camera_stand;
-
 /* Tangents of half the angles of view, across and up. */
 typedef struct camera_tangents {
     double across, up;
@@ -53,14 +49,6 @@ static camera_tangents tangents_of(const scene_image *image)
 {
     const double up = tan(image->camera.angle * (3.14159265358979323846 / 360));
     return (camera_tangents){up * image->width / image->height, up};
-}
-
-/* The place from which a sphere just fits into the narrower of the two angles of view. */
-static camera_stand fit_sphere(double radius, const scene_image *image, camera_tangents t)
-{
-    double half = 0.5 * image->camera.angle * 3.14159265358979323846 / 180;
-    if (image->width < image->height) half = atan(tan(half) * image->width / image->height);
-    return (camera_stand){.back = radius / sin(half), .half_height = radius * fmax(1, t.up / t.across)};
 }
 
 /* The largest of so many places of corners, for which see above. */
@@ -73,25 +61,82 @@ typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* The room that a colour bar, a title, and rulers' numbers take of the picture, in heights of words. */
-static const double bar_room = 6.5, title_room = 2.4, ruler_room = 3;
+/* What fits into the frame: its reach from the middle of the bounds in perspective and in parallel, and the frame. */
+typedef struct camera_fit {
+    corner_reach near, flat;
+    camera_frame tangents, shares;
+    bool is_centred; /* in its part of the frame */
+} camera_fit;
 
-static double less_room(double words, double pixels)
+/* The room that a column of colour bars, a title, a line of words, and rulers' numbers take of the picture, in heights
+ * of words; and the shape of a bar, about as adaptors/image/layout.cpp has it. */
+static const double bar_room = 6.5, title_room = 2.4, line_room = 1.5, ruler_room = 3;
+static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
+
+static double less_room(double most, double words, double pixels)
 {
-    return fmax(filled - 2 * words / pixels, 0.5);
+    return fmax(most - 2 * words / pixels, 0.5);
 }
 
-/* The part of the frame that decorations leave free. */
-static camera_frame free_frame(const scene_image *image)
+/* Counts the letters of the longest label, and the bars. */
+static int count_bars(const scene_image *image, double *letters)
 {
     const scene_decorations *d = &image->decorations;
-    if (!d->is_given) return (camera_frame){filled, filled, filled, filled};
-    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_room * size : 0;
-    const double bars = d->has_bars ? bar_room * size : 0, title = d->title ? title_room * size : 0;
-    return (camera_frame){.right = less_room(rulers + (d->bars_at == SCENE_RIGHT ? bars : 0), image->width),
-                          .left = less_room(rulers + (d->bars_at == SCENE_LEFT ? bars : 0), image->width),
-                          .up = less_room(title, image->height),
-                          .down = less_room(rulers, image->height)};
+    int count = image->slice_count + image->volume_count;
+    *letters = 0;
+    for (int i = 0; i < d->label_count; i++) *letters = fmax(*letters, (double)strlen(d->labels[i]));
+    for (int i = 0; i < image->isosurface_count; i++) count += image->isosurfaces[i].has_colour_by;
+    for (int i = 0; i < image->surface_count; i++) count += image->surfaces[i].has_colour_by;
+    return count;
+}
+
+/* The width of all columns of bars, in heights of words. */
+static double room_of_bars(const scene_image *image)
+{
+    const scene_decorations *d = &image->decorations;
+    double letters;
+    const int count = count_bars(image, &letters);
+    const double words = letter_width * letters, width = fmax(bar_room, fmin(words, label_width) + bar_borders);
+    const double each = bar_height + line_height * fmax(1, ceil(words / label_width));
+    const double rows = fmax(1, floor((1 / d->size - (d->title ? title_room : 0) - bar_borders) / each));
+    return d->has_bars ? width * fmax(1, ceil(count / rows)) : 0;
+}
+
+/* The height of the lines at the middle of the top or bottom, or at its corners, whichever is more. Lines at corners
+ * count if they reach far into the picture. In heights of words. */
+static double room_of_lines(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
+{
+    const scene_decorations *d = &image->decorations;
+    const double long_line = 0.3 * image->width / (d->size * image->height * letter_width);
+    int counts[3] = {0, 0, 0};
+    bool is_long[3] = {true, false, false};
+    for (int i = 0; i < d->words_count; i++) {
+        const scene_anchor at = d->words[i].at;
+        const int place = at == middle ? 0 : at == left ? 1 : at == right ? 2 : -1;
+        if (place < 0) continue;
+        counts[place]++;
+        is_long[place] = is_long[place] || (double)strlen(d->words[i].text) > long_line;
+    }
+    int most = 0;
+    for (int place = 0; place < 3; place++)
+        if (is_long[place] && counts[place] > most) most = counts[place];
+    return line_room * most + (most ? 0.5 : 0);
+}
+
+/* The part of the frame that decorations leave free, of at most this share of its half. */
+static camera_frame free_frame(const scene_image *image, double most)
+{
+    const scene_decorations *d = &image->decorations;
+    if (!d->is_given) return (camera_frame){most, most, most, most};
+    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_room : 0, bars = room_of_bars(image);
+    const double top = (d->title ? title_room : 0) + room_of_lines(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
+    const double foot = room_of_lines(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
+    const double right = rulers + (d->bars_at == SCENE_RIGHT ? bars : 0);
+    const double left = rulers + (d->bars_at == SCENE_LEFT ? bars : 0);
+    return (camera_frame){.right = less_room(most, right * size, image->width),
+                          .left = less_room(most, left * size, image->width),
+                          .up = less_room(most, top * size, image->height),
+                          .down = less_room(most, (rulers + foot) * size, image->height)};
 }
 
 static corner_reach reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)
@@ -110,23 +155,48 @@ static corner_reach reach_of_corners(const session_extent *e, const render_camer
     return r;
 }
 
-static camera_stand fit_box(const session_extent *e, const render_camera *axes, const scene_image *image,
-                            camera_tangents t)
+static corner_reach reach_of_sphere(double radius, const camera_frame *f)
+{
+    return (corner_reach){radius * hypot(1, f->right), radius * hypot(1, f->left), radius * hypot(1, f->up),
+                          radius * hypot(1, f->down), radius};
+}
+
+static camera_fit make_fit(const session_extent *e, const render_camera *axes, const scene_image *image)
 {
     static const camera_frame nothing;
-    const camera_frame share = free_frame(image);
-    const camera_frame f = {share.right * t.across, share.left * t.across, share.up * t.up, share.down * t.up};
-    const corner_reach near = reach_of_corners(e, axes, &f), flat = reach_of_corners(e, axes, &nothing);
-    const double back = fmax((near.right + near.left) / (f.right + f.left), (near.up + near.down) / (f.up + f.down));
-    const double across = 2 * flat.right / (share.right + share.left) * t.up / t.across;
-    return (camera_stand){.right = 0.5 * (near.right - near.left),
-                          .up = 0.5 * (near.up - near.down),
-                          .right_slope = 0.5 * (f.left - f.right),
-                          .up_slope = 0.5 * (f.down - f.up),
-                          .back = fmax(back, near.back + 0.01 * e->half_diagonal), /* flat bounds, seen edge on */
-                          .half_height = fmax(2 * flat.up / (share.up + share.down), across),
-                          .right_share = 0.5 * (share.left - share.right) * t.across / t.up,
-                          .up_share = 0.5 * (share.down - share.up)};
+    const camera_tangents t = tangents_of(image);
+    const bool by_box = image->camera.fits_box && e->half_diagonal > 0;
+    const camera_frame share = free_frame(image, by_box ? filled : 1);
+    const double radius = e->half_diagonal > 0 ? e->half_diagonal : 1;
+    camera_fit fit = {.shares = share, .is_centred = by_box};
+    fit.tangents = (camera_frame){share.right * t.across, share.left * t.across, share.up * t.up, share.down * t.up};
+    fit.near = by_box ? reach_of_corners(e, axes, &fit.tangents) : reach_of_sphere(radius, &fit.tangents);
+    fit.flat = by_box ? reach_of_corners(e, axes, &nothing) : reach_of_sphere(radius, &nothing);
+    return fit;
+}
+
+/* How far the eye is from the middle of the bounds. */
+static double back_of(const camera_fit *fit, double half_diagonal)
+{
+    const corner_reach *near = &fit->near;
+    const camera_frame *f = &fit->tangents;
+    const double back =
+        fmax((near->right + near->left) / (f->right + f->left), (near->up + near->down) / (f->up + f->down));
+    return fmax(back, near->back + 0.01 * half_diagonal); /* flat bounds, seen edge on */
+}
+
+/* Half the height of an orthographic picture in which all fits; aspect: width over height. */
+static double fitting_height(const camera_fit *fit, double aspect)
+{
+    const double across = (fit->flat.right + fit->flat.left) / (fit->shares.right + fit->shares.left) / aspect;
+    return fmax((fit->flat.up + fit->flat.down) / (fit->shares.up + fit->shares.down), across);
+}
+
+/* Returns the eye's place between low and high: in the middle, or as near to 0 as it may. */
+static double place_between(double low, double high, bool is_centred)
+{
+    if (is_centred || low > high) return 0.5 * (low + high);
+    return fmin(fmax(0, low), high);
 }
 
 /* Half the height of an orthographic picture. */
@@ -147,7 +217,6 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
 {
     const scene_camera *c = &image->camera;
     const double radius = extent->half_diagonal > 0 ? extent->half_diagonal : 1;
-    const camera_tangents tangents = tangents_of(image);
     double middle[3], eye[3], focal[3], up[3];
     render_camera axes;
     for (int a = 0; a < 3; a++) {
@@ -156,13 +225,17 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     }
     choose_up(c->direction, c->up, up);
     if (!render_camera_look_at(&axes, eye, middle, up, c->angle, image->width, image->height)) return false;
-    const bool by_box = c->fits_box && extent->half_diagonal > 0;
-    const camera_stand stand = by_box ? fit_box(extent, &axes, image, tangents) : fit_sphere(radius, image, tangents);
+    const camera_fit fit = make_fit(extent, &axes, image);
     const bool is_flat = c->is_orthographic;
-    const double back = is_flat ? 2 * radius : stand.back / c->zoom;
-    const double half_height = half_height_of(image, stand.half_height / c->zoom);
-    const double right = is_flat ? stand.right_share * half_height : stand.right + stand.right_slope * back;
-    const double above = is_flat ? stand.up_share * half_height : stand.up + stand.up_slope * back;
+    const double aspect = (double)image->width / image->height;
+    const double back = is_flat ? 2 * radius : back_of(&fit, extent->half_diagonal) / c->zoom;
+    const double half_height = half_height_of(image, fitting_height(&fit, aspect) / c->zoom);
+    const corner_reach *reach = is_flat ? &fit.flat : &fit.near;
+    const camera_frame *f = is_flat ? &fit.shares : &fit.tangents;
+    const double across = is_flat ? half_height * aspect : back, high = is_flat ? half_height : back;
+    const double right =
+        place_between(reach->right - f->right * across, f->left * across - reach->left, fit.is_centred);
+    const double above = place_between(reach->up - f->up * high, f->down * high - reach->down, fit.is_centred);
     for (int a = 0; a < 3; a++) {
         focal[a] = middle[a] + (right * axes.right[a] + above * axes.up[a]);
         eye[a] = focal[a] + c->direction[a] / length(c->direction) * back;

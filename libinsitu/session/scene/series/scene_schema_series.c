@@ -18,7 +18,7 @@ static const cyaml_strval_t projection_words[] = {{"perspective", SCENE_PERSPECT
     X(CHOICE("fit", scene_file_automatic, fit, fit_words),                                                             \
       .help = "The body that fits into the image: the `box` of the data's bounds, which then fills 0.95 of the "       \
               "frame's width or height, less the room of a title, colour bars and rulers, or the `sphere` around it, " \
-              "which looks the same size from every side.",                                                            \
+              "which looks the same size from every side and keeps off the same room.",                                \
       .by_default = "`sphere`")                                                                                        \
     X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom), .help = "1 fits; larger is nearer.",        \
       .by_default = "`1`", .low = 1e-4, .high = 1000)
