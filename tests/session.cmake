@@ -81,7 +81,7 @@ insitu_add_mpi_test(session_clips test_session_clips 1 2 3 7 TIMEOUT 120 ARGS ${
 insitu_session_program(test_session_index_base)
 insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
-foreach(name indexed cell_order corners filled writer)
+foreach(name indexed cell_order vertex_order corners filled writer)
   insitu_session_program(test_session_${name})
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
@@ -95,7 +95,7 @@ endforeach()
 insitu_add_mpi_test(session_patches test_session_patches 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 # Meshes in all forms, wrong ones.
-foreach(name zero_counts strides)
+foreach(name zero_counts strides wrong_input)
   insitu_session_program(test_session_${name})
   target_sources(test_session_${name} PRIVATE test_mesh_forms.c test_owned_faces.c)
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

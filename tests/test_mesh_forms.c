@@ -144,7 +144,8 @@ static void describe_mesh(formed_mesh *m)
 static int64_t corner_count(const formed_mesh *m)
 {
     const insitu_mesh *mesh = &m->mesh;
-    if (mesh->cell_count == 0) return 0;
+    if (!formed_has_corners(m->form)) return 0;
+    if (mesh->cell_count <= 0 || mesh->cell_count > INT32_MAX) return mesh->cell_count;
     if (mesh->offsets.data) return mesh->connectivity_count;
     return mesh->cell_count * (m->form == MESH_TETS ? 4 : m->form == MESH_HEXES ? 8 : 6);
 }

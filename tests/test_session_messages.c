@@ -96,12 +96,16 @@ static const struct warning_case {
     spoil_function *spoil;
     const char *words[3]; /* none: no warning */
 } warnings[] = {
-    {"hexes by rows", plain, TEST_HEXES, number_by_rows, {"mesh \"m\": ", "lexicographic order", "VTK's order"}},
+    {"hexes by rows",
+     plain,
+     TEST_HEXES,
+     number_by_rows,
+     {"mesh \"m\": ", "lexicographic order", "INSITU_ORDER_LEXICOGRAPHIC"}},
     {"straight hexes by rows",
      plain,
      TEST_HEXES,
      straighten_by_rows,
-     {"lexicographic order", "little of the cells is seen"}},
+     {"lexicographic order", "little of them is seen"}},
     {"pyramids by rows", plain, TEST_PYRAMIDS, number_by_rows, {"mesh \"m\": ", "lexicographic order"}},
     {"flat tets", plain, TEST_TETS, flatten, {"mesh \"m\": 384 of 384 cells have no volume", "the order of their"}},
     {"mirrored hexes", plain, TEST_HEXES, mirror, {"mesh \"m\": 64 of 64 cells are left-handed", "the order of their"}},

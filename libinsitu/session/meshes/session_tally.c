@@ -160,32 +160,44 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
     tally->flat += is_flat_cell;
 }
 
-/* ---- quads that cross themselves ----------------------------------------------------------------------------- */
+/* ---- corners that do not agree ------------------------------------------------------------------------------- */
 
-enum { CROSSED_SAMPLES = 256 };
+/* Corners of less volume than this share of the cell's largest count as flat: as those of a hex with two vertices in
+ * one place, or of an edge that is nearly straight. */
+static const double least_share = 1e-6;
 
-static bool is_crossed(const grid *g, int64_t cell, int type)
+/* A quad's corner has an area along the normal at the first corner. */
+static void quad_corners(double points[][3], double out[4])
 {
-    static const signed char exchanged[8] = {0, 1, 3, 2, 4, 5, 7, 6};
-    double points[GRID_MAX_CELL_VERTICES][3], turned[GRID_MAX_CELL_VERTICES][3];
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    const int count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < count; i++) grid_vertex(g, vertices[i], points[i]);
-    for (int i = 0; i < count; i++) memcpy(turned[i], points[exchanged[i]], sizeof turned[i]);
-    return fabs(signed_volume(type, turned)) > 2 * fabs(signed_volume(type, points));
+    double normals[4][3];
+    for (int i = 0; i < 4; i++) {
+        double u[3], v[3];
+        for (int axis = 0; axis < 3; axis++) {
+            u[axis] = points[(i + 1) % 4][axis] - points[i][axis];
+            v[axis] = points[(i + 3) % 4][axis] - points[i][axis];
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+            normals[i][axis] = u[b] * v[c] - u[c] * v[b];
+        }
+        out[i] = 0;
+        for (int axis = 0; axis < 3; axis++) out[i] += normals[0][axis] * normals[i][axis];
+    }
 }
 
-void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed)
+bool tally_has_both_signs(int type, double points[][3])
 {
-    const grid *g = &mesh->cells;
-    const int64_t step = g->cell_count / CROSSED_SAMPLES + 1;
-    *looked_at = *crossed = 0;
-    for (int64_t cell = 0; cell < g->cell_count; cell += step) {
-        const int type = grid_cell_type(g, cell);
-        if (grid_is_ghost(g, cell) || (type != GRID_HEX && type != GRID_PYRAMID)) continue;
-        ++*looked_at;
-        *crossed += is_crossed(g, cell, type);
-    }
+    const bool is_quad = type == GRID_QUAD;
+    const cell_corners of = corners_of(is_quad ? GRID_TET : type);
+    double volumes[8], largest = 0;
+    const int count = is_quad ? 4 : of.count;
+    if (is_quad) quad_corners(points, volumes);
+    for (int i = 0; i < count && !is_quad; i++) volumes[i] = corner_volume(points, of.corners[i]);
+    for (int i = 0; i < count; i++) largest = fmax(largest, fabs(volumes[i]));
+    bool has[2] = {false, false};
+    for (int i = 0; i < count; i++)
+        if (fabs(volumes[i]) > least_share * largest) has[volumes[i] < 0] = true;
+    return has[0] && has[1];
 }
 
 bool tally_is_flat(const grid *g, int64_t cell)

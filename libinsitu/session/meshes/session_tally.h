@@ -16,10 +16,9 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part);
 /* One good cell of any type. */
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
-/* Samples hexes and pyramids, spread over the mesh, and tells how many were looked at, and how many of them would have
- * more than twice the volume if two neighbours in each quad changed places. Those with quads numbered row by row do:
- * their quads cross themselves, which takes their volume. */
-void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed);
+/* Tells whether the volumes at the corners of a hex, wedge or pyramid, or the areas at those of a quad, are of both
+ * signs. So they are where vertices are read in another order than they stand in. */
+bool tally_has_both_signs(int type, double points[][3]);
 
 /* The mean of the volumes at the corners of a cell of the four types, by its vertices' places; negative where it is
  * left-handed. */

@@ -1,10 +1,67 @@
+/* A cell whose vertices are read in another order than they stand in is turned inside out at some corners: their
+ * volumes are of both signs, while those of a cell that is right or mirrored agree. Its sum of them may be of any sign,
+ * or 0. So cells with both signs are counted, and for each order that vertex_order has, how many it would leave with
+ * one. */
 #include "session_vertex_order.h"
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_cell_order.h"
 #include "session_tally.h"
+#include "session_topology.h"
 
-enum cell_sum { DRAWN, FLAT, INVERTED, LOOKED_AT, CROSSED, CELL_SUMS };
+enum { ORDERS = 3, SAMPLES = 256 /* cells of a mesh that a rank looks at */ };
+
+/* The types that orders differ in. Each is judged by itself: where few cells are hexes, these are wrong all the same.
+ */
+enum { JUDGED = 4 };
+static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
+
+/* Of the cells of a type. */
+enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
+
+enum cell_sum { DRAWN, FLAT, INVERTED, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
+
+/* Tells whether the cell's corners agree if its vertices stand in the order, and not in the one that they are read in.
+ */
+static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
+{
+    const signed char *read = session_vertex_turn(mesh->given.vertex_order, type);
+    const signed char *other = session_vertex_turn(order, type);
+    double points[GRID_MAX_CELL_VERTICES][3];
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(&mesh->cells, cell, vertices);
+    for (int i = 0; i < count; i++) {
+        const int given = other ? other[i] : i; /* the place in the caller's connectivity */
+        grid_vertex(&mesh->cells, vertices[read ? read[given] : given], points[i]);
+    }
+    return !tally_has_both_signs(type, points);
+}
+
+/* The sums of the cell's type; NULL where it is not judged: a ghost, or a polyhedron by the caller's word, whose faces
+ * tell the order. */
+static int64_t *sums_of(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
+{
+    const int type = grid_cell_type(&mesh->cells, cell);
+    int at = 0;
+    while (at < JUDGED && judged[at] != type) at++;
+    if (at == JUDGED || grid_is_ghost(&mesh->cells, cell) || session_given_type(mesh, cell) != type) return NULL;
+    return sums + OF_TYPES + at * TYPE_SUMS;
+}
+
+static void sum_orders(const session_mesh *mesh, int64_t sums[CELL_SUMS])
+{
+    const int64_t step = mesh->cells.cell_count / SAMPLES + 1;
+    for (int64_t cell = 0; cell < mesh->cells.cell_count; cell += step) {
+        const int type = grid_cell_type(&mesh->cells, cell);
+        int64_t *of_type = sums_of(mesh, cell, sums);
+        if (!of_type) continue;
+        of_type[LOOKED_AT]++;
+        of_type[BOTH_SIGNS] += !fits(mesh, cell, type, mesh->given.vertex_order);
+        for (int order = 0; order < ORDERS; order++)
+            of_type[FIT + order] += fits(mesh, cell, type, (insitu_vertex_order)order);
+    }
+}
 
 static void sum_cells(const session_meshes *meshes, const char *name, int64_t sums[CELL_SUMS])
 {
@@ -13,21 +70,69 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     sums[DRAWN] = mesh->drawn_count - mesh->shell_count;
     sums[FLAT] = mesh->flat_count - mesh->shell_count;
     sums[INVERTED] = mesh->inverted_count;
-    tally_crossed(mesh, &sums[LOOKED_AT], &sums[CROSSED]);
+    sum_orders(mesh, sums);
+}
+
+/* Tells whether most cells of a type have corners of both signs. */
+static bool is_any_turned(const int64_t sums[CELL_SUMS])
+{
+    bool is_any = false;
+    for (const int64_t *t = sums + OF_TYPES; t < sums + CELL_SUMS; t += TYPE_SUMS)
+        is_any = is_any || 2 * t[BOTH_SIGNS] > t[LOOKED_AT];
+    return is_any;
+}
+
+/* The order that fits most cells, if it fits most of each type; else -1. */
+static int order_that_fits(const int64_t sums[CELL_SUMS])
+{
+    int best = -1;
+    int64_t most = -1;
+    for (int order = 0; order < ORDERS; order++) {
+        int64_t fitting = 0;
+        bool fits_each = true;
+        for (const int64_t *t = sums + OF_TYPES; t < sums + CELL_SUMS; t += TYPE_SUMS) {
+            fitting += t[FIT + order];
+            fits_each = fits_each && 2 * t[FIT + order] >= t[LOOKED_AT];
+        }
+        if (!fits_each || fitting <= most) continue;
+        best = order;
+        most = fitting;
+    }
+    return best;
+}
+
+/* Warns if most cells of a type are turned inside out at some corners, and names the order that fits most cells, if one
+ * does. */
+static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
+{
+    static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};
+    static const char *const names[] = {"INSITU_ORDER_VTK", "INSITU_ORDER_LEXICOGRAPHIC", "INSITU_ORDER_DMPLEX"};
+    const session_warning warning = {WARNING_ORDER, NULL, mesh, 0};
+    const bool are_turned = is_any_turned(sums);
+    const int order = order_that_fits(sums);
+    if (order >= 0)
+        session_warn(
+            report, &warning, are_turned,
+            "mesh \"%s\": the vertices of its cells seem to be in %s: as they are read, most of a type are "
+            "turned inside out at some of their corners, so that little of them is seen; set vertex_order of the "
+            "mesh to %s",
+            mesh, words[order], names[order]);
+    else
+        session_warn(
+            report, &warning, are_turned,
+            "mesh \"%s\": most of its cells of a type are turned inside out at some of their corners, so that "
+            "little of them is seen, and no vertex_order would mend that: check the order of their vertices, and the "
+            "coordinates",
+            mesh);
+    return are_turned;
 }
 
 static void warn_of_order(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     const long long drawn = sums[DRAWN], flat = sums[FLAT], inverted = sums[INVERTED];
-    const bool are_crossed = 2 * sums[CROSSED] > sums[LOOKED_AT];
-    const bool are_flat = !are_crossed && 2 * flat > drawn;
-    const bool are_inverted = !are_crossed && 2 * inverted > drawn;
-    session_warn(
-        report, &(session_warning){WARNING_ORDER, NULL, mesh, 0}, are_crossed,
-        "mesh \"%s\": the vertices of its hexes or pyramids seem to be in lexicographic order: their quads cross "
-        "themselves, so that little of the cells is seen; VTK's order goes around each quad; set "
-        "vertex_order of the mesh to INSITU_ORDER_LEXICOGRAPHIC, or, where it is that already, to INSITU_ORDER_VTK",
-        mesh);
+    const bool are_turned = warn_of_corners(report, mesh, sums);
+    const bool are_flat = !are_turned && 2 * flat > drawn;
+    const bool are_inverted = !are_turned && 2 * inverted > drawn;
     session_warn(report, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,
                  "mesh \"%s\": %lld of %lld cells have no volume and are not seen: check the order of their vertices, "
                  "which must be VTK's, and the coordinates",

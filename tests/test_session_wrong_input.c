@@ -1,0 +1,338 @@
+/* Meshes and fields with random mistakes, of every form: counts, strides, NULLs, types, alignment, indices, offsets,
+ * coordinates, values, choices, and ranks without anything; on one rank or on all. Each step is an error, the same on
+ * all ranks, or draws its pictures; and once the input is right, the next step draws what it drew at first.
+ *
+ * A mistake must be one that the library can find, so none makes an array longer than its memory: counts and elements
+ * are made smaller, or so large that nothing of the size can exist. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_effort.h"
+#include "test_mesh_forms.h"
+#include "test_mesh_make.h"
+
+enum { SIDE = 2, CASES = 120, ALL_CASES = 3000, FAULTS = 3, MOST_PIXELS = 12 * 9 };
+
+/* Random numbers of a case. */
+typedef struct dice {
+    uint64_t seed, next;
+} dice;
+
+static int64_t roll(dice *d, int64_t sides)
+{
+    return (int64_t)(test_hash(d->next++, d->seed) % (uint64_t)sides);
+}
+
+#define PICK(d, list) (list)[roll((d), (int64_t)(sizeof(list) / sizeof(list)[0]))]
+
+/* ---- arrays ---------------------------------------------------------------------------------------------------- */
+
+/* An array of the input: its description, which may be spoilt, and what it is in truth. */
+typedef struct input_array {
+    insitu_array *array;
+    insitu_array truth;
+    int64_t count;              /* elements in truth */
+    bool are_indices, is_table; /* of pointers, or their sizes */
+} input_array;
+
+enum { ARRAYS = 22 };
+
+/* right: the input before it was spoilt. */
+static int list_arrays(formed_mesh *m, const formed_mesh *right, input_array *out)
+{
+    insitu_mesh *a = &m->mesh;
+    const insitu_mesh *r = &right->mesh;
+    const input_array all[ARRAYS] = {
+        {&a->coordinates[0], r->coordinates[0], r->vertex_count, false, false},
+        {&a->coordinates[1], r->coordinates[1], r->vertex_count, false, false},
+        {&a->coordinates[2], r->coordinates[2], r->vertex_count, false, false},
+        {&a->vertex_ids, r->vertex_ids, r->vertex_count, true, false},
+        {&a->cell_types, r->cell_types, r->cell_count, true, false},
+        {&a->connectivity, r->connectivity, r->connectivity_count, true, false},
+        {&a->offsets, r->offsets, r->cell_count + 1, true, false},
+        {&a->ghosts, r->ghosts, r->cell_count, true, false},
+        {&a->face_offsets, r->face_offsets, r->face_count + 1, true, false},
+        {&a->face_connectivity, r->face_connectivity, r->face_connectivity_count, true, false},
+        {&a->owner, r->owner, r->face_count, true, false},
+        {&a->neighbour, r->neighbour, r->neighbour_count, true, false},
+        {&a->face_sizes, r->face_sizes, r->face_count, false, true},
+        {&a->face_lists, r->face_lists, r->face_count, false, true},
+        {&m->fields[FORMED_F].values, right->fields[FORMED_F].values, right->fields[FORMED_F].count, false, false},
+        {&m->fields[FORMED_C].values, right->fields[FORMED_C].values, right->fields[FORMED_C].count, false, false},
+        {&m->fields[FORMED_I].values, right->fields[FORMED_I].values, right->fields[FORMED_I].count, false, false},
+        {&m->fields[FORMED_I].index, right->fields[FORMED_I].index, right->fields[FORMED_I].count, true, false},
+        {&m->fields[FORMED_D].values, right->fields[FORMED_D].values, right->fields[FORMED_D].count, false, false},
+        {&m->patch.values, right->patch.values, right->patch.count, false, false},
+        {&m->patch.faces, right->patch.faces, right->patch.count, true, false},
+        {&m->patch.connectivity, right->patch.connectivity, right->patch.connectivity_count, true, false},
+    };
+    int count = 0;
+    for (int i = 0; i < ARRAYS; i++)
+        if (all[i].truth.data && all[i].count > 0) out[count++] = all[i];
+    return count;
+}
+
+static int64_t size_of(insitu_type type)
+{
+    return type == INSITU_UINT8 ? 1 : type == INSITU_FLOAT32 || type == INSITU_INT32 ? 4 : 8;
+}
+
+static void put_index(const input_array *a, int64_t i, int64_t value)
+{
+    const int64_t size = size_of(a->truth.type);
+    char *p = (char *)(uintptr_t)a->truth.data + i * (a->truth.stride_bytes ? a->truth.stride_bytes : size);
+    const int32_t narrow = (int32_t)value;
+    const unsigned char byte = (unsigned char)value;
+    memcpy(p, size == 8 ? (const void *)&value : size == 4 ? (const void *)&narrow : &byte, (size_t)size);
+}
+
+static void put_number(const input_array *a, int64_t i, double value)
+{
+    const int64_t size = size_of(a->truth.type);
+    char *p = (char *)(uintptr_t)a->truth.data + i * (a->truth.stride_bytes ? a->truth.stride_bytes : size);
+    const float narrow = (float)value;
+    memcpy(p, size == 8 ? (const void *)&value : &narrow, (size_t)size);
+}
+
+/* Other contents of one to three elements. */
+static void spoil_elements(const input_array *a, dice *d)
+{
+    const int64_t indices[] = {-1, 0, 1, -7, INT32_MIN, INT32_MAX, INT64_MIN, INT64_MAX, (int64_t)1 << 40, a->count};
+    const double numbers[] = {NAN, INFINITY, -INFINITY, 1e200, -1e300, 1e30, 0, -0.0, 1e-310, 7};
+    for (int64_t n = roll(d, 3); n >= 0; n--) {
+        const int64_t at = roll(d, a->count), index = PICK(d, indices), shift = roll(d, 4);
+        const double number = PICK(d, numbers);
+        if (a->are_indices)
+            put_index(a, at, shift ? index : roll(d, a->count));
+        else if (!a->is_table)
+            put_number(a, at, number);
+    }
+}
+
+static void spoil_stride(const input_array *a, dice *d)
+{
+    static const int64_t wild[] = {
+        (int64_t)1 << 60, (int64_t)1 << 62, INT64_MIN, INT64_MAX, -((int64_t)1 << 50), 1, 3, 0};
+    a->array->stride_bytes = PICK(d, wild);
+}
+
+/* Types of no more bytes, right ones and wrong ones, and numbers that are no type. */
+static void spoil_type(const input_array *a, dice *d)
+{
+    static const int types[] = {INSITU_FLOAT32, INSITU_FLOAT64, INSITU_INT32, INSITU_INT64, INSITU_UINT8, 0, -1, 77};
+    const int type = PICK(d, types);
+    if (a->is_table || (type >= 1 && type <= 5 && size_of((insitu_type)type) > size_of(a->truth.type))) return;
+    a->array->type = (insitu_type)type;
+}
+
+static void spoil_array(formed_mesh *m, const formed_mesh *right, dice *d)
+{
+    input_array arrays[ARRAYS];
+    const int count = list_arrays(m, right, arrays);
+    if (!count) return;
+    const input_array *a = &arrays[roll(d, count)];
+    switch (roll(d, 6)) {
+    case 0: a->array->data = NULL; return;
+    case 1: spoil_stride(a, d); return;
+    case 2: spoil_type(a, d); return;
+    case 3:
+        if (size_of(a->truth.type) > 1) a->array->data = (const char *)a->truth.data + 1;
+        return;
+    default: spoil_elements(a, d);
+    }
+}
+
+/* ---- counts and choices ---------------------------------------------------------------------------------------- */
+
+static int64_t other_count(int64_t count, dice *d)
+{
+    static const int64_t huge[] = {INT64_MAX, INT64_MIN, -1, ((int64_t)1 << 58) - 1, (int64_t)1 << 62, 0};
+    return roll(d, 2) ? PICK(d, huge) : roll(d, count > 0 ? count : 1);
+}
+
+static void spoil_count(formed_mesh *m, dice *d)
+{
+    insitu_mesh *a = &m->mesh;
+    int64_t *const counts[] = {&a->vertex_count,
+                               &a->cell_count,
+                               &a->connectivity_count,
+                               &a->face_count,
+                               &a->face_connectivity_count,
+                               &a->neighbour_count,
+                               &m->fields[FORMED_F].count,
+                               &m->fields[FORMED_C].count,
+                               &m->fields[FORMED_I].count,
+                               &m->fields[FORMED_D].count,
+                               &m->patch.count,
+                               &m->patch.connectivity_count};
+    int64_t *count = PICK(d, counts);
+    *count = other_count(*count, d);
+    if (roll(d, 2)) formed_fit_fields(m);
+}
+
+static void spoil_choice(formed_mesh *m, dice *d)
+{
+    static const int types[] = {0, 5, 7, 9, 10, 11, 12, 13, 14, 41, 42, -1};
+    static const int64_t rows[] = {-1, 0, 3, 6, 9, 12, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
+    insitu_mesh *a = &m->mesh;
+    insitu_field *field = &m->fields[roll(d, FORMED_FIELDS)];
+    switch (roll(d, 11)) {
+    case 0: a->index_base = (int)roll(d, 4) - 1; return;
+    case 1: a->vertex_order = (insitu_vertex_order)roll(d, 4); return;
+    case 2: a->keep_polyhedra = (int)roll(d, 3); return;
+    case 3: a->cell_type = (insitu_cell_type)PICK(d, types); return;
+    case 4: a->changed = (unsigned)roll(d, 9); return;
+    case 5: a->connectivity_row = PICK(d, rows); return;
+    case 6: field->corner_row = PICK(d, rows); return;
+    case 7: field->centring = (insitu_centring)(roll(d, 5) - 1); return;
+    case 8: field->component_count = (int)roll(d, 3) - 1; return;
+    case 9: field->component_stride_bytes = PICK(d, rows); return;
+    default: m->patch.first_face = PICK(d, rows);
+    }
+}
+
+/* A rank without cells, or a field, or names. */
+static void leave_out(formed_mesh *m, dice *d)
+{
+    insitu_field *field = &m->fields[roll(d, FORMED_FIELDS)];
+    switch (roll(d, 6)) {
+    case 0:
+        insitu_mesh_defaults(&m->mesh);
+        formed_fit_fields(m);
+        return;
+    case 1: field->name = NULL; return;
+    case 2: field->name = ""; return;
+    case 3: field->patch_count = (int)roll(d, 3) - 1; return;
+    case 4: field->patches = NULL; return;
+    default: field->values.data = field->index.data = NULL;
+    }
+}
+
+/* The fault's own numbers do not depend on what the rank has. */
+static void spoil(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
+{
+    dice d = {number, 1000 * (uint64_t)(fault + 1)};
+    const int64_t kind = roll(&d, 8);
+    if (!is_mine) return;
+    if (kind < 4) spoil_array(m, right, &d);
+    if (kind == 4 || kind == 5) spoil_count(m, &d);
+    if (kind == 6) spoil_choice(m, &d);
+    if (kind == 7) leave_out(m, &d);
+}
+
+/* ---- cases ----------------------------------------------------------------------------------------------------- */
+
+typedef struct bench {
+    insitu_session *session;
+    formed_mesh mesh;
+    bool is_torn;
+    int pictures, cycle;
+    float truth[FORMED_PICTURES][MOST_PIXELS * 4];
+} bench;
+
+/* Counts the pixels that differ from those of the first step. The origin of a refused mesh may move roundings. */
+static int count_differing(const bench *b)
+{
+    int count = 0;
+    for (int i = 0; i < caught_count && i < b->pictures; i++)
+        for (int p = 0; p < MOST_PIXELS; p++)
+            for (int k = 0; k < 4; k++)
+                if (!(fabsf(caught[i].rgba[4 * p + k] - b->truth[i][4 * p + k]) <= 0.02f)) {
+                    count++;
+                    break;
+                }
+    return count;
+}
+
+static void draw_right(bench *b, bool is_first, int number)
+{
+    forget_pictures();
+    const insitu_status set = formed_hand_over(b->session, &b->mesh, b->is_torn);
+    const insitu_status status = insitu_step(b->session, b->cycle++, 0);
+    if (set || status) fprintf(stderr, "case %d: not healed: %s\n", number, insitu_error(b->session));
+    everywhere(set == INSITU_OK && status == INSITU_OK);
+    everywhere(insitu_last_report(b->session)->images == b->pictures && caught_count == (own_rank ? 0 : b->pictures));
+    for (int i = 0; i < caught_count && is_first; i++) memcpy(b->truth[i], caught[i].rgba, sizeof b->truth[i]);
+    const int differing = count_differing(b);
+    if (differing > 4) fprintf(stderr, "case %d: %d pixels are others\n", number, differing);
+    everywhere(differing <= 4);
+}
+
+static void open_bench(bench *b, mesh_form form, bool is_torn)
+{
+    *b = (bench){.is_torn = is_torn && formed_has_corners(form)};
+    b->session = open_session(MPI_COMM_WORLD, write_scene(b->is_torn ? formed_torn_scene : formed_scene));
+    b->pictures = b->is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES;
+    formed_create(form, SIDE, own_rank, rank_count, &b->mesh);
+    draw_right(b, true, -1);
+}
+
+static void close_bench(bench *b)
+{
+    insitu_destroy(&b->session);
+    formed_free(&b->mesh);
+}
+
+/* Returns whether the step failed. */
+static bool draw_wrong(bench *b, int number)
+{
+    dice d = {(uint64_t)number, 0};
+    const int64_t faults = 1 + roll(&d, FAULTS), where = roll(&d, rank_count + 2);
+    const bool is_mine = where >= rank_count || where == own_rank;
+    const formed_mesh right = b->mesh;
+    for (int fault = 0; fault < faults; fault++) spoil(&b->mesh, &right, (uint64_t)number, fault, is_mine);
+    forget_pictures();
+    const insitu_status set = formed_hand_over(b->session, &b->mesh, b->is_torn);
+    const insitu_status status = insitu_step(b->session, b->cycle++, 0);
+    const int images = insitu_last_report(b->session)->images;
+    const bool is_well = status ? *insitu_error(b->session) != '\0' : !set && images == b->pictures;
+    if (!is_well)
+        fprintf(stderr, "case %d: set %d, step %d, %d images: %s\n", number, (int)set, (int)status, images,
+                insitu_error(b->session));
+    everywhere(is_well);
+    told_everywhere(b->session, status, status, "");
+    return status != INSITU_OK;
+}
+
+/* INSITU_TEST_CASE: the number of the only case to do. Returns how many steps failed. */
+static int run_cases(mesh_form form, bool is_torn, int first, int end)
+{
+    const char *only = getenv("INSITU_TEST_CASE");
+    bench b;
+    int failed = 0;
+    open_bench(&b, form, is_torn);
+    for (int number = first; number < end; number++) {
+        if (only && number != atoi(only)) continue;
+        failed += draw_wrong(&b, number);
+        formed_renew(&b.mesh);
+        draw_right(&b, false, number);
+    }
+    close_bench(&b);
+    return failed;
+}
+
+static void any_mistake_is_an_error_or_a_picture(void **state)
+{
+    (void)state;
+    const int each = test_effort(CASES, ALL_CASES) / (2 * MESH_FORM_COUNT) + 1, all = 2 * MESH_FORM_COUNT * each;
+    int failed = 0;
+    for (int i = 0; i < 2 * MESH_FORM_COUNT; i++)
+        failed += run_cases((mesh_form)(i / 2), i % 2, i * each, (i + 1) * each);
+    if (own_rank == 0) fprintf(stderr, "%d cases, %d errors\n", all, failed);
+    everywhere(getenv("INSITU_TEST_CASE") || (failed > all / 4 && failed < all)); /* neither few nor all are fatal */
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(any_mistake_is_an_error_or_a_picture),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
