@@ -402,6 +402,72 @@ void ensight_numbers_without_the_letter_are_refused(void **)
     assert_true(false);
 }
 
+std::string ensight_line(const std::string &text)
+{
+    return text + std::string(80 - text.size(), ' ');
+}
+
+template <typename Number> std::string bytes_of(const std::vector<Number> &values)
+{
+    return {reinterpret_cast<const char *>(values.data()), values.size() * sizeof(Number)};
+}
+
+/* All steps in one file, those of the variable too, which begins with "C Binary". The second has `more` tets more. */
+void write_ensight_set(int more)
+{
+    using floats = std::vector<float>;
+    using ints = std::vector<int32_t>;
+    std::string geometry = ensight_line("C Binary"), values = geometry;
+    for (int step = 0; step < 2; step++) {
+        const int points = 4 + step * more;
+        const std::string part = ensight_line("part") + bytes_of(ints{1});
+        geometry += ensight_line("BEGIN TIME STEP") + ensight_line("a tet") + ensight_line("or two") +
+                    ensight_line("node id assign") + ensight_line("element id assign") + part + ensight_line("solid") +
+                    ensight_line("coordinates") + bytes_of(ints{points});
+        const float x = static_cast<float>(step);
+        for (const floats &axis : {floats{x, x + 1, x, x, x + 1}, floats{0, 0, 1, 0, 1}, floats{0, 0, 0, 1, 1}})
+            geometry += bytes_of(floats(axis.begin(), axis.begin() + points));
+        geometry += ensight_line("tetra4") + bytes_of(ints{1 + step * more}) + bytes_of(ints{1, 2, 3, 4}) +
+                    (step * more > 0 ? bytes_of(ints{2, 3, 4, 5}) : "") + ensight_line("END TIME STEP");
+        values += ensight_line("BEGIN TIME STEP") + ensight_line("values") + part + ensight_line("coordinates") +
+                  bytes_of(floats(static_cast<size_t>(points), static_cast<float>(step))) +
+                  ensight_line("END TIME STEP");
+    }
+    write_file(folder + "/set.geo", geometry);
+    write_file(folder + "/set.f", values);
+    write_file(folder + "/set.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: 1 1 set.geo\nVARIABLE\n"
+                                     "scalar per node: 1 1 f set.f\nTIME\ntime set: 1\nnumber of steps: 2\n"
+                                     "time values: 0 0.5\nFILE\nfile set: 1\nnumber of steps: 2\n");
+}
+
+std::string why_set_is_refused()
+{
+    try {
+        (void)open_data_file(folder + "/set.case");
+    } catch (const std::exception &e) {
+        return e.what();
+    }
+    return "";
+}
+
+void ensight_file_sets_are_read_step_by_step(void **)
+{
+    write_ensight_set(0);
+    const auto file = open_data_file(folder + "/set.case");
+    assert_int_equal(file->times().size(), 2);
+    for (size_t step = 0; step < 2; step++) {
+        const auto grid = only_grid(grids_of(file->read(step, 0, 1), "set.case"));
+        assert_int_equal(grid->GetNumberOfCells(), 1);
+        assert_true(grid->GetBounds()[0] == static_cast<double>(step));
+        assert_true(grid->GetPointData()->GetArray("f")->GetComponent(0, 0) == static_cast<double>(step));
+    }
+    const std::string values = read_file(folder + "/set.f");
+    write_file(folder + "/set.f", values.substr(0, values.size() - 100));
+    assert_true(why_set_is_refused().find("set.f: is cut short") != std::string::npos);
+    write_ensight_set(1);
+    assert_true(why_set_is_refused().find("set.f: has steps of different sizes") != std::string::npos);
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -419,6 +485,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(grids_without_cells_are_no_errors),
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
         cmocka_unit_test(ensight_numbers_without_the_letter_are_refused),
+        cmocka_unit_test(ensight_file_sets_are_read_step_by_step),
     };
     return cmocka_run_group_tests(tests, write_all, nullptr);
 }

@@ -35,6 +35,11 @@ struct part_sizes {
     int64_t points = 0;
     int64_t block_cells = 0;
     std::map<std::string, int64_t> elements; // by type
+
+    bool operator==(const part_sizes &other) const
+    {
+        return points == other.points && block_cells == other.block_cells && elements == other.elements;
+    }
 };
 
 using geometry = std::map<int64_t, part_sizes>; // by the part's number
@@ -60,16 +65,47 @@ bool has_ids(const std::string &line)
     return line.find("given") != std::string::npos || line.find("ignore") != std::string::npos;
 }
 
+/* A binary file's first line may name its encoding, also that of a variable. */
+std::string first_line(ensight_stream &in, encoding how)
+{
+    const std::string line = in.line();
+    const bool is_name =
+        how != encoding::text && (line.find("Binary") != std::string::npos || line.find("BINARY") != std::string::npos);
+    return is_name ? in.line() : line;
+}
+
+/* Reads the description with which a step begins, if there is one. line is that of the first step, which may be alone
+ * in the file, and "" for later ones. */
+bool is_next(ensight_stream &in, std::string line, bool is_first)
+{
+    if (!is_first && !in.next_line(line)) return false;
+    if (starts_with(line, "BEGIN TIME STEP"))
+        in.line();
+    else if (!is_first)
+        in.refuse("\"" + line + "\" is not understood");
+    return true;
+}
+
 class geometry_walk
 {
   public:
     geometry_walk(const std::string &path, encoding how) : in_(path, how), how_(how) {}
 
+    /* Of each step in the file; one where it has no steps. */
+    std::vector<geometry> steps()
+    {
+        std::vector<geometry> all;
+        for (std::string line = first_line(in_, how_); is_next(in_, line, all.empty()); line = "")
+            all.push_back(parts());
+        return all;
+    }
+
+  private:
+    /* After the first of the two descriptions. */
     geometry parts()
     {
-        std::string line = how_ == encoding::text ? "" : in_.line(); // "C Binary"
-        line = in_.line();
-        if (starts_with(line, "BEGIN TIME STEP")) line = in_.line();
+        std::string line;
+        part_ = nullptr;
         in_.line();
         has_node_ids_ = has_ids(in_.line());
         has_element_ids_ = has_ids(in_.line());
@@ -86,7 +122,6 @@ class geometry_walk
         return all;
     }
 
-  private:
     part_sizes &begin_part(geometry &all)
     {
         part_sizes &part = all[in_.integer()];
@@ -157,11 +192,17 @@ class geometry_walk
     part_sizes *part_ = nullptr;
 };
 
-void walk_variable(const std::string &path, encoding how, const geometry &parts, int components, bool is_per_node)
+/* A file named in a line of the case. */
+struct named_file {
+    std::string pattern; // with '*' for the step's number
+    int components = 0;  // 0: geometry
+    bool is_per_node = false;
+};
+
+/* The values of one step. */
+void walk_values(ensight_stream &in, const geometry &parts, int components, bool is_per_node)
 {
-    ensight_stream in(path, how);
-    std::string line = in.line();
-    if (starts_with(line, "BEGIN TIME STEP")) in.line();
+    std::string line;
     const part_sizes *part = nullptr;
     bool has_values = false;
     while (in.next_line(line)) {
@@ -187,12 +228,19 @@ void walk_variable(const std::string &path, encoding how, const geometry &parts,
     if (!has_values) in.refuse("is cut short: a part has no values");
 }
 
-/* A file named in a line of the case. */
-struct named_file {
-    std::string pattern; // with '*' for the step's number
-    int components = 0;  // 0: geometry
-    bool is_per_node = false;
-};
+/* Steps beyond those of the geometry are on its last one. VTK's reader skips earlier steps by the sizes of the one that
+ * it reads, so all must have the same. */
+void walk_variable(const std::string &path, encoding how, const std::vector<geometry> &steps, const named_file &file)
+{
+    ensight_stream in(path, how);
+    size_t step = 0;
+    for (std::string line = first_line(in, how); is_next(in, line, step == 0); line = "", step++) {
+        const geometry &parts = steps[std::min(step, steps.size() - 1)];
+        if (step > 0 && !(parts == steps[0]))
+            in.refuse("has steps of different sizes in one file, which are not read: a file for each step is");
+        walk_values(in, parts, file.components, file.is_per_node);
+    }
+}
 
 /* The words of "1 1 name file" without the numbers of time and file sets. */
 std::vector<std::string> words_of(const std::string &text)
@@ -264,13 +312,13 @@ void check_ensight(const std::string &case_path)
 {
     const std::string folder = case_path.substr(0, case_path.find_last_of('/') + 1);
     const std::vector<named_file> files = files_of(case_path);
-    std::map<std::string, geometry> geometries; // by the step's number
+    std::map<std::string, std::vector<geometry>> geometries; // by the number in the file's name
     encoding how = encoding::text;
     for (const named_file &file : files) {
         if (file.components > 0) continue;
         for (const auto &[number, path] : matches(folder, file.pattern)) {
             how = ensight_stream::encoding_of(path);
-            geometries[number] = geometry_walk(path, how).parts();
+            geometries[number] = geometry_walk(path, how).steps();
         }
     }
     if (geometries.empty()) throw std::runtime_error(case_path + ": names no geometry");
@@ -278,8 +326,7 @@ void check_ensight(const std::string &case_path)
         if (file.components == 0) continue;
         for (const auto &[number, path] : matches(folder, file.pattern)) {
             const auto same = geometries.find(number);
-            walk_variable(path, how, same == geometries.end() ? geometries.begin()->second : same->second,
-                          file.components, file.is_per_node);
+            walk_variable(path, how, same == geometries.end() ? geometries.begin()->second : same->second, file);
         }
     }
 }
