@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 
 /* Number of rows that a thread takes at a time. It also marks pixels of the row after them, which is another thread's
  * first. */
@@ -64,10 +65,15 @@ bool comp_find_edges(const image *picture, int threads, unsigned char *pixels)
     unsigned char *marks = base_calloc((size_t)count, 1), *differ = base_alloc((size_t)(blocks * width) * 4);
     const bool has_memory = marks && differ;
     if (has_memory) {
-#pragma omp parallel for num_threads(threads) schedule(dynamic)
-        for (int64_t block = 0; block < blocks; block++)
-            for (int64_t y = block * ROWS; y < (block + 1) * ROWS && y < picture->height; y++)
-                mark_row(picture, y, differ + 4 * width * block, marks);
+#pragma omp parallel num_threads(threads)
+        {
+            region_enter();
+#pragma omp for schedule(dynamic) nowait
+            for (int64_t block = 0; block < blocks; block++)
+                for (int64_t y = block * ROWS; y < (block + 1) * ROWS && y < picture->height; y++)
+                    mark_row(picture, y, differ + 4 * width * block, marks);
+            region_leave();
+        }
         for (int64_t p = 0; p < count; p++)
             if (marks[p]) pixel_set_add(pixels, p);
     }

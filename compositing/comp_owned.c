@@ -10,6 +10,7 @@
 
 #include "fragment_order.h"
 #include "memory.h"
+#include "region.h"
 
 /* A thread's memory, whose lists are kept from strip to strip. */
 typedef struct merge_scratch {
@@ -213,6 +214,7 @@ insitu_status comp_owned_merge(const comp_owned *owned, const comp_merged *merge
     *finished = (comp_messages){NULL, NULL};
 #pragma omp parallel num_threads(owned->own->grid->threads) reduction(&& : is_well)
     {
+        region_enter();
         merge_scratch *const m = base_alloc(sizeof *m);
         if (m) {
             m->left = m->listed = (fragment_list){NULL, 0, 0};
@@ -226,6 +228,7 @@ insitu_status comp_owned_merge(const comp_owned *owned, const comp_merged *merge
             base_free(m->listed.items);
         }
         base_free(m);
+        region_leave();
     }
     if (is_well) return INSITU_OK;
     comp_messages_free(finished);

@@ -1,6 +1,8 @@
 /* Bounds of cells from their vertices, for the builders. */
 #include "mmbvh_bounds.h"
 
+#include "region.h"
+
 #include <omp.h>
 
 #define DEFINE_READ(name, shape, wide_index, wide_number)                                                              \
@@ -109,12 +111,17 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
 static void span_of_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
-#pragma omp parallel for num_threads(threads) reduction(min : low) reduction(max : high)
-    for (int64_t i = 0; i < count; i++) {
-        const double x = grid_array_number(a, i);
-        const bool usable = x - x == 0;
-        low = usable && x < low ? x : low;
-        high = usable && x > high ? x : high;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : low) reduction(max : high) nowait
+        for (int64_t i = 0; i < count; i++) {
+            const double x = grid_array_number(a, i);
+            const bool usable = x - x == 0;
+            low = usable && x < low ? x : low;
+            high = usable && x > high ? x : high;
+        }
+        region_leave();
     }
     *least = low;
     *most = high;
@@ -155,15 +162,20 @@ static void span_of(const grid_array *a, int64_t count, int threads, double *lea
         span_of_any(a, count, threads, least, most);
         return;
     }
-#pragma omp parallel for num_threads(threads) schedule(dynamic) reduction(min : low) reduction(max : high)
-    for (int64_t begin = 0; begin < count; begin += BLOCK) {
-        const int64_t n = count - begin < BLOCK ? count - begin : BLOCK;
-        const char *data = a->data + begin * a->stride;
-        if (a->stride == sizeof(float)) {
-            span_of_floats(data, sizeof(float), n, &low, &high);
-        } else {
-            span_of_floats(data, a->stride, n, &low, &high);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic) reduction(min : low) reduction(max : high) nowait
+        for (int64_t begin = 0; begin < count; begin += BLOCK) {
+            const int64_t n = count - begin < BLOCK ? count - begin : BLOCK;
+            const char *data = a->data + begin * a->stride;
+            if (a->stride == sizeof(float)) {
+                span_of_floats(data, sizeof(float), n, &low, &high);
+            } else {
+                span_of_floats(data, a->stride, n, &low, &high);
+            }
         }
+        region_leave();
     }
     *least = (double)low;
     *most = (double)high;

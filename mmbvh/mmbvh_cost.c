@@ -2,6 +2,7 @@
 #include "mmbvh_cost.h"
 
 #include "mmbvh_sweep.h"
+#include "region.h"
 
 /* The nodes are summed in a fixed number of parts, so that the sum has the same bits for any number of threads. */
 enum { PARTS = 64 };
@@ -32,10 +33,15 @@ static double area_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
 double cost_area_of_tree(const mmbvh *tree, int threads)
 {
     double sums[PARTS], area = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic)
-    for (int part = 0; part < PARTS; part++) {
-        const int64_t begin = tree->node_count * part / PARTS, end = tree->node_count * (part + 1) / PARTS;
-        sums[part] = area_of_nodes(tree, begin, end);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic) nowait
+        for (int part = 0; part < PARTS; part++) {
+            const int64_t begin = tree->node_count * part / PARTS, end = tree->node_count * (part + 1) / PARTS;
+            sums[part] = area_of_nodes(tree, begin, end);
+        }
+        region_leave();
     }
     for (int part = 0; part < PARTS; part++) area += sums[part];
     return area;

@@ -4,6 +4,7 @@
 #include <omp.h>
 
 #include "mmbvh_fetch.h"
+#include "region.h"
 
 enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_TETS = 96 /* half as large */ };
 
@@ -71,8 +72,12 @@ sweep_sum sweep_tree(const sweep *s, int threads)
         sum = sweep_runs(s, 1, node_count);
     } else {
 #pragma omp parallel num_threads(threads)
+        {
+            region_enter();
 #pragma omp single
-        sum = sweep_below(s, 1, node_count);
+            sum = sweep_below(s, 1, node_count);
+            region_leave();
+        }
     }
     return sweep_add(sum, run_all(s, 0, 1)); /* the root after its children */
 }

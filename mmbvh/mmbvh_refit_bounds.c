@@ -4,6 +4,7 @@
 #include "mmbvh_bounds.h"
 #include "mmbvh_cost.h"
 #include "mmbvh_measure.h"
+#include "region.h"
 
 enum {
     PREFETCH_CELLS = 48,
@@ -61,6 +62,7 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
     fetch_box_empty(&all);
 #pragma omp parallel num_threads(threads)
     {
+        region_enter();
         fetch_box own;
         fetch_box_empty(&own);
 #pragma omp for schedule(static)
@@ -71,6 +73,7 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
         }
 #pragma omp critical(mmbvh_merge)
         fetch_box_unite(&all, &own);
+        region_leave();
     }
     return all;
 }

@@ -9,6 +9,7 @@
 #include "mmbvh.h"
 #include "mmbvh_fetch.h"
 #include "mmbvh_sweep.h"
+#include "region.h"
 
 enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
 
@@ -248,9 +249,14 @@ static int64_t mark_wish(const selector *s, int threads)
 {
     const int64_t block = (int64_t)WORD_CELLS * BLOCK_WORDS, cells = s->g->cell_count;
     int64_t unusable = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(+ : unusable)
-    for (int64_t begin = 0; begin < cells; begin += block)
-        unusable += s->run(s, begin, begin + block < cells ? begin + block : cells);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic, 4) reduction(+ : unusable) nowait
+        for (int64_t begin = 0; begin < cells; begin += block)
+            unusable += s->run(s, begin, begin + block < cells ? begin + block : cells);
+        region_leave();
+    }
     return unusable;
 }
 
@@ -273,16 +279,26 @@ static bool list_cells(const uint64_t *bits, int64_t words, int threads, mmbvh_s
 {
     int64_t *ends = base_calloc((size_t)threads + 1, sizeof *ends);
     if (!ends) return false;
-#pragma omp parallel for num_threads(threads) schedule(static, 1)
-    for (int part = 0; part < threads; part++)
-        ends[part + 1] = count_bits(bits, words * part / threads, words * (part + 1) / threads);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static, 1) nowait
+        for (int part = 0; part < threads; part++)
+            ends[part + 1] = count_bits(bits, words * part / threads, words * (part + 1) / threads);
+        region_leave();
+    }
     for (int part = 0; part < threads; part++) ends[part + 1] += ends[part];
     out->count = ends[threads];
     out->cells = base_alloc((size_t)(out->count ? out->count : 1) * sizeof *out->cells);
     if (out->cells) {
-#pragma omp parallel for num_threads(threads) schedule(static, 1)
-        for (int part = 0; part < threads; part++)
-            list_bits(bits, words * part / threads, words * (part + 1) / threads, out->cells + ends[part]);
+#pragma omp parallel num_threads(threads)
+        {
+            region_enter();
+#pragma omp for schedule(static, 1) nowait
+            for (int part = 0; part < threads; part++)
+                list_bits(bits, words * part / threads, words * (part + 1) / threads, out->cells + ends[part]);
+            region_leave();
+        }
     }
     base_free(ends);
     return out->cells != NULL;

@@ -9,6 +9,7 @@
 #include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
+#include "region.h"
 #include "render_hits.h"
 #include "render_kernels.h"
 #include "render_prepare.h"
@@ -120,6 +121,7 @@ bool render_differences_sort(const render_job *job, render_waiting_list *list)
 /* The work of all threads: to sample about hits, or to light them, a chunk at a time. */
 typedef struct chunk_work {
     kernel_frame frame;
+    const kernel_table *kernels;
     int threads;
     const render_waiting_hit *hits;
     render_samples_about *samples;
@@ -128,26 +130,18 @@ typedef struct chunk_work {
     fragment *out;
 } chunk_work;
 
-static bool thread_begin(kernel_thread *thread)
-{
-    const kernel_table *kernels = render_kernels();
-    *thread = (kernel_thread){.memory = base_alloc(kernels->memory_bytes)};
-    if (thread->memory) kernels->begin(thread);
-    return thread->memory;
-}
-
 static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
 {
-    const kernel_table *kernels = render_kernels();
     if (work->list)
-        kernels->light_waiting(&work->frame, thread, work->list, work->merged, first, count, work->out);
+        work->kernels->light_waiting(&work->frame, thread, work->list, work->merged, first, count, work->out);
     else
-        kernels->sample_waiting(&work->frame, thread, work->hits + first, work->samples + first, count);
+        work->kernels->sample_waiting(&work->frame, thread, work->hits + first, work->samples + first, count);
 }
 
 static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_t first, int64_t count,
                                  base_error *error)
 {
+    work->kernels = render_kernels();
     work->threads = job->threads > 0 ? job->threads : omp_get_max_threads();
     render_job surfaces = *job;
     bool has_memory = true;
@@ -157,14 +151,16 @@ static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_
     if (status != INSITU_OK) return status;
 #pragma omp parallel num_threads(work->threads) reduction(&& : has_memory)
     {
-        kernel_thread thread;
-        has_memory = thread_begin(&thread);
-#pragma omp for schedule(dynamic, 1)
+        region_enter();
+        kernel_thread thread = {0};
+        has_memory = render_thread_begin(work->kernels, &thread);
+#pragma omp for schedule(dynamic, 1) nowait
         for (int64_t at = first; at < first + count; at += CHUNK_HITS) {
             const int64_t left = first + count - at;
             if (thread.memory) work_on(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
         }
         base_free(thread.memory);
+        region_leave();
     }
     render_unprepare(&work->frame);
     if (!has_memory)

@@ -12,6 +12,7 @@
 #include "kernel_types.h"
 #include "memory.h"
 #include "pixel_set.h"
+#include "region.h"
 #include "render.h"
 #include "render_candidates.h"
 #include "render_fold.h"
@@ -54,9 +55,9 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     fragment_list *own = &end->writers[number].list;
     const bool folds = frame->job->reproducible && frame->job->volume_count && !frame->job->separate_samples;
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
-#pragma omp for schedule(dynamic, KERNEL_TILE_RUN)
+#pragma omp for schedule(dynamic, KERNEL_TILE_RUN) nowait
     for (int tile = 0; tile < columns * rows; tile++) {
-        if (thread->out_of_memory) continue;
+        if (!render_thread_begin(kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
         const pixel_area area = area_of(camera, tile % columns, tile / columns);
         if (!end->take) fragment_writer_advance(&end->writers[number], TILE_FRAGMENTS);
@@ -111,29 +112,22 @@ static void drop_places(fragment_list *list, int64_t first)
 
 /* ---- threads ------------------------------------------------------------------------------------------------- */
 
-/* Threads' states; false where memory ran out. */
-static bool begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
+/* The threads' states, all of them, should OpenMP give fewer threads than asked for. */
+static void begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
 {
-    const kernel_table *kernels = render_kernels();
-    bool has_polyhedra = false, has_memory = true;
+    bool has_polyhedra = false;
     for (int i = 0; i < frame->job->part_count; i++)
         has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
-        /* All of them, should OpenMP give fewer threads than asked for; else each by the thread that will use it, for
-         * its first touch. */
-#pragma omp parallel for num_threads(threads) schedule(static, 1) reduction(&& : has_memory)
-    for (int i = 0; i < threads; i++) {
-        states[i] = (kernel_thread){.memory = base_alloc(kernels->memory_bytes),
-                                    .out = &end->writers[i].list,
+    for (int i = 0; i < threads; i++)
+        states[i] = (kernel_thread){.out = &end->writers[i].list,
                                     .reserve = fragment_reserve,
                                     .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
+                                    .out_of_memory = false,
                                     .find_polyhedron = polyhedra_find,
                                     .polyhedron_scratch = polyhedra_scratch,
                                     .grow_waiting = grow_waiting,
                                     .now = now};
-        if (states[i].memory) kernels->begin(&states[i]);
-        has_memory = has_memory && states[i].memory && (!has_polyhedra || states[i].polyhedra);
-    }
-    return has_memory;
+    for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
 }
 
 static bool end_threads(const render_job *job, kernel_thread *states, int threads, render_statistics *statistics)
@@ -160,30 +154,32 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
 static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
 {
     const render_job *job = frame->job;
+    const kernel_table *kernels = render_kernels();
     const int64_t pixels = (int64_t)job->camera.width * job->camera.height;
     kernel_thread *states = base_calloc((size_t)threads, sizeof *states);
     if (!states) return false;
-    bool has_memory = begin_threads(frame, end, states, threads);
+    begin_threads(frame, end, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
-    if (has_memory && frame->is_binned && !render_surfaces_are_small(frame)) {
+    if (frame->is_binned && !render_surfaces_are_small(frame)) {
         const double start = now();
         render_candidates_find(frame, states, threads);
         statistics->surface_ms = 1e3 * (now() - start);
     }
-    if (has_memory && frame->bins_volume) {
+    if (frame->bins_volume) {
         const double start = now();
         render_candidates_find_volume(frame, states, threads);
         statistics->volume_ms = 1e3 * (now() - start);
     }
     frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
     if (frame->needs_planes) render_trees_cover(frame);
-    if (has_memory) {
-        const kernel_table *kernels = render_kernels();
 #pragma omp parallel num_threads(threads)
+    {
+        region_enter();
         trace_tiles(kernels, frame, &states[omp_get_thread_num()], end);
+        region_leave();
     }
     render_candidates_free(frame);
-    has_memory = end_threads(job, states, threads, statistics) && has_memory;
+    const bool has_memory = end_threads(job, states, threads, statistics);
     base_free(states);
     return has_memory;
 }

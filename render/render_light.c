@@ -11,6 +11,7 @@
 #include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
+#include "region.h"
 #include "render_hits.h"
 #include "render_kernels.h"
 #include "render_occluders.h"
@@ -355,14 +356,16 @@ static bool trace_all(const render_occluders *of, const render_hit *hits, render
     bool is_well = true;
 #pragma omp parallel num_threads(of->threads) reduction(&& : is_well)
     {
+        region_enter();
         tracer *t = tracer_create(of);
-#pragma omp for schedule(dynamic, 1)
+#pragma omp for schedule(dynamic, 1) nowait
         for (int64_t first = 0; first < count; first += CHUNK_HITS) {
             const int64_t left = count - first;
             if (t && !t->thread.out_of_memory)
                 trace_chunk(t, hits + first, rays + first, (int)(left < CHUNK_HITS ? left : CHUNK_HITS));
         }
         is_well = tracer_free(t);
+        region_leave();
     }
     return is_well;
 }

@@ -18,4 +18,5 @@ set_tests_properties(
   PROPERTIES TIMEOUT 60)
 add_test(NAME house_figures_are_held
   COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/house_figures.py --hold ${PROJECT_SOURCE_DIR})
+add_test(NAME house_regions_are_entered COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_regions.sh ${PROJECT_SOURCE_DIR})
 add_test(NAME house_hard_cases_are_tested COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_hard_cases.sh ${PROJECT_SOURCE_DIR})

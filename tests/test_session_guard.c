@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "region.h"
 #include "session_guard.h"
 
 enum { TRAPS = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW, THREADS = 3 };
@@ -21,9 +22,23 @@ static void divide_by_zero_on(int threads)
 {
 #pragma omp parallel num_threads(threads)
     {
+        region_enter();
         volatile double infinite = 1 / zero;
         (void)infinite;
+        region_leave();
     }
+}
+
+/* As the session does before its first region of so many threads. */
+static void start_threads(const session_guard *guard, int threads)
+{
+    session_guard_lend(guard);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+        region_leave();
+    }
+    session_guard_return();
 }
 
 static void arm_traps(void)
@@ -55,9 +70,7 @@ static void traps_are_off_inside_and_on_again_after(void **state)
 #pragma omp parallel num_threads(THREADS)
     arm_traps(); /* where they keep their own */
     session_guard_begin(&guard);
-    session_guard_begin_team(&guard, THREADS);
     divide_by_zero_on(THREADS); /* unguarded, this ends the process */
-    session_guard_end_team(THREADS);
     session_guard_end(&guard);
     count_armed(THREADS, &armed, &flagged);
     assert_int_equal(armed, THREADS);
@@ -74,32 +87,37 @@ static void threads_first_needed_inside_are_as_the_callers_own(void **state)
 #pragma omp parallel num_threads(THREADS)
     arm_traps();
     session_guard_begin(&guard);
-    session_guard_begin_team(&guard, 2 * THREADS);
+    start_threads(&guard, 2 * THREADS);
     divide_by_zero_on(2 * THREADS);
-    session_guard_end_team(2 * THREADS);
     session_guard_end(&guard);
     count_armed(2 * THREADS, &armed, &flagged);
     assert_int_equal(armed, 2 * THREADS);
     assert_int_equal(flagged, 0);
 }
 
-/* The team is larger at the end than at the begin: threads whose settings were not saved are left alone. */
-static void threads_that_come_later_keep_what_they_have(void **state)
+/* Rounding of a worker is its own again between regions, and to nearest within them. */
+static void workers_have_their_own_between_regions(void **state)
 {
     (void)state;
     session_guard guard;
-    session_guard_begin(&guard);
-    session_guard_begin_team(&guard, 1);
+    int nearest = 0, upward = 0;
 #pragma omp parallel num_threads(THREADS)
     fesetround(FE_UPWARD);
+    session_guard_begin(&guard);
+    for (int turn = 0; turn < 2; turn++) {
+#pragma omp parallel num_threads(THREADS) reduction(+ : nearest)
+        {
+            region_enter();
+            nearest += fegetround() == FE_TONEAREST;
+            region_leave();
+        }
+    }
     fesetround(FE_UPWARD); /* LLVM's workers take the caller's at every begin of a region */
-    session_guard_end_team(THREADS);
-    int upward = 0;
 #pragma omp parallel num_threads(THREADS) reduction(+ : upward)
     upward += fegetround() == FE_UPWARD;
     session_guard_end(&guard);
+    assert_int_equal(nearest, 2 * THREADS);
     assert_int_equal(upward, THREADS);
-    assert_int_equal(fegetround(), FE_TONEAREST);
 #pragma omp parallel num_threads(THREADS)
     fesetround(FE_TONEAREST);
 }
@@ -136,7 +154,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(traps_are_off_inside_and_on_again_after),
         cmocka_unit_test(threads_first_needed_inside_are_as_the_callers_own),
-        cmocka_unit_test(threads_that_come_later_keep_what_they_have),
+        cmocka_unit_test(workers_have_their_own_between_regions),
         cmocka_unit_test(rounding_is_to_nearest_inside),
         cmocka_unit_test(teams_are_of_one_size_inside),
     };

@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "region.h"
 #include "test_session_fixture.h"
 
 #define VISIBLE __attribute__((visibility("default")))
@@ -255,6 +256,30 @@ static void threads_that_ended_are_tried_again(void **context)
     insitu_destroy(&session);
 }
 
+/* A team waits at each region's end for a thread that has lost its core, so there are few. Nothing else is new than the
+ * values: their ranges are refitted (on small trees by one thread), cells are binned, tiles are traced. */
+static void a_step_opens_few_regions(void **context)
+{
+    (void)context;
+    static const char *const layers[2] = {"isosurface: {field: f, values: [0.1]}", "volume: {field: f}"};
+    for (int i = 0; i < 2; i++) {
+        char text[512];
+        snprintf(text, sizeof text,
+                 "threads: 2\nimages:\n  - {name: a, size: [120, 90], layers: [%s], outputs: [{path: a.png}]}\n",
+                 layers[i]);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+        everywhere(hand_over(session, &input) == INSITU_OK);
+        for (int cycle = 0; cycle < 6; cycle++) {
+            const int64_t before = region_count();
+            everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
+            step_is_good(session, cycle);
+            const int64_t regions = region_count() - before;
+            everywhere(cycle < 4 || (regions > 0 && regions <= (rank_count == 1 ? 3 : 6)));
+        }
+        insitu_destroy(&session);
+    }
+}
+
 static void smaller_teams_draw_the_same(void **context)
 {
     (void)context;
@@ -335,6 +360,7 @@ static int run(void)
         cmocka_unit_test_setup(threads_that_cannot_be_started_are_done_without, begin_test),
         cmocka_unit_test_setup(an_edit_of_the_scene_starts_no_more_than_can_be, begin_test),
         cmocka_unit_test_setup(threads_that_ended_are_tried_again, begin_test),
+        cmocka_unit_test_setup(a_step_opens_few_regions, begin_test),
         cmocka_unit_test_setup(smaller_teams_draw_the_same, begin_test),
         cmocka_unit_test_setup(teams_of_any_size_are_the_callers_own_affair, begin_test),
         cmocka_unit_test_setup(a_parallel_region_of_the_caller_gets_one_thread, begin_test),

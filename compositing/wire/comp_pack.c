@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 
 /* Bytes of a fragment, from which the room for a message is first guessed. In most pictures fragments take fewer. */
 enum { EXPECTED_BYTES = 16 };
@@ -94,6 +95,7 @@ static bool pack_all(const cargo *c, const comp_route *route, int place, comp_me
     bool is_well = true;
 #pragma omp parallel num_threads(threads) reduction(&& : is_well)
     {
+        region_enter();
         comp_layers *const layers = base_calloc(1, sizeof *layers);
         is_well = layers != NULL;
 #pragma omp for schedule(dynamic, 1)
@@ -109,6 +111,7 @@ static bool pack_all(const cargo *c, const comp_route *route, int place, comp_me
         }
         if (layers) comp_layers_free(layers);
         base_free(layers);
+        region_leave();
     }
     return is_well;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 
 enum { LONGEST_SORTED = 64, LEAST_PART = 1 << 14, MOST_PARTS = 256 };
 
@@ -93,9 +94,14 @@ insitu_status comp_strips_make(const comp_grid *grid, const fragment_list *list,
         return base_fail(error, INSITU_ERROR_MEMORY,
                          "compositing: %lld fragments of one rank are more than can be composited",
                          (long long)list->count);
-#pragma omp parallel for num_threads(count) schedule(static, 1)
-    for (int k = 0; k < count; k++)
-        find_ranges(grid, list->items, list->count * k / count, list->count * (k + 1) / count, &parts[k]);
+#pragma omp parallel num_threads(count)
+    {
+        region_enter();
+#pragma omp for schedule(static, 1) nowait
+        for (int k = 0; k < count; k++)
+            find_ranges(grid, list->items, list->count * k / count, list->count * (k + 1) / count, &parts[k]);
+        region_leave();
+    }
     const insitu_status status = gather_parts(parts, count, &made);
     for (int k = 0; k < count; k++) base_free(parts[k].ranges);
     if (!status) {

@@ -147,9 +147,7 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
                                    changes->are_threads_lacking || changes->of_scene, guard, &s->report, error);
     if (status) return status;
-    status = draw_due_images(s, changes, &moment, error);
-    session_guard_end_team(s->team.threads);
-    return status;
+    return draw_due_images(s, changes, &moment, error);
 }
 
 /* Pictures of earlier steps that could not be written are told where this step has nothing else to tell. Collective. */

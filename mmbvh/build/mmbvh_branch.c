@@ -10,6 +10,8 @@
  * Chunks depend on the number of items alone, so the tree does not depend on the threads that run them. */
 #include "mmbvh_branch.h"
 
+#include "region.h"
+
 #include <omp.h>
 
 enum {
@@ -216,8 +218,12 @@ topology *branch_build(const branch_builder *builder, const item_set *set, const
     if (!root) return NULL;
     const branch_node node = {*set, *grid, 1};
 #pragma omp parallel num_threads(builder->build->threads)
+    {
+        region_enter();
 #pragma omp single
-    grow(builder, root, node);
+        grow(builder, root, node);
+        region_leave();
+    }
     if (!atomic_load(&builder->build->failed)) return root;
     topology_free(root);
     return NULL;

@@ -13,6 +13,7 @@
 #include "mmbvh_cost.h"
 #include "mmbvh_morton.h"
 #include "mmbvh_store.h"
+#include "region.h"
 
 enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 
@@ -57,12 +58,17 @@ static uint32_t listed_cell(const build *b, int64_t i)
 static void count_cells(build *b)
 {
     b->starts[0] = 0;
-#pragma omp parallel for num_threads(b->threads)
-    for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) {
-        const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
-        int64_t count = end - begin;
-        for (int64_t cell = begin; may_leave_out(b) && cell < end; cell++) count -= is_left_out(b, cell);
-        b->starts[chunk + 1] = count;
+#pragma omp parallel num_threads(b->threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) {
+            const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
+            int64_t count = end - begin;
+            for (int64_t cell = begin; may_leave_out(b) && cell < end; cell++) count -= is_left_out(b, cell);
+            b->starts[chunk + 1] = count;
+        }
+        region_leave();
     }
     for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) b->starts[chunk + 1] += b->starts[chunk];
     b->count = b->starts[FILL_CHUNKS];
@@ -101,6 +107,7 @@ static void fill(build *b, const fetch_box *box)
     if (b->coder) morton_coder_init(b->coder, box->lower, box->upper, b->source.box_count);
 #pragma omp parallel num_threads(b->threads)
     {
+        region_enter();
         item_set set = item_set_empty();
         fetch_box exact;
         fetch_box_empty(&exact);
@@ -117,6 +124,7 @@ static void fill(build *b, const fetch_box *box)
             item_set_merge(&b->set, &set);
             fetch_box_unite(&b->exact, &exact);
         }
+        region_leave();
     }
 }
 
@@ -180,9 +188,14 @@ static bool list_cells(build *b)
     if (!cells) return false;
     b->tree.cell_count = b->count;
     const uint64_t mask = b->coder ? (UINT64_C(1) << b->coder->index_bits) - 1 : 0;
-#pragma omp parallel for num_threads(b->threads) schedule(dynamic, LIST_CELLS)
-    for (int64_t i = 0; i < b->count; i++) {
-        cells[i] = b->coder ? (uint32_t)(b->keys[i] & mask) : item_index(b->items[i]);
+#pragma omp parallel num_threads(b->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic, LIST_CELLS) nowait
+        for (int64_t i = 0; i < b->count; i++) {
+            cells[i] = b->coder ? (uint32_t)(b->keys[i] & mask) : item_index(b->items[i]);
+        }
+        region_leave();
     }
     return true;
 }

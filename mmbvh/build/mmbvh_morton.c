@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 
 enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
@@ -189,12 +190,17 @@ static inline int digit_of(uint64_t key, int shift)
 
 static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, int shift)
 {
-#pragma omp parallel for num_threads(s->threads) schedule(dynamic)
-    for (int chunk = 0; chunk < s->chunks; chunk++) {
-        int64_t *of = s->counts->of[chunk];
-        memset(of, 0, sizeof s->counts->of[chunk]);
-        const int64_t end = count * (chunk + 1) / s->chunks;
-        for (int64_t i = count * chunk / s->chunks; i < end; i++) of[digit_of(keys[i], shift)]++;
+#pragma omp parallel num_threads(s->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic) nowait
+        for (int chunk = 0; chunk < s->chunks; chunk++) {
+            int64_t *of = s->counts->of[chunk];
+            memset(of, 0, sizeof s->counts->of[chunk]);
+            const int64_t end = count * (chunk + 1) / s->chunks;
+            for (int64_t i = count * chunk / s->chunks; i < end; i++) of[digit_of(keys[i], shift)]++;
+        }
+        region_leave();
     }
 }
 
@@ -215,11 +221,16 @@ static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
 
 static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, int64_t count, int shift)
 {
-#pragma omp parallel for num_threads(s->threads) schedule(dynamic)
-    for (int chunk = 0; chunk < s->chunks; chunk++) {
-        int64_t *places = s->counts->of[chunk];
-        const int64_t end = count * (chunk + 1) / s->chunks;
-        for (int64_t i = count * chunk / s->chunks; i < end; i++) to[places[digit_of(from[i], shift)]++] = from[i];
+#pragma omp parallel num_threads(s->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic) nowait
+        for (int chunk = 0; chunk < s->chunks; chunk++) {
+            int64_t *places = s->counts->of[chunk];
+            const int64_t end = count * (chunk + 1) / s->chunks;
+            for (int64_t i = count * chunk / s->chunks; i < end; i++) to[places[digit_of(from[i], shift)]++] = from[i];
+        }
+        region_leave();
     }
 }
 
@@ -270,10 +281,15 @@ static void sort_together(const sorting *s, uint64_t *from, uint64_t *other, int
     count_digits(s, from, count, shift);
     sum_digits(s, starts);
     move_digits(s, from, other, count, shift);
-#pragma omp parallel for num_threads(s->threads) schedule(dynamic, 8)
-    for (int digit = 0; digit < DIGITS; digit++) {
-        const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
-        if (size <= s->large) sort_alone(other + begin, from + begin, size, !to_other);
+#pragma omp parallel num_threads(s->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic, 8) nowait
+        for (int digit = 0; digit < DIGITS; digit++) {
+            const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
+            if (size <= s->large) sort_alone(other + begin, from + begin, size, !to_other);
+        }
+        region_leave();
     }
     for (int digit = 0; digit < DIGITS; digit++) {
         const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
@@ -352,8 +368,12 @@ topology *morton_build(topology_build *build, const uint64_t *keys, int64_t coun
     topology *root = topology_new(build, 0, count);
     if (!root) return NULL;
 #pragma omp parallel num_threads(build->threads)
+    {
+        region_enter();
 #pragma omp single
-    grow(build, root, keys);
+        grow(build, root, keys);
+        region_leave();
+    }
     if (!atomic_load(&build->failed)) return root;
     topology_free(root);
     return NULL;

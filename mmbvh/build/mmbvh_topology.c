@@ -4,6 +4,7 @@
 
 #include "memory.h"
 #include "mmbvh_store.h"
+#include "region.h"
 
 bool topology_begin(topology_build *build, int64_t cells, int threads)
 {
@@ -91,8 +92,12 @@ static int64_t write(topology *t, const mmbvh *tree, int64_t slot, int64_t below
 void topology_write(topology *t, const mmbvh *tree, int threads)
 {
 #pragma omp parallel num_threads(threads)
+    {
+        region_enter();
 #pragma omp single
-    write(t, tree, 0, 1);
+        write(t, tree, 0, 1);
+        region_leave();
+    }
 }
 
 void topology_free(topology *t)

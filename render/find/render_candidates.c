@@ -15,6 +15,7 @@
 
 #include "memory.h"
 #include "mmbvh.h"
+#include "region.h"
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
@@ -273,11 +274,14 @@ static void run(search *s, kernel_thread *thread_of, int threads)
     bool is_full = false;
 #pragma omp parallel num_threads(threads)
     {
+        region_enter();
         const int me = omp_get_thread_num();
         kernel_candidate_list *list = &s->lists[me];
-#pragma omp for schedule(dynamic, 1)
-        for (int64_t i = 0; i < s->subtrees.count; i++)
+#pragma omp for schedule(dynamic, 1) nowait
+        for (int64_t i = 0; i < s->subtrees.count; i++) {
+            list->is_full = list->is_full || !render_thread_begin(kernels, &thread_of[me]);
             if (!list->is_full) kernels->find_candidates(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
+        }
         if (list->chunk) list->chunk->count = list->count;
 #pragma omp barrier
 #pragma omp single
@@ -289,6 +293,7 @@ static void run(search *s, kernel_thread *thread_of, int threads)
         }
         for (const kernel_candidate_chunk *c = s->candidates ? list->chunk : NULL; c; c = c->before)
             bin_tiles(c, across, s->counts + me * tiles, s->candidates);
+        region_leave();
     }
 }
 

@@ -7,6 +7,7 @@
 
 #include "memory.h"
 #include "mmbvh.h"
+#include "region.h"
 
 enum { MOST_LANES = 16 };
 
@@ -210,8 +211,13 @@ static insitu_status build_boxes(const occluder_pieces *of, int threads, mmbvh *
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the boxes of %lld pieces of surfaces",
                            (long long)of->count);
     } else {
-#pragma omp parallel for num_threads(threads) schedule(static)
-        for (int64_t i = 0; i < of->count; i++) box_of(of, i, lower + 3 * i, upper + 3 * i);
+#pragma omp parallel num_threads(threads)
+        {
+            region_enter();
+#pragma omp for schedule(static) nowait
+            for (int64_t i = 0; i < of->count; i++) box_of(of, i, lower + 3 * i, upper + 3 * i);
+            region_leave();
+        }
         status = mmbvh_build_boxes(lower, upper, ranges, of->count, &options, out, error);
     }
     base_free(lower);

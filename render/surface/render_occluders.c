@@ -17,6 +17,7 @@
 #include "kernel_interest.h"
 #include "memory.h"
 #include "mmbvh.h"
+#include "region.h"
 #include "render_occluder_tree.h"
 #include "render_subtrees.h"
 
@@ -406,6 +407,7 @@ static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees,
     bool is_well = true;
 #pragma omp parallel num_threads(threads) reduction(&& : is_well)
     {
+        region_enter();
         finds own = {0};
         subject s = {.into = &own, .frame = frame};
 #pragma omp for schedule(dynamic, 1) nowait
@@ -415,6 +417,7 @@ static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees,
         base_free(s.places.items);
         base_free(s.values.items);
         free_finds(&own);
+        region_leave();
     }
     return is_well;
 }

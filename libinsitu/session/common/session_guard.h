@@ -16,12 +16,9 @@ void session_guard_begin(session_guard *guard);
 /* Give it back, exception flags too. */
 void session_guard_end(const session_guard *guard);
 
-/* Gives the default environment to the other threads of teams of this size. Call it between the two calls above.
- * Threads that OpenMP starts for it begin under the caller's own environment, as if the caller had needed them first.
- */
-void session_guard_begin_team(const session_guard *guard, int threads);
-
-/* Gives each thread that was there at the begin its environment back. */
-void session_guard_end_team(int threads);
+/* Gives the calling thread its environment back for the region that OpenMP starts threads in: they begin under the
+ * caller's own environment, as if the caller had needed them first. Call both between the two calls above. */
+void session_guard_lend(const session_guard *guard);
+void session_guard_return(void);
 
 #endif

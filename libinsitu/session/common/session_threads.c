@@ -20,6 +20,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 
 enum {
@@ -206,17 +207,25 @@ static int64_t least_worker_stack(int threads)
 {
     int64_t least = INT64_MAX;
 #pragma omp parallel num_threads(threads) reduction(min : least)
-    if (omp_get_thread_num() > 0) {
-        least = stack_left();
-        if (has_key) pthread_setspecific(key, &key);
+    {
+        region_enter();
+        if (omp_get_thread_num() > 0) {
+            least = stack_left();
+            if (has_key) pthread_setspecific(key, &key);
+        }
+        region_leave();
     }
     return least;
 }
 
 /* An error where a stack is too small. In the first parallel region. Collective. */
-static insitu_status check_stacks(session_threads *threads, const session_team *team, base_error *error)
+static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
+                                  base_error *error)
 {
-    const int64_t own = stack_left(), least = least_worker_stack(team->threads);
+    const int64_t own = stack_left();
+    session_guard_lend(guard);
+    const int64_t least = least_worker_stack(team->threads);
+    session_guard_return();
     if (own < SESSION_CALLER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB (ulimit -s)",
@@ -237,8 +246,5 @@ insitu_status session_begin_threads(session_threads *threads, session_team *team
     insitu_status status = is_new ? try_threads(threads, wanted, team->comm, error) : INSITU_OK;
     if (status) return status;
     team->threads = choose_threads(threads, asked, wanted, report);
-    session_guard_begin_team(guard, team->threads);
-    if (is_new) status = check_stacks(threads, team, error);
-    if (status) session_guard_end_team(team->threads);
-    return status;
+    return is_new ? check_stacks(threads, team, guard, error) : INSITU_OK;
 }

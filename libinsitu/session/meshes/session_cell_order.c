@@ -3,6 +3,8 @@
  * both orders, as tets, are not copied. */
 #include "session_cell_order.h"
 
+#include "region.h"
+
 const signed char *session_vertex_turn(insitu_vertex_order order, int type)
 {
     static const signed char lexicographic[GRID_MAX_CELL_VERTICES] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -60,11 +62,16 @@ static cell_rows rows_of(const session_mesh *mesh)
 static bool fit_narrow(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
-    for (int64_t i = 0; i < rows->count; i++) {
-        const int64_t entry = entry_of(rows, i);
-        least = entry < least ? entry : least;
-        most = entry > most ? entry : most;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
+        for (int64_t i = 0; i < rows->count; i++) {
+            const int64_t entry = entry_of(rows, i);
+            least = entry < least ? entry : least;
+            most = entry > most ? entry : most;
+        }
+        region_leave();
     }
     return least >= INT32_MIN && most <= INT32_MAX;
 }
@@ -90,8 +97,13 @@ static void turn_cell(const session_mesh *mesh, int64_t cell, int64_t entries, c
 
 void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
 {
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) turn_cell(mesh, cell, entries, out);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) turn_cell(mesh, cell, entries, out);
+        region_leave();
+    }
 }
 
 insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error)
@@ -102,8 +114,13 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
     const int64_t largest = fit_narrow(&rows, threads) ? 0 : INT64_MAX;
     if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
         return error->status;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, entry_of(&rows, i));
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, entry_of(&rows, i));
+        region_leave();
+    }
     session_turn_cells(mesh, rows.count, threads, &t->connectivity);
     t->has_own_order = true;
     t->connectivity_count = rows.count;

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_tally.h"
 #include "session_topology.h"
@@ -381,6 +382,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
     int64_t first_bad = count;
 #pragma omp parallel num_threads(threads) reduction(min : first_bad)
     {
+        region_enter();
         mesh_tally mine = tally_empty();
         face_room room = {0};
 #pragma omp for schedule(static)
@@ -395,6 +397,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         free_room(&room);
 #pragma omp critical(session_check_tally)
         tally_merge(tally, &mine);
+        region_leave();
     }
     return first_bad;
 }
@@ -447,10 +450,16 @@ static bool is_far(const mesh_tally *tally)
 static void find_flat(const grid *g, int threads, uint64_t *flat)
 {
     const int64_t words = (g->cell_count + 63) / 64;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t word = 0; word < words; word++) {
-        const int64_t first = 64 * word, end = first + 64 < g->cell_count ? first + 64 : g->cell_count;
-        for (int64_t cell = first; cell < end; cell++) flat[word] |= (uint64_t)tally_is_flat(g, cell) << (cell - first);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t word = 0; word < words; word++) {
+            const int64_t first = 64 * word, end = first + 64 < g->cell_count ? first + 64 : g->cell_count;
+            for (int64_t cell = first; cell < end; cell++)
+                flat[word] |= (uint64_t)tally_is_flat(g, cell) << (cell - first);
+        }
+        region_leave();
     }
 }
 

@@ -24,6 +24,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_cell_order.h"
 #include "session_tally.h"
 
@@ -425,6 +426,7 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
     const int64_t count = mesh->cells.cell_count;
 #pragma omp parallel num_threads(threads)
     {
+        region_enter();
         recognition mine = {.types = r->types};
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < count; cell++) recognise_cell(mesh, cell, &mine);
@@ -436,6 +438,7 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
             for (int type = 0; type < TYPES; type++) r->of_type[type] += mine.of_type[type];
             r->entries += mine.entries;
         }
+        region_leave();
     }
 }
 
@@ -486,9 +489,14 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
         return error->status;
     }
     if (!type) put_offsets(mesh, r, &offsets);
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t cell = 0; cell < count; cell++)
-        put_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell), &connectivity);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t cell = 0; cell < count; cell++)
+            put_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell), &connectivity);
+        region_leave();
+    }
     session_drop_array(&t->offsets);
     session_drop_array(&t->connectivity);
     t->has_own_cells = true;

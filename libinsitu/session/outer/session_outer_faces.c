@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_cell_faces.h"
 #include "session_neighbours.h"
@@ -77,29 +78,39 @@ static bool has_faces(const face_search *s, int64_t cell)
 static void hash_vertices(face_search *s, bool by_id)
 {
     const int64_t count = s->mesh->cells.vertex_count;
-#pragma omp parallel for num_threads(s->threads) schedule(static)
-    for (int64_t v = 0; v < count; v++) {
-        const session_key key = session_vertex_key(s->mesh, v, by_id);
-        s->hashes[v] = session_key_hash(&key);
+#pragma omp parallel num_threads(s->threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < count; v++) {
+            const session_key key = session_vertex_key(s->mesh, v, by_id);
+            s->hashes[v] = session_key_hash(&key);
+        }
+        region_leave();
     }
 }
 
 static void cancel_faces(face_search *s)
 {
     const grid *g = &s->mesh->cells;
-#pragma omp parallel for num_threads(s->threads) schedule(static)
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (!has_faces(s, cell)) continue;
-        const session_cell_faces faces = session_faces_of_cell(g, cell);
-        for (int64_t f = 0; f < faces.count; f++) {
-            const session_face_loop loop = session_face_of(&faces, f);
-            session_key key;
-            if (!make_key(s, &loop, &key)) continue;
-            const uint64_t hash = session_key_hash(&key);
-            uint64_t *slot = &s->slots[hash & s->mask];
+#pragma omp parallel num_threads(s->threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t cell = 0; cell < g->cell_count; cell++) {
+            if (!has_faces(s, cell)) continue;
+            const session_cell_faces faces = session_faces_of_cell(g, cell);
+            for (int64_t f = 0; f < faces.count; f++) {
+                const session_face_loop loop = session_face_of(&faces, f);
+                session_key key;
+                if (!make_key(s, &loop, &key)) continue;
+                const uint64_t hash = session_key_hash(&key);
+                uint64_t *slot = &s->slots[hash & s->mask];
 #pragma omp atomic
-            *slot ^= hash;
+                *slot ^= hash;
+            }
         }
+        region_leave();
     }
 }
 
@@ -127,8 +138,13 @@ static bool collect_faces(face_search *s)
 {
     const int64_t cells = s->mesh->cells.cell_count;
     int64_t count = 0;
-#pragma omp parallel for num_threads(s->threads) schedule(static) reduction(+ : count)
-    for (int64_t cell = 0; cell < cells; cell++) count += take_faces(s, cell, NULL, NULL);
+#pragma omp parallel num_threads(s->threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(+ : count) nowait
+        for (int64_t cell = 0; cell < cells; cell++) count += take_faces(s, cell, NULL, NULL);
+        region_leave();
+    }
     s->faces = base_alloc((size_t)count * sizeof *s->faces);
     s->keys = base_alloc((size_t)count * sizeof *s->keys);
     if (!s->faces || !s->keys) return false;

@@ -2,6 +2,7 @@
 
 #include "memory.h"
 #include "mmbvh_fetch.h"
+#include "region.h"
 #include "session_scalars.h"
 
 static session_threshold resolve(const session_mesh *mesh, const scene_threshold *in)
@@ -94,12 +95,17 @@ unsigned char *session_hidden_cells(const session_mesh *mesh, const session_thre
     unsigned char *is_hidden = base_alloc((size_t)(count ? count : 1));
     if (!is_hidden) return NULL;
     const grid_field field = scalar ? session_scalar_field(mesh, scalar) : (grid_field){0};
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t cell = 0; cell < count; cell++) {
-        is_hidden[cell] = true;
-        if (!scalar) continue;
-        const fetch_range of_cell = fetch_any_cell_range(&mesh->cells, &field, cell);
-        is_hidden[cell] = !of_cell.is_finite || of_cell.low < threshold->low || of_cell.high > threshold->high;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t cell = 0; cell < count; cell++) {
+            is_hidden[cell] = true;
+            if (!scalar) continue;
+            const fetch_range of_cell = fetch_any_cell_range(&mesh->cells, &field, cell);
+            is_hidden[cell] = !of_cell.is_finite || of_cell.low < threshold->low || of_cell.high > threshold->high;
+        }
+        region_leave();
     }
     return is_hidden;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 
 bool session_wants_channels(const scene_image *image)
@@ -96,17 +97,22 @@ static void name_surfaces(const scene_image *image, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image);
     const int64_t pixels = (int64_t)image->width * image->height;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t p = 0; p < pixels; p++) {
-        float *pixel = values + 4 * p;
-        const int number = (int)pixel[1];
-        if (pixel[3] > 0 && number >= 0 && number < numbers.count) {
-            pixel[1] = numbers.layer[number];
-            pixel[2] = numbers.surface[number];
-        } else {
-            pixel[0] = NAN;
-            pixel[1] = pixel[2] = -1;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t p = 0; p < pixels; p++) {
+            float *pixel = values + 4 * p;
+            const int number = (int)pixel[1];
+            if (pixel[3] > 0 && number >= 0 && number < numbers.count) {
+                pixel[1] = numbers.layer[number];
+                pixel[2] = numbers.surface[number];
+            } else {
+                pixel[0] = NAN;
+                pixel[1] = pixel[2] = -1;
+            }
         }
+        region_leave();
     }
 }
 

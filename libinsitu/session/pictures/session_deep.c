@@ -1,6 +1,7 @@
 #include "session_deep.h"
 
 #include "memory.h"
+#include "region.h"
 
 bool session_wants_deep(const scene_image *image)
 {
@@ -26,10 +27,16 @@ static float depth_of(float t, const render_space *space)
 
 void session_finish_deep(deep_image *deep, const render_space *space, int threads)
 {
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < deep->count; i++) {
-        deep->samples[i].z = depth_of(deep->samples[i].z, space);
-        deep->samples[i].z_back = depth_of(deep->samples[i].z_back, space);
+    if (!deep->count) return;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < deep->count; i++) {
+            deep->samples[i].z = depth_of(deep->samples[i].z, space);
+            deep->samples[i].z_back = depth_of(deep->samples[i].z_back, space);
+        }
+        region_leave();
     }
 }
 

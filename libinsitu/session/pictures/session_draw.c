@@ -8,6 +8,7 @@
 
 #include "comp_edges.h"
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_channels.h"
 #include "session_decorations.h"
@@ -88,8 +89,13 @@ static void canvas_add(canvas *c, int threads)
 {
     if (!c->sum) return;
     const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
+        region_leave();
+    }
 }
 
 /* Room for the pixels of the set and the frames that they are in. False: no memory. */
@@ -107,32 +113,54 @@ static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
 
 static void canvas_add_edges(canvas *c, int threads)
 {
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < c->edge_count; i++)
-        for (int k = 0; k < 4; k++) c->edge_sums[4 * i + k] += (double)c->samples.rgba[4 * c->edges[i] + k];
+    if (!c->edge_count) return;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < c->edge_count; i++)
+            for (int k = 0; k < 4; k++) c->edge_sums[4 * i + k] += (double)c->samples.rgba[4 * c->edges[i] + k];
+        region_leave();
+    }
 }
 
 static void average_edges(canvas *c, int frames, int threads)
 {
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < c->edge_count; i++)
-        for (int k = 0; k < 4; k++) c->frame.rgba[4 * c->edges[i] + k] = (float)(c->edge_sums[4 * i + k] / frames);
+    if (!c->edge_count) return;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < c->edge_count; i++)
+            for (int k = 0; k < 4; k++) c->frame.rgba[4 * c->edges[i] + k] = (float)(c->edge_sums[4 * i + k] / frames);
+        region_leave();
+    }
 }
 
 static void average_frames(canvas *c, int frames, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < count; i++) c->frame.rgba[i] = (float)(c->sum[i] / frames);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < count; i++) c->frame.rgba[i] = (float)(c->sum[i] / frames);
+        region_leave();
+    }
 }
 
 /* Turns depths from the rays' t into distances along the camera's axis. Infinity stays. */
 static void scale_depths(canvas *c, const render_space *space, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < count; i++)
-        c->frame.depth[i] = (float)((double)c->frame.depth[i] / space->scale + space->depth_origin);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t i = 0; i < count; i++)
+            c->frame.depth[i] = (float)((double)c->frame.depth[i] / space->scale + space->depth_origin);
+        region_leave();
+    }
 }
 
 static void canvas_finish(canvas *c, int frames, const render_space *space, int threads)

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "mmbvh_fetch.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_distances.h"
 #include "session_scalars.h"
@@ -80,15 +81,20 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
     const grid_field field = session_scalar_field(mesh, scalar);
     const uint32_t known = known_of(of->pass), mask = ~known;
     const int shift = shift_of(of->pass);
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : counts[:2 * DIGITS])
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (!grid_is_seen(g, cell)) continue;
-        const fetch_range range = fetch_any_cell_range(g, &field, cell);
-        const float middle = (float)(0.5 * range.low + 0.5 * range.high);
-        if (!range.is_finite || !isfinite(middle) || (of->is_positive && !(middle > 0))) continue;
-        const uint32_t order = order_of(middle);
-        for (int end = 0; end < 2; end++)
-            if ((order & known) == of->found[end]) counts[end * DIGITS + (int)((order & mask) >> shift)]++;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(+ : counts[:2 * DIGITS]) nowait
+        for (int64_t cell = 0; cell < g->cell_count; cell++) {
+            if (!grid_is_seen(g, cell)) continue;
+            const fetch_range range = fetch_any_cell_range(g, &field, cell);
+            const float middle = (float)(0.5 * range.low + 0.5 * range.high);
+            if (!range.is_finite || !isfinite(middle) || (of->is_positive && !(middle > 0))) continue;
+            const uint32_t order = order_of(middle);
+            for (int end = 0; end < 2; end++)
+                if ((order & known) == of->found[end]) counts[end * DIGITS + (int)((order & mask) >> shift)]++;
+        }
+        region_leave();
     }
 }
 

@@ -19,6 +19,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_exchange.h"
 #include "session_neighbours.h"
@@ -93,9 +94,14 @@ static double mean_of(double *values, int64_t count)
 
 static void groups_average(value_groups *groups, int threads)
 {
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t g = 0; g < groups->count; g++)
-        groups->means[g] = mean_of(groups->values + groups->starts[g], groups->starts[g + 1] - groups->starts[g]);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t g = 0; g < groups->count; g++)
+            groups->means[g] = mean_of(groups->values + groups->starts[g], groups->starts[g + 1] - groups->starts[g]);
+        region_leave();
+    }
 }
 
 /* ---- this rank's part ---------------------------------------------------------------------------------------- */
@@ -413,10 +419,16 @@ static session_scalar *scalar_of(const session_mesh *mesh, const session_recentr
  * value is checked elsewhere (grid_field.own). */
 static void spread_means(const vertex_groups *groups, const grid_field *own, int64_t count, double *values, int threads)
 {
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t v = 0; v < count; v++) {
-        const bool is_lost = groups->of_vertex[v] < 0 || (!own->is_cell_centred && !isfinite(grid_field_value(own, v)));
-        values[v] = is_lost ? NAN : groups->values.means[groups->of_vertex[v]];
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < count; v++) {
+            const bool is_lost =
+                groups->of_vertex[v] < 0 || (!own->is_cell_centred && !isfinite(grid_field_value(own, v)));
+            values[v] = is_lost ? NAN : groups->values.means[groups->of_vertex[v]];
+        }
+        region_leave();
     }
 }
 

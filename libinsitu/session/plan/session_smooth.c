@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "render.h"
 #include "session_agree.h"
 #include "session_exchange.h"
@@ -254,12 +255,17 @@ static bool find_entries(smooth_work *work, bool by_id, int threads)
 {
     key_filter filter;
     if (!filter_create(&work->keys, &filter)) return false;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t v = 0; v < work->mesh->cells.vertex_count; v++) {
-        const session_key key = session_vertex_key(work->mesh, v, by_id);
-        const uint64_t bit = session_key_hash(&key) >> 32 & filter.mask;
-        const bool may_be = filter.bits[bit / 64] >> bit % 64 & 1;
-        work->entries[v] = may_be ? (int32_t)session_keys_find(&work->keys, &key) : -1;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < work->mesh->cells.vertex_count; v++) {
+            const session_key key = session_vertex_key(work->mesh, v, by_id);
+            const uint64_t bit = session_key_hash(&key) >> 32 & filter.mask;
+            const bool may_be = filter.bits[bit / 64] >> bit % 64 & 1;
+            work->entries[v] = may_be ? (int32_t)session_keys_find(&work->keys, &key) : -1;
+        }
+        region_leave();
     }
     base_free(filter.bits);
     return true;

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "region.h"
 #include "session_scalars.h"
 
 enum { BLOCK_VALUES = 1 << 14, LANES = 4 };
@@ -42,14 +43,19 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
 {
     const int64_t size = a->is_wide ? 8 : 4, blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
     uint64_t sum = 0;
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : sum)
-    for (int64_t block = 0; block < blocks; block++) {
-        const int64_t first = block * BLOCK_VALUES;
-        const int64_t values = count - first < BLOCK_VALUES ? count - first : BLOCK_VALUES;
-        const char *data = a->data + first * a->stride;
-        const uint64_t own =
-            a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
-        sum += mix(own, (uint64_t)block); /* a sum, so that the order of the blocks does not matter */
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(+ : sum) nowait
+        for (int64_t block = 0; block < blocks; block++) {
+            const int64_t first = block * BLOCK_VALUES;
+            const int64_t values = count - first < BLOCK_VALUES ? count - first : BLOCK_VALUES;
+            const char *data = a->data + first * a->stride;
+            const uint64_t own =
+                a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
+            sum += mix(own, (uint64_t)block); /* a sum, so that the order of the blocks does not matter */
+        }
+        region_leave();
     }
     return sum;
 }

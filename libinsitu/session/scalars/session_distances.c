@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_scalars.h"
 
@@ -87,11 +88,16 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 static void compute(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
 {
     const double *n = plane->normal, *p = plane->point;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t v = 0; v < mesh->cells.vertex_count; v++) {
-        double at[3];
-        grid_vertex(&mesh->cells, v, at);
-        out[v] = (float)(n[0] * (at[0] - p[0]) + n[1] * (at[1] - p[1]) + n[2] * (at[2] - p[2]));
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < mesh->cells.vertex_count; v++) {
+            double at[3];
+            grid_vertex(&mesh->cells, v, at);
+            out[v] = (float)(n[0] * (at[0] - p[0]) + n[1] * (at[1] - p[1]) + n[2] * (at[2] - p[2]));
+        }
+        region_leave();
     }
 }
 

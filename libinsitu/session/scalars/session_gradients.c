@@ -18,6 +18,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 
 enum { HIGH_BITS = 43 };
 #define LOW_UNIT 0x1p44 /* of low words, in a high one's last bit */
@@ -264,23 +265,33 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
     uint64_t *bits = base_calloc((size_t)blocks * (BLOCK / 64) + 1, sizeof *bits);
     *out = (session_cell_list){0};
     if (!starts || !bits) goto done;
-#pragma omp parallel for num_threads(basis->threads) schedule(dynamic)
-    for (int64_t b = 0; b < blocks; b++)
-        for (int64_t cell = b * BLOCK; cell < (b + 1) * BLOCK && cell < cells; cell++)
-            if (has_entry(basis, cell)) {
-                bits[cell / 64] |= (uint64_t)1 << cell % 64;
-                starts[b + 1]++;
-            }
+#pragma omp parallel num_threads(basis->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic) nowait
+        for (int64_t b = 0; b < blocks; b++)
+            for (int64_t cell = b * BLOCK; cell < (b + 1) * BLOCK && cell < cells; cell++)
+                if (has_entry(basis, cell)) {
+                    bits[cell / 64] |= (uint64_t)1 << cell % 64;
+                    starts[b + 1]++;
+                }
+        region_leave();
+    }
     for (int64_t b = 0; b < blocks; b++) starts[b + 1] += starts[b];
     out->cells = base_alloc((size_t)(starts[blocks] ? starts[blocks] : 1) * sizeof *out->cells);
     if (!out->cells) goto done;
     out->count = starts[blocks];
-#pragma omp parallel for num_threads(basis->threads) schedule(dynamic)
-    for (int64_t b = 0; b < blocks; b++) {
-        int64_t at = starts[b];
-        for (int64_t word = b * (BLOCK / 64); word < (b + 1) * (BLOCK / 64); word++)
-            for (uint64_t left = bits[word]; left; left &= left - 1)
-                out->cells[at++] = word * 64 + __builtin_ctzll(left);
+#pragma omp parallel num_threads(basis->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic) nowait
+        for (int64_t b = 0; b < blocks; b++) {
+            int64_t at = starts[b];
+            for (int64_t word = b * (BLOCK / 64); word < (b + 1) * (BLOCK / 64); word++)
+                for (uint64_t left = bits[word]; left; left &= left - 1)
+                    out->cells[at++] = word * 64 + __builtin_ctzll(left);
+        }
+        region_leave();
     }
 done:
     base_free(starts);
@@ -297,6 +308,7 @@ static bool give_all(const session_gradient_basis *basis, const session_cell_lis
                                                            : of_gradients, of_weights) reduction(||                    \
                                                                                                  : is_out_of_memory)
     {
+        region_enter();
         target to = {basis, sums, 1 / basis->length, {unit[0], unit[1]}, {0, 0}};
         node_list nodes = {0};
 #pragma omp for schedule(static)
@@ -311,6 +323,7 @@ static bool give_all(const session_gradient_basis *basis, const session_cell_lis
         of_weights = to.largest[1];
         is_out_of_memory = nodes.is_out_of_memory;
         base_free(nodes.nodes);
+        region_leave();
     }
     largest[0] = of_gradients;
     largest[1] = of_weights;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_field_input.h"
 #include "session_scalars.h"
@@ -96,9 +97,14 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     if (!field->copy) field->copy = base_alloc((size_t)(bytes ? bytes : 1));
     if (!field->copy) return session_no_memory(error, bytes, "a field's values by their index");
     field->copy_bytes = bytes;
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : bad)
-    for (int64_t place = 0; place < v.places; place++)
-        if (!copy_tuple(&v, place, field->copy) && place < bad) bad = place;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : bad) nowait
+        for (int64_t place = 0; place < v.places; place++)
+            if (!copy_tuple(&v, place, field->copy) && place < bad) bad = place;
+        region_leave();
+    }
     if (bad < v.places) return describe_fault(mesh, field, &v, bad, error);
     field->is_copy_stale = false;
     return INSITU_OK;

@@ -4,6 +4,7 @@
 
 #include "memory.h"
 #include "mmbvh_fetch.h"
+#include "region.h"
 
 int session_resolve_component(const scene_field *field, int component_count)
 {
@@ -139,13 +140,18 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
                                     bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (has_shells ? !grid_is_seen(g, cell) : !grid_is_drawn(g, cell)) continue;
-        const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
-        if (!of_cell.is_finite) continue;
-        if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);
-        most = fmax(most, of_cell.high);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
+        for (int64_t cell = 0; cell < g->cell_count; cell++) {
+            if (has_shells ? !grid_is_seen(g, cell) : !grid_is_drawn(g, cell)) continue;
+            const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
+            if (!of_cell.is_finite) continue;
+            if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);
+            most = fmax(most, of_cell.high);
+        }
+        region_leave();
     }
     return (session_extremes){true, least, most};
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_cell_order.h"
 #include "session_field_input.h"
@@ -72,11 +73,16 @@ static bool copy_coordinates(const grid *shared, int threads, session_torn *torn
         if (!to) return false;
         torn->coordinates[axis] = (grid_array){to, (int64_t)size, from.is_wide, false, 0};
         torn->bytes += torn->corner_count * (int64_t)size;
-#pragma omp parallel for num_threads(threads) schedule(static)
-        for (int64_t corner = 0; corner < torn->corner_count; corner++) {
-            const int64_t vertex = session_torn_origin(torn, corner);
-            const bool is_vertex = vertex >= 0 && vertex < shared->vertex_count;
-            memcpy(to + corner * (int64_t)size, from.data + (is_vertex ? vertex : 0) * from.stride, size);
+#pragma omp parallel num_threads(threads)
+        {
+            region_enter();
+#pragma omp for schedule(static) nowait
+            for (int64_t corner = 0; corner < torn->corner_count; corner++) {
+                const int64_t vertex = session_torn_origin(torn, corner);
+                const bool is_vertex = vertex >= 0 && vertex < shared->vertex_count;
+                memcpy(to + corner * (int64_t)size, from.data + (is_vertex ? vertex : 0) * from.stride, size);
+            }
+            region_leave();
         }
     }
     return true;

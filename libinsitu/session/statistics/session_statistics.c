@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_scalars.h"
 #include "session_volume.h"
@@ -100,10 +101,15 @@ typedef struct statistics_pass {
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
 {
-#pragma omp parallel for num_threads(p->team->threads) schedule(static) reduction(+ : sums[:count])
-    for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-        const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
-        if (value.is_there) add_cell(b, &value, sums);
+#pragma omp parallel num_threads(p->team->threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
+        for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
+            const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
+            if (value.is_there) add_cell(b, &value, sums);
+        }
+        region_leave();
     }
 }
 
@@ -112,13 +118,18 @@ static void find_ends(const statistics_pass *p, double ends[3])
 {
     const int threads = p->team->threads;
     double least = ends[0], most = -ends[1], largest = -ends[2];
-#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most, largest)
-    for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-        const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
-        if (!value.is_there) continue;
-        least = fmin(least, value.least);
-        most = fmax(most, value.most);
-        largest = fmax(largest, value.volume);
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : least) reduction(max : most, largest) nowait
+        for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
+            const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
+            if (!value.is_there) continue;
+            least = fmin(least, value.least);
+            most = fmax(most, value.most);
+            largest = fmax(largest, value.volume);
+        }
+        region_leave();
     }
     ends[0] = least;
     ends[1] = -most;

@@ -1,0 +1,54 @@
+/* Floating-point traps and flushing to zero are settings of a thread, and a worker may have those of the simulation
+ * (session_guard.h). A worker so gets the default ones at the begin of each region, and its own back at the end, some
+ * 50 ns each. A thread that OpenMP starts for a region begins with those of the thread that opened it.
+ *
+ * If all cores are busy when a region begins, the scheduler may wake a worker on the core of the thread that opened it,
+ * and leaves it there for tens of milliseconds: two runnable threads on one core and one, of another process, on the
+ * other are balanced to it. The team then has the speed of one thread, or less. So a worker that finds itself there
+ * moves to another core that it may run on, and is free to be moved again at once. */
+#define _GNU_SOURCE 1
+#include "region.h"
+
+#include <fenv.h>
+#include <omp.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+
+static _Thread_local fenv_t environment;
+static atomic_int first_core = -1; /* of the thread that opened the last region; another session's does no harm */
+static atomic_llong regions;
+
+static void leave_core(int core)
+{
+    cpu_set_t own, others;
+    if (core < 0 || core >= CPU_SETSIZE || sched_getaffinity(0, sizeof own, &own)) return;
+    others = own;
+    CPU_CLR((size_t)core, &others);
+    if (CPU_COUNT(&others) == 0 || sched_setaffinity(0, sizeof others, &others)) return;
+    sched_setaffinity(0, sizeof own, &own);
+}
+
+void region_enter(void)
+{
+    const int core = sched_getcpu();
+    if (omp_get_num_threads() == 1) return;
+    if (omp_get_thread_num() == 0) {
+        atomic_store_explicit(&first_core, core, memory_order_relaxed);
+        atomic_fetch_add_explicit(&regions, 1, memory_order_relaxed);
+        return;
+    }
+    fegetenv(&environment);
+    fesetenv(FE_DFL_ENV);
+    if (core == atomic_load_explicit(&first_core, memory_order_relaxed)) leave_core(core);
+}
+
+void region_leave(void)
+{
+    if (omp_get_thread_num() > 0) fesetenv(&environment);
+}
+
+int64_t region_count(void)
+{
+    return (int64_t)atomic_load(&regions);
+}
