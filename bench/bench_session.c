@@ -20,7 +20,10 @@ static float *caught_depths;
 
 bool session_writes_behind;
 
-void session_load_image_library(void) {}
+double session_load_image_library(void)
+{
+    return 0;
+}
 
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)

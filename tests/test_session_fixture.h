@@ -5,6 +5,7 @@
 #ifndef TEST_SESSION_FIXTURE_H
 #define TEST_SESSION_FIXTURE_H
 
+#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -126,5 +127,14 @@ extern const char *unwritable;
 /* Pictures are written before a step is over, unless session_writes_behind (session_image.h) is set. Then the writing
  * thread first calls this, if it is not NULL. */
 extern void (*before_writing)(void);
+
+/* How often the image library was to be loaded, by which thread, and how long that is said to have taken. */
+typedef struct library_loading {
+    int count;
+    pthread_t by;
+    double ms;
+} library_loading;
+
+extern library_loading library_loaded;
 
 #endif

@@ -267,6 +267,26 @@ static void tables_follow_their_pictures(void **state)
     input_free(&in);
 }
 
+/* In insitu_create(), by the thread that calls it: beside a step it would hold the loader's lock, for which the start
+ * of OpenMP's threads waits. The next report has its time. */
+static void image_library_is_loaded_before_the_first_step(void **state)
+{
+    (void)state;
+    session_input in;
+    make_input(&in);
+    library_loaded = (library_loading){.ms = 1e6};
+    insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, NULL);
+    const int wanted = own_rank == 0;
+    everywhere(library_loaded.count == wanted && (!wanted || pthread_equal(library_loaded.by, pthread_self())));
+    everywhere(insitu_step(session, 0, 0.5) == INSITU_OK);
+    everywhere(insitu_last_report(session)->background_ms == wanted * 1e6);
+    everywhere(insitu_step(session, 1, 0.5) == INSITU_OK);
+    everywhere(insitu_last_report(session)->background_ms < 1e6 && library_loaded.count == wanted);
+    insitu_destroy(&session);
+    library_loaded = (library_loading){0};
+    input_free(&in);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -277,6 +297,7 @@ static int run(void)
         cmocka_unit_test(failure_waits_for_an_error_of_the_step),
         cmocka_unit_test(scene_is_kept_until_its_pictures_are_written),
         cmocka_unit_test(tables_follow_their_pictures),
+        cmocka_unit_test(image_library_is_loaded_before_the_first_step),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

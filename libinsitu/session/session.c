@@ -96,7 +96,8 @@ static insitu_status create(const session_team *team, const session_scene_source
     session_report_create(&session->report);
     status = session_load_scene(&session->scene_file, &session->team, source, error);
     if (status) goto fail;
-    if (team->rank == 0) session_writer_begin(&session->writer, &session->scene_file.scene);
+    if (team->rank == 0)
+        session->writer.loading_ms = session_writer_begin(&session->writer, &session->scene_file.scene);
     *out = session;
     return INSITU_OK;
 fail:

@@ -135,7 +135,7 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
 {
     s->report.numbers.time = changes->time;
     if (changes->of_scene) reload_scene(s);
-    if (s->team.rank == 0) session_writer_begin(&s->writer, &s->scene_file.scene);
+    if (s->team.rank == 0) s->report.numbers.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
     session_begin_cinema(&s->cinema, changes->cycle);
     insitu_status status = session_check_input(changes, &s->meshes, &s->team, error);
     const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};

@@ -270,9 +270,10 @@ typedef struct insitu_report {
     double composite_ms;    /* fragments exchanged, merged and gathered, waiting included; of a rank alone, its slowest
                                thread's time */
     double write_ms;        /* on rank 0: pictures written in the step, or given to the thread that writes them, with
-                               the wait for room there */
+                               the wait for room there; loading the image library, if a scene that was edited has the
+                               first pictures */
     double background_ms;   /* on rank 0: time that the writing thread took for pictures that it finished since the last
-                               step */
+                               step; in the first step also what insitu_create() took to load the image library */
     int pictures_waiting;   /* on rank 0: pictures that the writing thread had not yet written when the step ended */
     int turns;              /* in which pixels were drawn where cells or several volumes overlap; in each, all ranks
                                wait for each other. The same on every rank */

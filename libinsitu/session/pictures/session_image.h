@@ -12,8 +12,9 @@
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
 
-/* Load the library ahead of the first picture, whose write reports an error. Local. Thread-safe. */
-void session_load_image_library(void);
+/* Load the library ahead of the first picture, whose write reports an error. Returns the milliseconds that it took, 0
+ * where it was there. Local. Thread-safe. */
+double session_load_image_library(void);
 
 /* Whether pictures may be written by a thread of their own (session_writer.h). Tests that replace this file set it to
  * false. */

@@ -1,6 +1,11 @@
-/* Some library behind OpenImageIO makes threads and static objects when it is loaded. These are destroyed as the
+/* The image library is loaded by the caller's thread before the writing thread is there. Loading takes 0.1 s, or 1 s
+ * from a cold disk, and holds the loader's lock, which every start of a thread needs: a thread that loaded it beside
+ * the first step would have all ranks wait there.
+ *
+ * Some library behind OpenImageIO makes threads and static objects when it is loaded. These are destroyed as the
  * process exits, in the reverse of the order in which they were made. So the wait at exit is registered again once the
- * library is loaded, and comes before: no picture is written with half-destroyed objects. */
+ * library is loaded, and once the first pictures are written, which make more such objects, and comes before: no
+ * picture is written with half-destroyed objects. */
 #include "session_writer.h"
 
 #include <mpi.h>
@@ -26,7 +31,7 @@ static pid_t process; /* the process that has the threads; a fork has none */
 static void wait_for_thread(session_writer *w)
 {
     pthread_mutex_lock(&w->mutex);
-    while (w->first || w->is_loading) pthread_cond_wait(&w->has_changed, &w->mutex);
+    while (w->first) pthread_cond_wait(&w->has_changed, &w->mutex);
     pthread_mutex_unlock(&w->mutex);
 }
 
@@ -181,17 +186,15 @@ static void finish_first(session_writer *w)
 
 static void *run(void *of_writer)
 {
+    enum { FIRST_PICTURES = 16 };
     session_writer *w = of_writer;
-    session_load_image_library();
-    atexit(wait_for_all);
     pthread_mutex_lock(&w->mutex);
-    w->is_loading = false;
-    pthread_cond_broadcast(&w->has_changed);
     for (;;) {
         while (!w->first && !w->is_ending) pthread_cond_wait(&w->has_changed, &w->mutex);
         if (!w->first) break;
         pthread_mutex_unlock(&w->mutex);
         session_write_files(w->first);
+        if (w->written++ < FIRST_PICTURES) atexit(wait_for_all);
         pthread_mutex_lock(&w->mutex);
         finish_first(w);
     }
@@ -211,18 +214,19 @@ bool session_writer_is_behind(const session_writer *w, const scene *scene)
     return scene->writing == SCENE_WRITE_BEHIND && (w->is_running || (session_writes_behind && !w->is_refused));
 }
 
-void session_writer_begin(session_writer *w, const scene *scene)
+double session_writer_begin(session_writer *w, const scene *scene)
 {
     sigset_t all, before;
-    if (w->is_running || !session_writer_is_behind(w, scene)) return;
+    if (w->is_running || scene->image_count == 0 || !session_writer_is_behind(w, scene)) return 0;
+    const double ms = session_load_image_library();
+    atexit(wait_for_all);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    w->is_loading = true;
     w->is_running = pthread_create(&w->thread, NULL, run, w) == 0;
     w->is_refused = !w->is_running;
-    if (w->is_refused) w->is_loading = false;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (w->is_running) enlist(w);
+    return ms;
 }
 
 /* ---- what goes in and what comes out -------------------------------------------------------------------------- */
@@ -274,6 +278,8 @@ void session_writer_collect(session_writer *w, session_report *report)
     session_files *files = w->done;
     w->done = w->last_done = NULL;
     pthread_mutex_unlock(&w->mutex);
+    report->numbers.background_ms += w->loading_ms;
+    w->loading_ms = 0;
     while (files) {
         session_files *next = files->next;
         collect_one(w, files, report);

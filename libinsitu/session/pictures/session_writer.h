@@ -24,27 +24,28 @@ enum { SESSION_FREE_PICTURES = 4 };
 /* The thread touches these between lock and unlock, but for the files at hand. */
 typedef struct session_writer {
     pthread_mutex_t mutex;
-    pthread_cond_t has_changed; /* the queue, or is_ending, or is_loading */
+    pthread_cond_t has_changed; /* the queue, or is_ending */
     pthread_t thread;
     bool is_running, is_refused; /* a thread was started; a thread could not be started */
-    bool is_loading;             /* the thread loads the image library */
     bool is_ending;
     struct session_files *first, *last; /* the queue; the thread is at the first */
     struct session_files *done, *last_done;
+    int64_t written;                                    /* by the thread, whose it is */
     int waiting;                                        /* pictures in the queue */
     int64_t waiting_bytes;                              /* of all that is in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* for pictures that come */
     base_error failure;                                 /* the first that no step has told yet; the caller's thread's */
     int failures;                                       /* how many there were */
+    double loading_ms;                                  /* of insitu_create(), for the next report */
     struct session_writer *next;                        /* of the process's */
 } session_writer;
 
 /* Nothing is started yet. Local. */
 void session_writer_create(session_writer *writer);
 
-/* Start the thread, which loads the image library, if the scene's pictures are to be written by one and there is none.
- * Local. */
-void session_writer_begin(session_writer *writer, const scene *scene);
+/* Load the image library and start the thread, if the scene has pictures, which are to be written by one, and there is
+ * none. Returns the milliseconds that the library took. Local. */
+double session_writer_begin(session_writer *writer, const scene *scene);
 
 /* Tells whether session_writer_begin() has started the thread, or will start it for this scene. Local. */
 bool session_writer_is_behind(const session_writer *writer, const scene *scene);
