@@ -1,4 +1,4 @@
-/* A finished picture on rank 0: linear premultiplied float RGBA and the depth of the nearest opaque surface. */
+/* A finished picture on rank 0: linear premultiplied float RGBA and the depth of the nearest surface. */
 #ifndef BASE_IMAGE_H
 #define BASE_IMAGE_H
 
@@ -18,9 +18,9 @@ typedef struct deep_image {
 typedef struct image {
     int width;
     int height;
-    float *rgba;  /* row-major, height × width × 4, top row first, premultiplied, linear light */
-    float *depth; /* row-major, height × width: fragment.t_in of the nearest
-                     surface hit; +infinity where there is none. NULL: not wanted */
+    float *rgba;      /* row-major, height × width × 4, top row first, premultiplied, linear light */
+    float *depth;     /* row-major, height × width: fragment.t_in of the nearest
+                         surface hit; +infinity where there is none. NULL: not wanted */
     deep_image *deep; /* NULL on every rank: not wanted */
     bool is_folded;   /* made of fragments that ranks have folded (fragment_fold.h) */
 } image;

@@ -23,10 +23,13 @@ enum change_word {
     UNWRITTEN,
     FILLED,
     WRITES_AT_ONCE,
-    ISA_LOW,
+    ISA_LOW, /* and the lowest rank that has it */
+    ISA_HIGH,
     ROOT_TIME, /* the bits of rank 0's */
     CHANGE_WORDS
 };
+
+static const int64_t more_ranks = (int64_t)1 << 32; /* than there are */
 
 static int64_t bits_of(double value)
 {
@@ -68,7 +71,8 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[UNWRITTEN] = session->writer.failures;
     words[FILLED] = has_filled_field(meshes);
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
-    words[ISA_LOW] = -render_isa_level();
+    words[ISA_LOW] = -(render_isa_level() * more_ranks + team->rank);
+    words[ISA_HIGH] = render_isa_level();
     words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
 }
 
@@ -92,7 +96,9 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .are_unwritten = all[UNWRITTEN],
                              .is_filled = all[FILLED],
                              .writes_behind = !all[WRITES_AT_ONCE] && !all[SCENE_CHANGED],
-                             .isa_level = (int)-all[ISA_LOW]};
+                             .isa_level = (int)(-all[ISA_LOW] / more_ranks),
+                             .isa_rank = (int)(-all[ISA_LOW] % more_ranks),
+                             .isa_best = (int)all[ISA_HIGH]};
     return INSITU_OK;
 }
 

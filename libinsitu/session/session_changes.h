@@ -16,6 +16,8 @@ typedef struct session_changes {
     bool is_filled;     /* some field's values are made on demand: what fills it may call MPI */
     bool writes_behind; /* this step's pictures are written when it is over */
     int isa_level;      /* the lowest of the ranks' instruction sets (render_isa.h) */
+    int isa_rank;       /* the lowest rank that has no better */
+    int isa_best;       /* the highest of the ranks' */
 } session_changes;
 
 /* One small reduction. Collective. */

@@ -45,12 +45,13 @@ static void reload_scene(insitu_session *s)
 
 /* Takes kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a face
  * between cells of two ranks. */
-static void use_common_kernels(int level, session_report *report)
+static void use_common_kernels(const session_changes *changes, session_report *report)
 {
-    render_isa_limit(level);
-    if (level < render_isa_level())
-        session_text_add(&report->warnings, "kernels are %s, the best that all ranks have; this rank has %s",
-                         cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
+    render_isa_limit(changes->isa_level);
+    session_warn(report, &(session_warning){WARNING_ISA, NULL, NULL, 1}, changes->isa_level < changes->isa_best,
+                 "kernels are %s, the best that all ranks have: rank %d has no better, others have %s",
+                 cpu_isa_name((cpu_isa)changes->isa_level), changes->isa_rank,
+                 cpu_isa_name((cpu_isa)changes->isa_best));
 }
 
 /* Finds the statistics that are due, and the images whose conditions hold. An error here does not keep images from
@@ -143,7 +144,7 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
     s->last_time = changes->time;
     const bool are_images_due = session_count_due(&s->scene_file.scene, &moment) > 0;
     if (status || !(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) return status;
-    use_common_kernels(changes->isa_level, &s->report);
+    use_common_kernels(changes, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
                                    changes->are_threads_lacking || changes->of_scene, guard, &s->report, error);
     if (status) return status;

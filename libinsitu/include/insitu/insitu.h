@@ -315,8 +315,8 @@ typedef struct insitu_picture {
     int width;         /* pixels */
     int height;
     const float *rgba;  /* height x width x 4, row-major, the top row first: linear light, premultiplied by opacity */
-    const float *depth; /* height x width: distance along the camera's axis from the eye to the nearest opaque surface,
-                           as in EXR files; infinite where there is none */
+    const float *depth; /* height x width: distance along the camera's axis from the eye to the nearest surface, opaque
+                           or transparent, as in EXR files; infinite where there is none, as in volumes alone */
 } insitu_picture;
 
 /* Fill in defaults: nothing given, everything changed. Local. */
