@@ -72,6 +72,8 @@ insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${
 
 insitu_session_program(test_session_concave)
 insitu_add_mpi_test(session_concave test_session_concave 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_session_program(test_session_hanging)
+insitu_add_mpi_test(session_hanging test_session_hanging 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_shells)
 insitu_add_mpi_test(session_shells test_session_shells 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -62,6 +62,22 @@ uint64_t session_names_hash(const session_meshes *meshes)
 
 /* ---- texts to a catalogue ------------------------------------------------------------------------------------ */
 
+void session_hanging_free(session_hanging *hanging)
+{
+    base_free(hanging->vertices);
+    base_free(hanging->sent_counts);
+    base_free(hanging->sent_groups);
+    *hanging = (session_hanging){0};
+}
+
+static void drop_homes(session_catalogue_mesh *mesh)
+{
+    session_homes_free(&mesh->homes);
+    if (mesh->hanging) session_hanging_free(mesh->hanging);
+    base_free(mesh->hanging);
+    mesh->hanging = NULL;
+}
+
 void session_catalogue_free(session_catalogue *catalogue)
 {
     for (int i = 0; i < catalogue->mesh_count; i++) {
@@ -69,7 +85,7 @@ void session_catalogue_free(session_catalogue *catalogue)
         for (int f = 0; f < mesh->field_count; f++) base_free(mesh->fields[f].name);
         base_free(mesh->fields);
         base_free(mesh->name);
-        session_homes_free(&mesh->homes);
+        drop_homes(mesh);
     }
     base_free(catalogue->meshes);
     *catalogue = (session_catalogue){0};
@@ -320,6 +336,8 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
     for (int i = 0; i < catalogue->mesh_count; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         if (mesh->homes.is_known) continue;
+        if (!mesh->hanging) mesh->hanging = base_calloc(1, sizeof *mesh->hanging);
+        if (!mesh->hanging) session_no_memory(error, (int64_t)sizeof *mesh->hanging, "hanging vertices");
         const insitu_status status = session_homes_find(&mesh->homes, session_find_mesh(meshes, mesh->name),
                                                         mesh->has_ids, half_diagonal, team, error);
         if (status) return status;
@@ -329,5 +347,5 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
 
 void session_forget_homes(session_catalogue *catalogue)
 {
-    for (int i = 0; i < catalogue->mesh_count; i++) session_homes_free(&catalogue->meshes[i].homes);
+    for (int i = 0; i < catalogue->mesh_count; i++) drop_homes(&catalogue->meshes[i]);
 }

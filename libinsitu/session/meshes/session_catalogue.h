@@ -17,13 +17,33 @@ typedef struct session_catalogue_field {
     int lacking_rank; /* -1, or one that has cells of the mesh but not the field */
 } session_catalogue_field;
 
+/* A vertex that hangs on a quad: its value is the sum of those of the quad's corners, times weights. */
+typedef struct session_hanging_vertex {
+    int64_t group;      /* of the vertices that are this one (session_hanging.h) */
+    int64_t corners[4]; /* groups, or places among the values that come from other ranks */
+    double weights[4];
+    bool is_received;
+} session_hanging_vertex;
+
+/* This rank's hanging vertices of a mesh, and what it sends to others for theirs. */
+typedef struct session_hanging {
+    bool is_known;
+    int64_t count, total; /* on this rank, on all */
+    session_hanging_vertex *vertices;
+    int64_t *sent_counts, *sent_groups; /* to each rank; whose values, rank by rank */
+    int64_t sent_total;
+} session_hanging;
+
+void session_hanging_free(session_hanging *hanging);
+
 typedef struct session_catalogue_mesh {
     char *name;
     int first_rank; /* that has cells of it; -1: none */
     bool has_ids;   /* all of these give vertex ids */
     int field_count;
     session_catalogue_field *fields;
-    session_homes homes; /* this rank's view of the parts; known where it has been asked for since cells changed */
+    session_homes homes;      /* this rank's view of the parts; known where it has been asked for since cells changed */
+    session_hanging *hanging; /* the same; NULL until homes are known */
 } session_catalogue_mesh;
 
 typedef struct session_catalogue {

@@ -324,11 +324,21 @@ static insitu_status search_shared(face_search *s, const session_homes *homes, c
     return status;
 }
 
+static void mark_border(const face_search *s, unsigned char *is_border)
+{
+    for (int64_t i = 0; i < s->count; i++) {
+        const session_cell_faces faces = session_faces_of_cell(&s->mesh->cells, s->faces[i].cell);
+        const session_face_loop loop = session_face_of(&faces, s->faces[i].face);
+        for (int64_t k = 0; k < loop.size; k++) is_border[session_face_vertex(&loop, k)] = 1;
+    }
+}
+
 insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, const session_homes *homes,
-                                       const session_team *team, base_error *error)
+                                       const session_team *team, unsigned char *is_border, base_error *error)
 {
     face_search search = {.mesh = mesh, .threads = team->threads};
     search_own(&search, outer, homes->by_id, error);
+    if (is_border && !error->status) mark_border(&search, is_border);
     const insitu_status status =
         team->ranks > 1 ? search_shared(&search, homes, team, error) : session_agree(team->comm, error);
     if (!status && mesh) {

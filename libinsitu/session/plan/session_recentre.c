@@ -11,6 +11,8 @@
  *     shared: groups inside another rank's box  --(key, values)-->  their home (session_homes.h): merged by key, means
  *             means  <-------------------------------------------
  *
+ * Then vertices that hang on larger cells take those cells' values (outer/session_hanging.h).
+ *
  * Ranks wait for each other twice a field. What fails goes with that to all; what fails in receiving the means, with
  * the next phase. */
 #include "session_recentre.h"
@@ -22,6 +24,7 @@
 #include "region.h"
 #include "session_agree.h"
 #include "session_exchange.h"
+#include "session_hanging.h"
 #include "session_neighbours.h"
 #include "session_patches.h"
 #include "session_scalars.h"
@@ -432,6 +435,16 @@ static void spread_means(const vertex_groups *groups, const grid_field *own, int
     }
 }
 
+/* Values at corners are left as they are: codes that have them constrain them. */
+static insitu_status constrain_hanging(const session_recentring *item, const session_mesh *mesh,
+                                       const session_team *team, vertex_groups *groups, base_error *error)
+{
+    session_hanging *hanging = item->mesh->hanging;
+    const session_hanging_basis basis = {mesh, &item->mesh->homes, groups->of_vertex, groups->keys.count};
+    const insitu_status status = session_update_hanging(hanging, &basis, team, error);
+    return status ? status : session_constrain_hanging(hanging, team, groups->values.means, error);
+}
+
 static insitu_status recentre(const session_recentring *item, const session_meshes *meshes, const session_team *team,
                               base_error *error)
 {
@@ -451,8 +464,10 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     } else {
         make_groups(NULL, -1, NULL, by_id, team->threads, &groups, error);
     }
-    const insitu_status status = team->ranks > 1 ? merge_shared(team, mesh, &item->mesh->homes, &groups, error)
-                                                 : session_agree(team->comm, error);
+    insitu_status status = team->ranks > 1 ? merge_shared(team, mesh, &item->mesh->homes, &groups, error)
+                                           : session_agree(team->comm, error);
+    if (!status && session_catalogue_find(item->mesh, item->field)->centring == INSITU_CELL)
+        status = constrain_hanging(item, mesh, team, &groups, error);
     if (!status && !error->status && scalar) {
         spread_means(&groups, &field, mesh->cells.vertex_count, scalar->vertex_values, team->threads);
         scalar->are_values_stale = false;

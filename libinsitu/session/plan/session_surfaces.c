@@ -75,7 +75,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
 {
     session_mesh *mesh;
     session_outer *outer = find_own(meshes, wish, &mesh);
-    const insitu_status status = session_find_outer_faces(outer ? mesh : NULL, outer, &wish->mesh->homes, team, error);
+    const insitu_status status = session_find_outer_faces(outer ? mesh : NULL, outer, &wish->mesh->homes, team, NULL, error);
     if (!status && outer) session_set_outer_fresh(mesh, outer);
     return status;
 }
