@@ -166,6 +166,9 @@ insitu_add_mpi_test(session_files test_session_files 1 2 TIMEOUT 120 ARGS ${CMAK
 insitu_session_program(test_session_overwrites)
 insitu_add_mpi_test(session_overwrites test_session_overwrites 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_narrow)
+insitu_add_mpi_test(session_narrow test_session_narrow 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_colour)
 insitu_add_mpi_test(session_colour test_session_colour 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

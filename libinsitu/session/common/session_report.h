@@ -45,6 +45,7 @@ typedef enum session_warning_kind {
     WARNING_PLANE,    /* a plane lies outside of the meshes that it is drawn on */
     WARNING_SAMPLES,  /* several volumes are sampled by default, to no error */
     WARNING_SCALE,    /* a field has no value that its logarithmic scale can show */
+    WARNING_NARROW,   /* values are too near to one another for the colours of their range */
     WARNING_REPLACED, /* a picture takes the place of an earlier one */
     WARNING_VIEW,     /* a camera sees no cell */
     WARNING_GREY,     /* a surface does not have the field that colours it */

@@ -251,6 +251,9 @@ static void add_bar(session_decorations *d, const scene_decorations *scene, cons
     const int i = d->all.bar_count, most = scene->tick_count;
     if (i == SESSION_MAX_BARS) return;
     const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high};
+    const int tick_count = transfer->is_constant ? session_make_constant_tick(transfer->constant, d->ticks[i])
+                           : map->is_banded      ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
+                                                 : session_make_ticks(&scale, most, d->ticks[i]);
     d->fields[i] = field;
     write_label(scene, i, field, d->labels[i]);
     d->bars[i] = (insitu_colour_bar){.label = d->labels[i],
@@ -260,9 +263,7 @@ static void add_bar(session_decorations *d, const scene_decorations *scene, cons
                                      .below = map->has_below ? map->outside[0] : NULL,
                                      .above = map->has_above ? map->outside[1] : NULL,
                                      .at = (insitu_anchor)scene->bars_at,
-                                     .tick_count = map->is_banded
-                                                       ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
-                                                       : session_make_ticks(&scale, most, d->ticks[i]),
+                                     .tick_count = tick_count,
                                      .ticks = d->ticks[i]};
     if (!is_repeated(d, i)) d->all.bar_count++;
 }

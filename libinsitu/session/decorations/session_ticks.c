@@ -180,3 +180,14 @@ int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[S
     if (is_begun) c_numbers_end(&numbers);
     return count;
 }
+
+int session_make_constant_tick(double value, insitu_tick *tick)
+{
+    c_numbers numbers;
+    const bool is_begun = c_numbers_begin(&numbers);
+    tick->place = 0.5;
+    snprintf(tick->text, sizeof tick->text, "%.9g", value);
+    shorten_exponent(tick->text);
+    if (is_begun) c_numbers_end(&numbers);
+    return 1;
+}

@@ -12,12 +12,26 @@
 
 enum { band_entries = 16 };
 
-/* A range must be at least this share of its larger end. Values are float32, relative to the range or, with a scale, to
- * its larger end; rounding then moves them by up to 1e-4 of the map. */
-static const double narrowest_linear = 1e-6, narrowest_scaled = 1e-3, widest_log = 1e30;
+/* Values are counted from the low end in double, so a range may be as narrow as their digits allow. A range that comes
+ * from the data counts as one value where it is no wider than these shares of its larger end: means over cells and
+ * ranks round by a few of 2^-53. */
+static const double least_of_data = 64 * DBL_EPSILON, widest_log = 1e30;
 
-static render_scale scale_of(const scene_colour_map *map)
+/* How wide the range of a constant field is, as a share of the value. */
+static const double constant_linear = 1e-6, constant_scaled = 1e-3;
+
+/* With a scale, values are counted from 0 in float32, whose rounding would be seen in a range below this share of its
+ * larger end. There a scale is a straight line: off by an eighth of the share, 1.3e-4 of the map, at most. */
+static const double straight = 1e-3;
+
+static double larger_end(double low, double high)
 {
+    return fmax(fabs(low), fabs(high));
+}
+
+static render_scale scale_of(const scene_colour_map *map, double low, double high)
+{
+    if (high - low < straight * larger_end(low, high)) return RENDER_LINEAR;
     switch (map->scale) {
     case SCENE_LINEAR: return RENDER_LINEAR;
     case SCENE_LOG: return RENDER_LOG;
@@ -26,8 +40,14 @@ static render_scale scale_of(const scene_colour_map *map)
     return RENDER_LINEAR;
 }
 
-/* A constant field has its value in the middle of a range that float32 numbers can tell from nothing. */
-void session_usable_range(const scene_colour_map *map, double *low, double *high)
+bool session_is_too_narrow(double low, double high)
+{
+    return low < high && high - low < fmax(least_of_data * larger_end(low, high), FLT_MIN);
+}
+
+/* Makes a range that is never empty, and positive for a logarithmic scale. A constant field has its value in the middle
+ * of it. Returns whether there is one value alone, and which. */
+static bool make_usable(const scene_colour_map *map, double *low, double *high, double *constant)
 {
     const bool is_log = map->scale == SCENE_LOG;
     if (is_log && *high > 0 && *low > *high) *low = *high / 1000;
@@ -36,12 +56,17 @@ void session_usable_range(const scene_colour_map *map, double *low, double *high
         *high = is_log ? 10 : 1;
     }
     if (is_log) *low = fmax(*low, *high / widest_log);
-    const double narrowest = map->scale == SCENE_LINEAR ? narrowest_linear : narrowest_scaled;
-    const double least = fmax(narrowest * fmax(fabs(*low), fabs(*high)), FLT_MIN);
-    if (*high - *low >= least) return;
+    const double narrowest = map->range.is_fixed ? 0 : least_of_data * larger_end(*low, *high);
+    const double width = *high - *low;
+    const bool is_constant = width <= 0 || width < narrowest;
+    if (!is_constant && width >= FLT_MIN) return false;
+    const double share = map->scale == SCENE_LINEAR ? constant_linear : constant_scaled;
+    const double least = fmax(is_constant ? share * larger_end(*low, *high) : 0, FLT_MIN);
     const double middle = 0.5 * *low + 0.5 * *high;
+    *constant = middle;
     *low = middle - 0.5 * least;
     *high = middle + 0.5 * least;
+    return is_constant;
 }
 
 /* ---- colours --------------------------------------------------------------------------------------------------- */
@@ -106,16 +131,19 @@ static void set_opacity(const scene_volume *volume, double half_diagonal, sessio
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out)
 {
-    session_usable_range(map, &low, &high);
+    double constant = 0;
+    const bool is_constant = make_usable(map, &low, &high, &constant);
     *out = (session_transfer){.transfer = {.low = low,
                                            .high = high,
                                            .colour_count = map->count,
                                            .colours = map->colours,
-                                           .scale = scale_of(map),
-                                           .threshold = fmax(map->threshold, fmax(fabs(low), fabs(high)) / widest_log),
+                                           .scale = scale_of(map, low, high),
+                                           .threshold = fmax(map->threshold, larger_end(low, high) / widest_log),
                                            .unit_distance = 1},
                               .low = low,
-                              .high = high};
+                              .high = high,
+                              .is_constant = is_constant,
+                              .constant = constant};
     if (volume) {
         set_opacity(volume, half_diagonal, out);
         return !session_takes_memory(map, volume) || expand_table(map, out);

@@ -11,7 +11,9 @@ typedef struct session_transfer {
     float opacities[RENDER_MAX_OPACITY_POINTS];
     double low, high; /* the values that the map's ends stand for; the transfer's go farther where a volume shows what
                          is outside of them */
-    float *table;     /* of its own; NULL: the map's */
+    bool is_constant; /* the values are one, in the middle of low and high */
+    double constant;
+    float *table; /* of its own; NULL: the map's */
 } session_transfer;
 
 /* Makes the transfer function of a colour map over [low, high] (low > high: there are no values), and the opacity of
@@ -23,8 +25,8 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
 bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 
-/* The range that a map is drawn with where the data's is [low, high]: never empty, and of a logarithmic scale positive.
- */
-void session_usable_range(const scene_colour_map *map, double *low, double *high);
+/* Tells whether the values of a range are so near to one another that float32, after the range's low end was taken from
+ * them in double, shows their rounding. */
+bool session_is_too_narrow(double low, double high);
 
 #endif

@@ -1,5 +1,6 @@
 #include "session_statistics_file.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "memory.h"
@@ -31,12 +32,21 @@ typedef struct new_lines {
     const session_statistics *values;
 } new_lines;
 
+/* Significant digits that give nine of the width of a range, however far from 0 it is; at most all of a double. */
+static int digits_for(double low, double high)
+{
+    enum { OF_THE_WIDTH = 9, MOST = 17 };
+    const double share = (0.5 * high - 0.5 * low) / fmax(fabs(low), fabs(high));
+    return share > 0 && share < 1 ? (int)fmin(OF_THE_WIDTH + floor(-log10(share)), MOST) : OF_THE_WIDTH;
+}
+
 static void write_line(FILE *file, const new_lines *n)
 {
     const session_statistics *v = n->values;
-    fprintf(file, "%lld,%.9g,%lld,%.9g,%.9g,%.9g,%.9g,%.9g", (long long)n->cycle, n->time, (long long)v->cells,
-            v->volume, v->least, v->most, v->mean, v->deviation);
-    if (v->bin_count) fprintf(file, ",%.9g,%.9g", v->low, v->high);
+    const int digits = digits_for(v->least, v->most), of_bins = digits_for(v->low, v->high);
+    fprintf(file, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cells,
+            v->volume, digits, v->least, digits, v->most, digits, v->mean, v->deviation);
+    if (v->bin_count) fprintf(file, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
     for (int bin = 0; bin < v->bin_count; bin++) fprintf(file, ",%.9g", v->shares[bin]);
     fputc('\n', file);
 }

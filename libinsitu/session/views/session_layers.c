@@ -132,6 +132,16 @@ static void warn_of_scale(const session_layer_basis *basis, const scene_field *f
                  basis->image->name, field->name);
 }
 
+static void warn_of_width(const session_layer_basis *basis, const scene_field *field, double low, double high)
+{
+    const session_warning warning = {WARNING_NARROW, basis->image->name, field->name, 0};
+    session_warn(
+        basis->report, &warning, session_is_too_narrow(low, high),
+        "image \"%s\": the values of the field \"%s\" between %.17g and %.17g, the range of its colours, are too "
+        "near to one another to be told apart; the colours may show rounding, or one value",
+        basis->image->name, field->name, low, high);
+}
+
 /* Makes a transfer function, whose range may include that of the run before. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
@@ -144,6 +154,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     if (!map->range.is_fixed && map->scale == SCENE_LOG) warn_of_scale(basis, field, !(high > 0));
     if (!map->range.is_fixed && map->range.source == SCENE_RANGE_RUN)
         session_widen_run_range(basis->run_ranges, map, &low, &high);
+    warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
     return INSITU_OK; /* lack of memory is left to the next agreement */

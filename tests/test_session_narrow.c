@@ -1,0 +1,306 @@
+/* Colours over narrow ranges far from 0. A field rises linearly from left to right, so that the colour of each pixel is
+ * known in closed form, in double, from its place: by every kind of layer, on every scale, of float32 and float64
+ * values. Legends of constant fields, warnings where values cannot be told apart, and statistics. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "session_ticks.h"
+#include "session_transfer.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, SIZE = 16, MOST = 1 << 12 };
+
+/* ---- inputs ---------------------------------------------------------------------------------------------------- */
+
+/* The field "f" from low at x = -1 to high at x = 1, and "z", the third coordinate, by which isosurfaces are found. */
+typedef struct ramp {
+    session_input in;
+    double *values, *heights;
+    float *singles;
+    bool is_single;
+} ramp;
+
+static void ramp_create(ramp *r, double low, double high, bool is_single)
+{
+    input_create(&r->in, TEST_TETS, SIDE, TEST_RANDOM, own_rank, rank_count);
+    const size_t count = (size_t)r->in.part.vertex_count;
+    r->is_single = is_single;
+    r->values = test_calloc(count + 1, sizeof *r->values);
+    r->heights = test_calloc(count + 1, sizeof *r->heights);
+    r->singles = test_calloc(count + 1, sizeof *r->singles);
+    for (size_t v = 0; v < count; v++) {
+        const double *x = r->in.part.coordinates + 3 * v, place = 0.5 + 0.5 * x[0];
+        r->values[v] = low + place * (high - low);
+        r->singles[v] = (float)r->values[v];
+        r->heights[v] = x[2];
+    }
+}
+
+static void ramp_free(ramp *r)
+{
+    input_free(&r->in);
+    test_free(r->values);
+    test_free(r->heights);
+    test_free(r->singles);
+}
+
+static void ramp_hand_over(const ramp *r, insitu_session *session)
+{
+    insitu_field field = r->in.field;
+    everywhere(insitu_set_mesh(session, "m", &r->in.mesh) == INSITU_OK);
+    field.values =
+        r->is_single ? (insitu_array){r->singles, INSITU_FLOAT32, 0} : (insitu_array){r->values, INSITU_FLOAT64, 0};
+    everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+    field.name = "z";
+    field.values = (insitu_array){r->heights, INSITU_FLOAT64, 0};
+    everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+}
+
+/* ---- pictures -------------------------------------------------------------------------------------------------- */
+
+#define LIT "material: {ambient: 1, diffuse: 0, specular: 0}"
+
+/* Layers in which every pixel has the colour of its place, with the keys of its map. */
+static const char *const layers[] = {
+    "isosurface: {field: z, values: [0.1], colour_by: {field: f, %s}, " LIT "}",
+    "slice: {field: f, planes: [{normal: [0, 0, 1]}], %s, " LIT "}",
+    "surface: {colour_by: {field: f, %s}, " LIT "}",
+    "volume: {field: f, %s, opacity: [[0, 0.9], [1, 0.9]], unit_distance: 0.05}",
+};
+
+static const char *scene_of(int layer, const char *keys)
+{
+    static char text[1024];
+    char filled[512];
+    const char *of = strstr(layers[layer], "%s");
+    snprintf(filled, sizeof filled, "%.*s%s, map: {colours: [[0, 0, 0], [1, 1, 1]]}%s", (int)(of - layers[layer]),
+             layers[layer], keys, of + 2);
+    snprintf(text, sizeof text,
+             "images:\n  - name: a\n    size: [%d, %d]\n    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, "
+             "0], projection: orthographic, height: 2}\n    layers: [%s]\n"
+             "    outputs: [{path: narrow.png}]\n",
+             SIZE, SIZE, filled);
+    return text;
+}
+
+static double srgb_of(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
+}
+
+static double linear_of(double srgb)
+{
+    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
+}
+
+/* How much a picture is off, in sRGB or linear light from 0 to 1: expected are the colours of a scale's places. Colours
+ * between two are even in sRGB. */
+static double colours_are_off(const caught_picture *picture, bool is_linear, double (*place)(double value), double low,
+                              double high)
+{
+    double worst = 0;
+    for (int i = 0; own_rank == 0 && i < SIZE * SIZE; i++) {
+        const double across = (i % SIZE + 0.5) / SIZE, value = low + across * (high - low);
+        const double expected = (place(value) - place(low)) / (place(high) - place(low));
+        const float *pixel = picture->rgba + 4 * (size_t)i;
+        const double found = (double)pixel[1] / (double)pixel[3];
+        const double off = is_linear ? found - linear_of(expected) : srgb_of(found) - expected;
+        worst = test_worse(worst, pixel[3] > 0.9F ? fabs(off) : 9);
+    }
+    return worst;
+}
+
+static double by_value(double value)
+{
+    return value;
+}
+
+static double by_log(double value)
+{
+    return log(value);
+}
+
+typedef struct narrow_case {
+    double low, high;
+    bool is_single;
+    const char *scale;
+    double (*place)(double value);
+} narrow_case;
+
+static const narrow_case cases[] = {
+    {101325, 101325.01, false, "", by_value},
+    {0, 1e-5, false, "", by_value},
+    {1e5, 1e5 + 1e-3, false, "", by_value},
+    {1e8, 1e8 + 1e-2, false, "", by_value},
+    {1e8, 1e8 + 1e-3, false, "", by_value},
+    {-1e8, -1e8 + 1e-2, false, "", by_value},
+    {1, 1 + 1e-11, false, "", by_value},
+    {0, 1e-5, true, "", by_value},
+    {1e5, 1e5 + 8, true, "", by_value},
+    {1e8, 1e8 + 8192, true, "", by_value},
+    {1, 1 + 1e-4, true, "", by_value},
+    {1e5, 1e5 + 1e-3, false, "scale: log, ", by_log},
+    {1e8, 1e8 + 1, false, "scale: log, ", by_log},
+    {1e5, 1.002e5, false, "scale: log, ", by_log},
+    {1e5, 1.0009e5, false, "scale: log, ", by_log},
+    {1e5, 1e5 + 8, true, "scale: log, ", by_log},
+    {1e5, 1e5 + 1e-3, false, "scale: symlog, threshold: 1, ", by_log},
+    {1e8, 1e8 + 1, false, "scale: symlog, threshold: 1, ", by_log},
+};
+
+/* What a picture may be off: the rounding of values at vertices, of the map's table and of float32 between (2e-3 of the
+ * map together: a darkest colour is steep in sRGB), and 2e-4 for scales that are taken as straight. */
+static double allowed_of(const narrow_case *c)
+{
+    const double larger = fmax(fabs(c->low), fabs(c->high));
+    return (c->is_single ? 6e-8 : 1.2e-16) * larger / (c->high - c->low) + 2e-3 + (*c->scale ? 2e-4 : 0);
+}
+
+static void check_case(const narrow_case *c, int layer, bool is_given)
+{
+    char keys[256];
+    ramp r;
+    if (is_given)
+        snprintf(keys, sizeof keys, "%srange: [%.17g, %.17g]", c->scale, c->low, c->high);
+    else
+        snprintf(keys, sizeof keys, "%srange: data", c->scale);
+    ramp_create(&r, c->low, c->high, c->is_single);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
+    forget_pictures();
+    ramp_hand_over(&r, session);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
+    caught_picture picture = take_caught();
+    const bool is_volume = layer == 3; /* to max_error, in linear light */
+    const double allowed = allowed_of(c) + (is_volume ? 0.01 : 0);
+    const double off = colours_are_off(&picture, is_volume, c->place, c->low, c->high);
+    if (!(off <= allowed)) fprintf(stderr, "layer %d, %s: off by %g\n", layer, keys, off);
+    everywhere(off <= allowed);
+    free_caught(&picture);
+    insitu_destroy(&session);
+    ramp_free(&r);
+}
+
+static void narrow_ranges_are_closed_forms(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (int layer = 0; layer < 4; layer++)
+            for (int is_given = 0; is_given < 2; is_given++) check_case(&cases[i], layer, is_given);
+}
+
+/* ---- legends and warnings -------------------------------------------------------------------------------------- */
+
+static void constant_fields_have_one_tick(void **state)
+{
+    (void)state;
+    static const struct {
+        double value;
+        const char *text;
+    } constants[] = {{1, "1"},          {0, "0"},           {-3.25, "-3.25"},
+                     {0.1, "0.1"},      {1e8, "100000000"}, {101325.01, "101325.01"},
+                     {2e-300, "2e-300"}};
+    float colours[6] = {0};
+    for (size_t i = 0; i < sizeof constants / sizeof *constants; i++)
+        for (int scale = 0; scale < 2; scale++) {
+            const double value = constants[i].value;
+            const scene_colour_map map = {
+                .count = 2, .colours = colours, .scale = scale ? SCENE_SYMLOG : SCENE_LINEAR, .threshold = 1};
+            session_transfer made;
+            insitu_tick tick;
+            assert_true(session_make_transfer(1, &map, value, value, NULL, &made));
+            assert_true(made.is_constant && made.low < made.high);
+            assert_int_equal(session_make_constant_tick(made.constant, &tick), 1);
+            assert_string_equal(tick.text, constants[i].text);
+            assert_true(tick.place == 0.5);
+            session_transfer_free(&made);
+        }
+}
+
+/* Values that rounding alone tells apart are told of, once; a constant field is not. The steps are good all the same.
+ */
+static void values_too_near_are_told(void **state)
+{
+    (void)state;
+    static const struct {
+        double low, high;
+        const char *range;
+        bool is_told;
+    } near[] = {{1, 1 + 1e-15, "data", true},    {1, 1 + 1e-15, "[1, 1.000000000000001]", true},
+                {0, 1e-300, "data", true},       {0, 1e-300, "[0, 1e-300]", true},
+                {1e8, 1e8 + 1e-7, "data", true}, {1, 1, "data", false},
+                {1, 1 + 1e-12, "data", false},   {0, 1e-30, "data", false}};
+    for (size_t i = 0; i < sizeof near / sizeof *near; i++)
+        for (int layer = 0; layer < 4; layer++) {
+            char keys[256];
+            ramp r;
+            snprintf(keys, sizeof keys, "range: %s", near[i].range);
+            ramp_create(&r, near[i].low, near[i].high, false);
+            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
+            for (int cycle = 0; cycle < 2; cycle++) {
+                ramp_hand_over(&r, session);
+                everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
+                const bool is_told = strstr(insitu_last_report(session)->warnings, "too near") != NULL;
+                if (is_told != (near[i].is_told && cycle == 0)) fprintf(stderr, "layer %d, %s\n", layer, keys);
+                everywhere(is_told == (near[i].is_told && cycle == 0));
+            }
+            insitu_destroy(&session);
+            ramp_free(&r);
+        }
+    forget_pictures();
+}
+
+/* ---- statistics ------------------------------------------------------------------------------------------------ */
+
+/* A linear field over a cube: its ends are at corners, its mean in the middle. The histogram's shares add up to 1, and
+ * are alike on both sides of the middle as far as cells are. */
+static void statistics_tell_narrow_fields_apart(void **state)
+{
+    (void)state;
+    for (int is_given = 0; is_given < 2; is_given++) {
+        const double low = 1e8, high = 1e8 + 1e-2;
+        char scene[1200], text[MOST] = "";
+        double n[16] = {0};
+        ramp r;
+        ramp_create(&r, low, high, false);
+        if (own_rank == 0) unlink("narrow.csv");
+        snprintf(scene, sizeof scene, "%sstatistics: [{field: f, path: narrow.csv, histogram: {bins: 4%s}}]\n",
+                 scene_of(1, "range: data"), is_given ? ", range: [100000000, 100000000.01]" : "");
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+        ramp_hand_over(&r, session);
+        everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+        insitu_destroy(&session);
+        read_file("narrow.csv", MOST, text);
+        const char *at = strchr(text, '\n');
+        for (int i = 0; at && i < 14; i++, at = strchr(at + 1, ',')) n[i] = strtod(at + 1, NULL);
+        /* Cycle, time, cells, volume, minimum, maximum, mean, deviation, low, high, bins. Doubles are 1.5e-8 apart. */
+        const bool is_well = fabs(n[4] - low) <= 2e-8 && fabs(n[5] - high) <= 2e-8 &&
+                             fabs(n[6] - 0.5 * (low + high)) <= 1e-6 && fabs(n[8] - low) <= 2e-8 &&
+                             fabs(n[9] - high) <= 2e-8 && fabs(n[10] + n[11] + n[12] + n[13] - 1) < 1e-8 &&
+                             n[10] > 0.1 && n[11] > 0.1 && n[12] > 0.1 && n[13] > 0.1;
+        if (own_rank == 0 && !is_well) fprintf(stderr, "%s", text);
+        everywhere(own_rank != 0 || is_well);
+        ramp_free(&r);
+        forget_pictures();
+    }
+}
+
+static const char *work_folder = ".";
+
+static int run(void)
+{
+    if (!enter_folder(work_folder, "narrow")) return 1;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(constant_fields_have_one_tick),
+        cmocka_unit_test(values_too_near_are_told), cmocka_unit_test(statistics_tell_narrow_fields_apart)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) work_folder = argv[1];
+    return run_session_tests(argc, argv, run);
+}
