@@ -236,7 +236,8 @@ static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_pl
     if (!g->offsets.data) return BAD_TYPE;
     place->first = grid_array_index(&g->offsets, cell);
     place->next = grid_array_index(&g->offsets, cell + 1);
-    if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next - place->first < 3)
+    if (place->first < 0 || place->next < place->first || place->next > mesh->given.connectivity_count ||
+        place->next - place->first < 3)
         return BAD_OFFSETS;
     for (int64_t i = place->first; i < place->next; i++) {
         place->vertex = grid_array_index(&g->connectivity, i);

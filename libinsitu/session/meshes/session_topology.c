@@ -258,7 +258,8 @@ static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
     int64_t from, to;
     if (face < 0 || face >= g->face_count) return false;
     grid_face_vertices(g, face, &from, &to);
-    if (from < 0 || to > mesh->topology.face_connectivity_count || to < from + 3 || to > from + 4) return false;
+    if (from < 0 || to < from || to > mesh->topology.face_connectivity_count) return false;
+    if (to - from < 3 || to - from > 4) return false;
     ring->count = (int)(to - from);
     for (int i = 0; i < ring->count; i++) {
         ring->vertex[i] = grid_array_index(&g->face_connectivity, from + i);
