@@ -203,6 +203,9 @@ if(NOT CMAKE_PROJECT_INCLUDE)
   foreach(ranks 1 2)
     set_property(TEST session_small_stacks_np${ranks} APPEND PROPERTY ENVIRONMENT OMP_STACKSIZE=100k SMALL_STACKS=1)
   endforeach()
+  # They write scene files of the same name.
+  set_tests_properties(session_stack_np1 session_small_stacks_np1 session_small_stacks_np2 PROPERTIES
+    RESOURCE_LOCK session_stack)
 endif()
 
 add_executable(test_session_guard test_session_guard.c)
