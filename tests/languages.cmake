@@ -19,7 +19,7 @@ endforeach()
 add_executable(six_calls_cpp ${PROJECT_SOURCE_DIR}/examples/six_calls.cpp)
 set_target_properties(six_calls_cpp PROPERTIES CXX_EXTENSIONS OFF) # -std=c++17
 target_link_libraries(six_calls_cpp PRIVATE insitu)
-target_compile_options(six_calls_cpp PRIVATE -Wall -Wextra -Wold-style-cast -Wpedantic -Werror -ffp-contract=off)
+target_compile_options(six_calls_cpp PRIVATE -Wall -Wextra -Wold-style-cast -Wpedantic ${insitu_werror} -ffp-contract=off)
 insitu_add_same_pictures_test(cpp_example_draws_on_2_ranks $<TARGET_FILE:six_calls_cpp>)
 
 # Fortran, where there is a compiler whose MPI module it reads: with every check that gfortran has.
@@ -41,7 +41,7 @@ else()
   add_executable(test_fortran test_fortran.f90)
   foreach(target insitu_fortran six_calls_fortran test_fortran)
     if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
-      target_compile_options(${target} PRIVATE -std=f2008 -Wall -Wextra -Wno-function-elimination -Werror
+      target_compile_options(${target} PRIVATE -std=f2008 -Wall -Wextra -Wno-function-elimination ${insitu_werror}
         -fcheck=all -ffp-contract=off)
     endif()
   endforeach()

@@ -5,13 +5,25 @@ set(INSITU_TEST_ENVIRONMENT
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
   OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_base_warn_component_unused=0)
 
+# Ranks that all MPI tests run on, instead of their own.
+set(INSITU_TEST_RANKS "" CACHE STRING "Ranks to run each MPI test on, instead of those that it names")
+
 # insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [ARGS arg ...]): one ctest case a count, named NAME_np<RANKS>.
 function(insitu_add_mpi_test name target)
   cmake_parse_arguments(PARSE_ARGV 2 arg "" "TIMEOUT" "ARGS")
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
-  foreach(ranks IN LISTS arg_UNPARSED_ARGUMENTS)
+  set(counts ${arg_UNPARSED_ARGUMENTS})
+  if(INSITU_TEST_RANKS)
+    set(counts ${INSITU_TEST_RANKS})
+    get_property(has_name GLOBAL PROPERTY insitu_mpi_test_${name})
+    if(has_name)
+      return()
+    endif()
+    set_property(GLOBAL PROPERTY insitu_mpi_test_${name} 1)
+  endif()
+  foreach(ranks IN LISTS counts)
     set(cores 2)
     if(ranks EQUAL 1)
       set(cores 1)

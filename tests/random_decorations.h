@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <random>
 #include <string>
@@ -51,7 +52,7 @@ class random_decorations
     void make_words()
     {
         what_.words_count = whole(0, 1) ? whole(0, 3) : whole(0, 17);
-        for (int i = 0; i < what_.words_count; i++)
+        for (std::size_t i = 0; i < static_cast<std::size_t>(what_.words_count); i++)
             words_[i] = {text(whole(0, 4) ? 8 : 60), static_cast<insitu_anchor>(whole(0, 7)), whole(0, 3) ? 1 : 1.4F};
         what_.words = words_.data();
     }
@@ -60,11 +61,12 @@ class random_decorations
     {
         static const float colours[] = {0, 0, 0, 1, 0, 0, 1, 1, 1};
         what_.bar_count = whole(0, 1) ? whole(0, 4) : whole(0, 20);
-        for (int i = 0; i < what_.bar_count; i++) {
+        for (std::size_t i = 0; i < static_cast<std::size_t>(what_.bar_count); i++) {
             const int ticks = whole(0, 12);
             for (int k = 0; k < ticks; k++) {
-                ticks_[i][k].place = (k + 0.5) / ticks;
-                std::snprintf(ticks_[i][k].text, sizeof ticks_[i][k].text, "%.*f", whole(0, 6), real(-1e4, 1e4));
+                insitu_tick &tick = ticks_[i][static_cast<std::size_t>(k)];
+                tick.place = (k + 0.5) / ticks;
+                std::snprintf(tick.text, sizeof tick.text, "%.*f", whole(0, 6), real(-1e4, 1e4));
             }
             bars_[i] = insitu_colour_bar{};
             bars_[i].label = text(whole(0, 4) ? 6 : 60);
@@ -83,7 +85,7 @@ class random_decorations
     void make_labels(int width, int height)
     {
         what_.label_count = whole(0, 1) ? 0 : whole(0, 39);
-        for (int i = 0; i < what_.label_count; i++) {
+        for (std::size_t i = 0; i < static_cast<std::size_t>(what_.label_count); i++) {
             const double angle = real(0, 6.3);
             labels_[i] = {{real(-0.1, 1.1) * width, real(-0.1, 1.1) * height},
                           {std::cos(angle), std::sin(angle)},

@@ -132,7 +132,7 @@ typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count)
 
 static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, dealing how, uint32_t seed)
 {
-    setting s = {.count = count, .expected = make_image(width, height), .out = {width, height, NULL, NULL, NULL}};
+    setting s = {.count = count, .expected = make_image(width, height), .out = {.width = width, .height = height}};
     if (own_rank == 0) s.out = make_image(width, height);
     fragment *all = count ? base_alloc(count * sizeof *all) : NULL;
     s.own.items = count ? base_alloc(count * sizeof *all) : NULL;
@@ -288,7 +288,7 @@ static void smooth_surfaces_travel_in_a_third(void **context)
 {
     (void)context;
     enum { WIDTH = 512, HEIGHT = 256, MOST_BYTES = 9 };
-    setting s = {.out = {WIDTH, HEIGHT, NULL, NULL, NULL}};
+    setting s = {.out = {.width = WIDTH, .height = HEIGHT}};
     if (own_rank == 0) s.out = make_image(WIDTH, HEIGHT);
     s.own = (fragment_list){base_alloc(WIDTH * HEIGHT * sizeof(fragment)), 0, WIDTH * HEIGHT};
     for (uint32_t p = 0; p < WIDTH * HEIGHT; p++)

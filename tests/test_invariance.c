@@ -375,7 +375,7 @@ static bool judge_mesh(insitu_session *session, int kind, int side, const test_m
             if (!is_due(kind, how, layers)) continue;
             snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), dealing_names[how],
                      layers);
-            deal(mesh, how, side, owners);
+            deal(mesh, (dealing)how, side, owners);
             take_part(mesh, owners, layers, &part);
             draw(session, &part, cycle++);
             if (own_rank == 0) are_well = are_the_same(whole, what) && are_well;

@@ -395,7 +395,7 @@ static void further_fields_have_ranges_beside_the_tree(void **state)
     double *vectors = malloc((size_t)l.g.cell_count * 3 * sizeof *vectors);
     for (int64_t i = 0; i < 3 * l.g.cell_count; i++) vectors[i] = hash_unit((uint64_t)i) - 0.5;
     vectors[3 * 17 + 1] = NAN;
-    grid_field field = {.values = {(const char *)vectors, 24, true, false},
+    grid_field field = {.values = {.data = (const char *)vectors, .stride = 24, .is_wide = true},
                         .component_stride = 8,
                         .component_count = 3,
                         .component = 1};
@@ -409,7 +409,8 @@ static void further_fields_have_ranges_beside_the_tree(void **state)
 
     int32_t *integers = malloc((size_t)l.g.vertex_count * sizeof *integers);
     for (int64_t v = 0; v < l.g.vertex_count; v++) integers[v] = (int32_t)(2e9 * hash_unit((uint64_t)v));
-    const grid_field materials = {.values = {(const char *)integers, 4, false, true}, .component_count = 1};
+    const grid_field materials = {.values = {.data = (const char *)integers, .stride = 4, .is_integer = true},
+                                  .component_count = 1};
     assert_pairs_equal_refit(&l, &tree, &materials);
     mmbvh_free(&tree);
     free(vectors);

@@ -132,19 +132,19 @@ static void fields_of_other_kinds_are_selected_by(void **state)
         for (int64_t i = 0; i < count; i++) integers[i] = (int32_t)test_uniform_in((uint64_t)i, 5, -3, 3);
         vectors[3 * 11 + 2] = (double)NAN;
         const grid_field fields[] = {
-            {.values = {(const char *)vectors, 24, true, false},
+            {.values = {.data = (const char *)vectors, .stride = 24, .is_wide = true},
              .component_stride = 8,
              .component_count = 3,
              .component = 2},
-            {.values = {(const char *)vectors, 24, true, false},
+            {.values = {.data = (const char *)vectors, .stride = 24, .is_wide = true},
              .component_stride = 8,
              .component_count = 3,
              .component = -1},
-            {.values = {(const char *)vectors, 8, true, false},
+            {.values = {.data = (const char *)vectors, .stride = 8, .is_wide = true},
              .component_stride = 8,
              .component_count = 1,
              .is_cell_centred = true},
-            {.values = {(const char *)integers, 4, false, true}, .component_count = 1},
+            {.values = {.data = (const char *)integers, .stride = 4, .is_integer = true}, .component_count = 1},
         };
         for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
             const float root = sqrtf(3);

@@ -61,7 +61,7 @@ typedef struct moved {
 static void free_moved(moved *m)
 {
     free(m->connectivity), free(m->coordinates), free(m->values);
-    *m = (moved){NULL};
+    *m = (moved){0};
 }
 
 static void put(const moved *m, bool is_narrow, int64_t i, int64_t value)
@@ -94,7 +94,7 @@ static void move_connectivity(session_input *in, layout how, moved *m)
 static moved move_arrays(session_input *in, layout how)
 {
     const test_mesh *part = &in->part;
-    moved m = {NULL};
+    moved m = {0};
     if (how == WITH_TYPES) return m;
     move_connectivity(in, how, &m);
     if (how < NARROW) return m;

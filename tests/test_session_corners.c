@@ -143,9 +143,9 @@ static void turn_hexes(test_mesh *part)
     }
 }
 
-static int type_of(test_mesh_kind kind)
+static insitu_cell_type type_of(test_mesh_kind kind)
 {
-    static const int types[] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
+    static const insitu_cell_type types[] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
     return types[kind];
 }
 

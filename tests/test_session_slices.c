@@ -171,8 +171,8 @@ static bool is_once(const caught_picture *picture, const plane *p)
         const ray r = ray_of(pixel);
         double at[3];
         meet(&r, p, at);
-        const double outside =
-            outside_by((const double[3]){p->normal[0] ? 0 : at[0], p->normal[1] ? 0 : at[1], p->normal[2] ? 0 : at[2]});
+        const double outside = outside_by((const double[3]){
+            p->normal[0] != 0 ? 0 : at[0], p->normal[1] != 0 ? 0 : at[1], p->normal[2] != 0 ? 0 : at[2]});
         const float opacity = picture->rgba[4 * pixel + 3];
         if (fabs(outside) < 1e-5) continue;
         hits += outside < 0;

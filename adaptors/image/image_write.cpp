@@ -76,7 +76,7 @@ class srgb_codes
     }
 
   private:
-    enum { CODES = 256, BINS = 4096 };
+    static constexpr int CODES = 256, BINS = 4096;
 
     /* The least number that has the code, by bisection until no number lies between. */
     static double least_of(int code)

@@ -240,8 +240,9 @@ typedef struct kernel_local_pair {
 
 SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi lane, kernel_local_pair *out)
 {
+    if (KERNEL_LOCAL_ROW != SIMD_WIDTH) return false;
     const unsigned bits = vm_bits(rays);
-    if (KERNEL_LOCAL_ROW != SIMD_WIDTH || !bits) return false;
+    if (!bits) return false;
     int32_t lanes[SIMD_WIDTH];
     memcpy(lanes, &lane, sizeof lanes);
     const int first = lanes[__builtin_ctz(bits)], last = lanes[31 - __builtin_clz(bits)];

@@ -54,7 +54,7 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
     const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
     s->first = first;
     s->count = count;
-    s->pad = 1e-4f + 4e-7f * ((float)(abs(first) + count) + base);
+    s->pad = 1e-4f + 4e-7f * ((float)((first < 0 ? -first : first) + count) + base);
 }
 
 /* Finds the window's samples, as indices into it, that may be in the interval of some ray. */

@@ -349,7 +349,8 @@ class hdf_grids : public data_file
         if (offsets->GetComponent(0, 0) != 0 || offsets->GetComponent(at.cells, 0) != static_cast<double>(at.ids))
             in_.refuse("the Offsets of part " + std::to_string(at.part) + " do not fit its Connectivity");
         for (int64_t i = 0; i < at.cells; i++)
-            if (types->GetComponent(i, 0) == VTK_POLYHEDRON) in_.refuse("polyhedra of this format are not read");
+            if (types->GetComponent(i, 0) == static_cast<double>(VTK_POLYHEDRON))
+                in_.refuse("polyhedra of this format are not read");
         vtkNew<vtkCellArray> cells;
         cells->SetData(vtkIdTypeArray::SafeDownCast(offsets), vtkIdTypeArray::SafeDownCast(ids));
         grid->SetCells(vtkUnsignedCharArray::SafeDownCast(types), cells);

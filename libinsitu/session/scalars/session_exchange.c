@@ -208,7 +208,7 @@ static void free_delivery(delivery *d)
 insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
                                    base_error *error)
 {
-    delivery d = {.comm = comm, .tag = tag};
+    delivery d = {.comm = comm, .tag = (int)tag};
     int failed = 0;
     *in = (session_mail){0};
     MPI_Comm_rank(comm, &d.rank);

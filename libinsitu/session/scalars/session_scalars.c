@@ -86,14 +86,15 @@ bool session_find_values(const session_mesh *mesh, const scene_field *field, gri
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
 {
     if (session_is_distance(scalar))
-        return (grid_field){.values = {(const char *)scalar->distances, (int64_t)sizeof(float), false, false},
+        return (grid_field){.values = {.data = (const char *)scalar->distances, .stride = (int64_t)sizeof(float)},
                             .component_stride = (int64_t)sizeof(float),
                             .component_count = 1};
     if (!scalar->is_recentred) return session_given_field(mesh, scalar->field, scalar->component);
-    return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
-                        .component_stride = (int64_t)sizeof(double),
-                        .component_count = 1,
-                        .own = scalar->own.is_cell_centred ? &scalar->own : NULL};
+    return (grid_field){
+        .values = {.data = (const char *)scalar->vertex_values, .stride = (int64_t)sizeof(double), .is_wide = true},
+        .component_stride = (int64_t)sizeof(double),
+        .component_count = 1,
+        .own = scalar->own.is_cell_centred ? &scalar->own : NULL};
 }
 
 session_scalar *session_add_scalar(session_mesh *mesh)

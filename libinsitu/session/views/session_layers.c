@@ -78,7 +78,8 @@ static const double no_number = NAN;
 /* One value for all vertices. */
 static grid_field absent_field(void)
 {
-    return (grid_field){.values = {(const char *)&no_number, 0, true, false}, .component_count = 1};
+    return (grid_field){.values = {.data = (const char *)&no_number, .stride = 0, .is_wide = true},
+                        .component_count = 1};
 }
 
 /* A part's field; scalar: NULL where it has none. */
@@ -221,7 +222,7 @@ static bool gather(const session_mesh *whole, const session_outer *outer, const 
 {
     const grid_field field = session_scalar_field(whole, scalar);
     *values = session_gather_outer_values(outer, &field);
-    *out = (grid_field){.values = {(const char *)*values, (int64_t)sizeof **values, true, false},
+    *out = (grid_field){.values = {.data = (const char *)*values, .stride = (int64_t)sizeof **values, .is_wide = true},
                         .component_stride = (int64_t)sizeof **values,
                         .component_count = 1,
                         .is_cell_centred = field.is_cell_centred};

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Has another compiler read the sources of a build, without making objects: every warning is an error.
+
+compilers_read.py clang BUILD    all C and C++, by clang and clang++
+compilers_read.py aarch64 BUILD  the library's C, by the cross compiler for aarch64, without what is compiled for x86 alone
+
+The flags are those of BUILD/compile_commands.json. Ends with 77 if the compiler is not installed.
+"""
+
+import json
+import os
+import pathlib
+import shlex
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+CROSS = "aarch64-linux-gnu-gcc"
+LIBRARY = ("libinsitu", "mmbvh", "render", "compositing")
+# Other compilers' names for warnings are not asked about; clang's C++ is older than gcc's unless it is told.
+CLANG = ["-Wno-unknown-warning-option", "-Werror", "-fsyntax-only"]
+
+
+def clang_command(source, flags):
+    if source.suffix != ".cpp":
+        return ["clang", *flags, *CLANG, str(source)]
+    standard = [] if any(f.startswith("-std=") for f in flags) else ["-std=gnu++17"]
+    return ["clang++", *flags, *standard, *CLANG, str(source)]
+
+
+def cross_command(source, flags):
+    """None if the object is compiled for x86 alone. The host's headers come last: the cross compiler has its own C library."""
+    if any(f.startswith("-m") for f in flags):
+        return None
+    kept = [f for f in flags if not f.endswith("_HAS_X86")]
+    return [CROSS, *kept, "-Werror", "-fsyntax-only", "-idirafter", "/usr/include", str(source)]
+
+
+def entries(build, is_wanted):
+    """(folder, source, flags) of each object; of objects that differ only in folders and exported names, one."""
+    seen = {}
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        source = pathlib.Path(entry["file"])
+        if source.suffix not in (".c", ".cpp") or not is_wanted(source):
+            continue
+        words = shlex.split(entry["command"])
+        at = words.index("-o")
+        flags = [w for w in words[1:at] + words[at + 2 :] if w not in ("-c", entry["file"]) and not w.endswith("_EXPORTS")]
+        seen.setdefault((source, *(f for f in flags if f.startswith(("-D", "-m")))), (entry["directory"], source, flags))
+    return seen.values()
+
+
+def read(job):
+    folder, command = job
+    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return answer.returncode == 0 and not answer.stderr, answer.stdout + answer.stderr
+
+
+def main():
+    who, build = sys.argv[1], pathlib.Path(sys.argv[2])
+    command = {"clang": clang_command, "aarch64": cross_command}[who]
+    if not all(map(shutil.which, {"clang": ("clang", "clang++"), "aarch64": (CROSS,)}[who])):
+        print(f"skipped: there is no compiler {who}")
+        return 77
+    root = pathlib.Path(__file__).resolve().parent.parent
+
+    def is_wanted(source):
+        if who == "clang":
+            return True
+        return source.suffix == ".c" and any(root / room in source.parents for room in LIBRARY)
+
+    jobs = [(folder, command(source, flags)) for folder, source, flags in entries(build, is_wanted)]
+    jobs = [job for job in jobs if job[1]]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        answers = list(pool.map(read, jobs))
+    faults = [text for is_right, text in answers if not is_right]
+    print("".join(faults), end="")
+    print(f"{who} has read {len(jobs)} sources and found fault with {len(faults)}")
+    return 1 if faults or not jobs else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
