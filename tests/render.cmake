@@ -48,7 +48,7 @@ add_test(NAME render_invariance COMMAND test_render_invariance)
 set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)
 
 insitu_render_program(test_render_batches)
-insitu_add_set_tests(render_batches 120)
+insitu_add_set_tests(render_batches 120 split)
 
 
 insitu_render_program(test_render_isa)
@@ -116,7 +116,7 @@ insitu_add_long_test(roots_bent_long test_roots_bent 1000000)
 insitu_add_long_test(contraction_long test_contraction 10000000)
 
 insitu_render_program(test_hits)
-add_test(NAME hits COMMAND test_hits)
+insitu_add_split_test(hits $<TARGET_FILE:test_hits>)
 set_tests_properties(hits PROPERTIES TIMEOUT 180)
 
 add_executable(test_polygon test_polygon.c)
@@ -139,12 +139,13 @@ set_tests_properties(duals PROPERTIES TIMEOUT 120)
 insitu_add_long_test(duals_long test_duals 16)
 
 insitu_render_program(test_folded)
-insitu_add_set_tests(folded 120)
+insitu_add_set_tests(folded 120 split)
 
 # Rays' intervals: the kernels' headers compiled into the test, once an instruction set.
 # Not all of the headers is used here. GCC 12 takes a vector that is written lane by lane for uninitialized. A source's
 # options come after all others.
-set_source_files_properties(chord_trace.c PROPERTIES COMPILE_OPTIONS "-Wno-unused-function;-Wno-maybe-uninitialized")
+set_source_files_properties(chord_trace.c PROPERTIES
+  COMPILE_OPTIONS "-Wno-unused-function;$<$<C_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
 add_executable(test_chords test_chords.c chord_aim.c chord_hull.c test_mesh_honeycomb.c)
 target_link_libraries(test_chords PRIVATE test_render_support insitu_flags)
 function(insitu_chords isa definition)

@@ -1,7 +1,8 @@
 /* Cells whose maps are folded: a point then has several solutions or none, and there is no truth to compare with. But
  * the picture has finite numbers only, it depends neither on how the simulation numbers a cell's vertices nor on the
  * rank that has the cell, and the report has the count of inverse maps that found nothing. For cells that are not
- * folded that count is 0. */
+ * folded that count is 0. Usually a kind has every second pair of a camera and a scene. */
+#include "test_effort.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -55,6 +56,11 @@ static void assert_finite(const fragment *item)
     if (!is_finite) fail_msg("pixel %u: t %g to %g", item->pixel, (double)item->t_in, (double)item->t_out);
 }
 
+static bool is_due(int kind, fixture_camera camera, scene_kind scene)
+{
+    return test_is_whole() || (kind + (int)camera + (int)scene) % 2 == 0;
+}
+
 static void folded_cells_make_numbers(void **state)
 {
     (void)state;
@@ -65,6 +71,7 @@ static void folded_cells_make_numbers(void **state)
                 test_mesh mesh;
                 render_fixture f;
                 drawn_frame drawn;
+                if (!is_due(k, camera, scene)) continue;
                 tangle(kinds[k], &mesh);
                 stage(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);
@@ -134,6 +141,7 @@ static void maps_of_sound_cells_converge(void **state)
                 test_mesh mesh;
                 render_fixture f;
                 drawn_frame drawn;
+                if (!is_due(k, camera, scene)) continue;
                 test_mesh_lattice(kinds[k], SIDE, 0.2, test_wave, &mesh);
                 stage(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);

@@ -1,5 +1,6 @@
 /* Tests places and normals of robust roots in whole frames: on warped lattices of hexes, wedges and pyramids, on ugly
  * single cells, and by closed forms. */
+#include "test_effort.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -160,6 +161,7 @@ static void robust_hits_are_on_the_surface(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             render_fixture f;
             tally t = {.rays = 0};
+            if (!test_is_whole() && (k + (int)camera) % 2) continue; /* a kind has one or two cameras */
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
             fixture_look(&f, camera, 53, 45);
             add_robust(&f, 0.4f); /* all crossings, not the first alone */

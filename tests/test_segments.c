@@ -157,21 +157,23 @@ static void surfaces_cut_segments(void **state)
 {
     static const double values[4] = {-0.4, -0.1, 0.2, 0.5};
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        render_fixture f;
+        fixture_create_lattice(&f, kind, 3, 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 25, 21);
+        set_segments(&f, 1, 1e-4);
+        fixture_add_surface(&f, values, 3, 0.4f);
+        fixture_add_surface(&f, values + 3, 1, 1);
+        double *truth = truth_of(&f);
         for (int alone = 0; alone < 2; alone++) {
-            render_fixture f;
-            fixture_create_lattice(&f, kind, 3, 0.2, test_wave);
-            fixture_look(&f, CAMERA_OUTSIDE, 25, 21);
-            set_segments(&f, 1, 1e-4);
-            fixture_add_surface(&f, values, 3, 0.4f);
-            fixture_add_surface(&f, values + 3, 1, 1);
             f.job.is_alone = alone;
-            double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
+            const double worst = error_of(&f, truth, NULL);
             fprintf(stderr, "surfaces, %s: %.2g\n", test_mesh_kind_name(kind), worst);
             assert_true(worst <= 1e-4);
-            free(truth);
-            fixture_free(&f);
         }
+        free(truth);
+        fixture_free(&f);
+    }
 }
 
 /* Errors of steps 1/4, 1/8 ... of a cell, and the order seen between the first and the last. */

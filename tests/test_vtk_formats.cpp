@@ -186,14 +186,21 @@ void info_leaves_hidden_cells_out(void **)
     expect(run_tool(2, "scene.yaml blanked.vts"), 0, "  60 cells");
 }
 
-void expect_error_or_same(const sample &s, const std::string &file, const std::string &right, size_t percent, int ranks)
+/* The picture of the whole is drawn only if the tool draws the file that is cut. */
+void expect_error_or_same(const sample &s, const std::string &file, size_t percent, int ranks)
 {
     const std::string whole = read_file(folder + "/" + file);
     write_file(folder + "/" + file, whole.substr(0, whole.size() * percent / 100));
     const run_result r = run_tool(ranks, "scene.yaml " + s.name);
     write_file(folder + "/" + file, whole);
     const bool is_error = r.status == 1 && r.err.compare(0, 15, "insitu-render: ") == 0;
-    if (is_error || (r.status == 0 && picture(0) == right)) return;
+    if (is_error) return;
+    if (r.status == 0) {
+        const std::string drawn = picture(0);
+        write_vtu(folder + "/same.vtu", s.expected);
+        expect(run_tool(1, "scene.yaml same.vtu"), 0, "1 picture");
+        if (picture(0) == drawn) return;
+    }
     print_error("%s with %s cut at %zu %% on %d ranks: status %d\n%s%s", s.name.c_str(), file.c_str(), percent, ranks,
                 r.status, r.out.c_str(), r.err.c_str());
     assert_true(false);
@@ -203,13 +210,10 @@ void cut_files_end_all_ranks(void **)
 {
     int turn = 0;
     for (const sample &s : samples) {
-        write_vtu(folder + "/same.vtu", s.expected);
-        expect(run_tool(1, "scene.yaml same.vtu"), 0, "1 picture");
-        const std::string right = picture(0);
         for (const std::string &file : s.files)
             for (const size_t percent : percents)
                 for (const int ranks : {1, 2})
-                    if (!is_quick || turn++ % 5 == 0) expect_error_or_same(s, file, right, percent, ranks);
+                    if (!is_quick || turn++ % 5 == 0) expect_error_or_same(s, file, percent, ranks);
     }
 }
 

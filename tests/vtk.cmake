@@ -59,7 +59,7 @@ add_executable(test_vtk_images test_vtk_images.cpp test_vtk_run.cpp)
 target_include_directories(test_vtk_images SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
 target_link_libraries(test_vtk_images PRIVATE
   insitu_flags PkgConfig::CMOCKA ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
-add_test(NAME vtk_images COMMAND test_vtk_images $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
+insitu_add_split_test(vtk_images $<TARGET_FILE:test_vtk_images> $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
 
 # Real grids as the renderer's tests have their meshes. The C headers are not C++'s style, hence SYSTEM.
 add_library(test_data_mesh STATIC test_data_mesh.cpp test_vtk_session_stub.cpp)
@@ -75,6 +75,7 @@ foreach(noun volumes polyhedra)
 endforeach()
 target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
+set_tests_properties(vtk_images_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" SKIP_RETURN_CODE 77)
 set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
 
