@@ -70,7 +70,7 @@ static void check(test_mesh_kind kind, insitu_vertex_order stand, insitu_vertex_
     in.mesh.vertex_order = said;
     snprintf(what, sizeof what, "%s in order %d read in %d, jitter %g%s", test_mesh_kind_name(kind), (int)stand,
              (int)said, jitter, mirrored ? ", mirrored" : "");
-    expect(session, &in, differ(kind, stand, said) ? names[stand] : NULL, what);
+    expect(session, &in, differ(kind, (int)stand, (int)said) ? names[stand] : NULL, what);
     insitu_destroy(&session);
     input_free(&in);
 }
