@@ -11,7 +11,7 @@ enum { SIDE = 4 };
 
 #define IMAGE(size, camera, layer, sampling)                                                                           \
     "images:\n  - name: a\n    size: " size "\n" camera "    layers: [" layer "]\n" sampling                           \
-    "    outputs: [{path: a.exr}]\n"
+    "    outputs: [{path: \"a_{cycle}.exr\"}]\n"
 #define SURFACE "{isosurface: {field: f, values: [0.1]}}"
 #define VOLUME "{volume: {field: f}}"
 #define CAMERA(text) "    camera: {" text "}\n"
