@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "vector3.h"
+
 /* The share of the polygon's area by which a triangle of the fan may be turned over, and still count as rounding of
  * corners in a line: some rounding of coordinates in float32. */
 static const double fan_slack = 0x1p-20;
@@ -96,31 +98,19 @@ static bool find_places(polygon_work *w, const double (*p)[3])
 
 /* ---- fans ----------------------------------------------------------------------------------------------------- */
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* The normal's length is twice the area. */
 static bool is_fan(const polygon_work *w, double normal[3])
 {
     double area[3];
     normal[0] = normal[1] = normal[2] = 0;
     for (int i = 1; i + 1 < w->count; i++) {
-        cross(w->places[i], w->places[i + 1], area);
+        vector3_cross(w->places[i], w->places[i + 1], area);
         for (int axis = 0; axis < 3; axis++) normal[axis] += area[axis];
     }
-    const double least = -fan_slack * dot(normal, normal);
+    const double least = -fan_slack * vector3_dot(normal, normal);
     for (int i = 1; i + 1 < w->count; i++) {
-        cross(w->places[i], w->places[i + 1], area);
-        if (dot(area, normal) < least) return false;
+        vector3_cross(w->places[i], w->places[i + 1], area);
+        if (vector3_dot(area, normal) < least) return false;
     }
     return true;
 }
@@ -133,10 +123,10 @@ static bool is_concave_quad(const polygon_work *w)
     for (int i = 0; i < 4; i++)
         for (int axis = 0; axis < 3; axis++) sides[i][axis] = w->places[(i + 1) & 3][axis] - w->places[i][axis];
     for (int i = 0; i < 4; i++) {
-        cross(sides[(i + 3) & 3], sides[i], areas[i]);
+        vector3_cross(sides[(i + 3) & 3], sides[i], areas[i]);
         for (int axis = 0; axis < 3; axis++) normal[axis] += areas[i][axis] / 2;
     }
-    for (int i = 0; i < 4; i++) inward += dot(areas[i], normal) < -fan_slack * dot(normal, normal);
+    for (int i = 0; i < 4; i++) inward += vector3_dot(areas[i], normal) < -fan_slack * vector3_dot(normal, normal);
     return inward == 1;
 }
 
@@ -157,19 +147,19 @@ static void add_fan(polygon_work *w, int first)
 
 static void flatten(polygon_work *w, const double normal[3])
 {
-    const double size = sqrt(dot(normal, normal));
+    const double size = sqrt(vector3_dot(normal, normal));
     double up[3], right[3], across[3] = {0, 0, 0};
     int largest = 0;
     for (int axis = 1; axis < 3; axis++)
         if (fabs(normal[axis]) > fabs(normal[largest])) largest = axis;
     across[(largest + 1) % 3] = 1;
-    cross(across, normal, right);
-    const double length = sqrt(dot(right, right));
+    vector3_cross(across, normal, right);
+    const double length = sqrt(vector3_dot(right, right));
     for (int axis = 0; axis < 3; axis++) right[axis] /= length;
-    cross(normal, right, up);
+    vector3_cross(normal, right, up);
     for (int i = 0; i < w->count; i++) {
-        w->flat[i][0] = dot(w->places[i], right);
-        w->flat[i][1] = dot(w->places[i], up) / size;
+        w->flat[i][0] = vector3_dot(w->places[i], right);
+        w->flat[i][1] = vector3_dot(w->places[i], up) / size;
     }
 }
 

@@ -7,6 +7,7 @@
 #include "session_agree.h"
 #include "session_cell_faces.h"
 #include "session_outer_faces.h"
+#include "vector3.h"
 
 /* The share of a quad's width by which a vertex may be off it: roundings of codes that compute hanging vertices in
  * other ways. Vertices that hang are an eighth of it apart, or more. */
@@ -276,11 +277,6 @@ static void place_on(const quad *q, const double at[2], double out[3], double sl
     }
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* A whole part of the quad where it is one but for rounding. */
 static double rounded(double at)
 {
@@ -296,8 +292,9 @@ static bool find_on_quad(const quad *q, const double place[3], double slack, dou
     for (int step = 0; step < 12; step++) {
         place_on(q, at, on, slopes);
         for (int axis = 0; axis < 3; axis++) off[axis] = place[axis] - on[axis];
-        const double aa = dot(slopes[0], slopes[0]), ab = dot(slopes[0], slopes[1]), bb = dot(slopes[1], slopes[1]);
-        const double a = dot(slopes[0], off), b = dot(slopes[1], off), det = aa * bb - ab * ab;
+        const double aa = vector3_dot(slopes[0], slopes[0]), ab = vector3_dot(slopes[0], slopes[1]),
+                     bb = vector3_dot(slopes[1], slopes[1]);
+        const double a = vector3_dot(slopes[0], off), b = vector3_dot(slopes[1], off), det = aa * bb - ab * ab;
         if (!(det > 0)) return false;
         at[0] += (a * bb - b * ab) / det;
         at[1] += (b * aa - a * ab) / det;

@@ -8,6 +8,7 @@
 #include "session_agree.h"
 #include "session_cell_faces.h"
 #include "session_scalars.h"
+#include "vector3.h"
 
 /* ---- one face ------------------------------------------------------------------------------------------------ */
 
@@ -54,11 +55,6 @@ static void subtract(const double a[3], const double b[3], double out[3])
     for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* Finds the normal, whose length is twice the area. */
 static void find_normal(const corner_loop *loop, double out[3])
 {
@@ -76,7 +72,7 @@ static double perimeter(const corner_loop *loop)
     double sum = 0, side[3];
     for (int i = 0; i < loop->count; i++) {
         subtract(loop->places[(i + 1) % loop->count], loop->places[i], side);
-        sum += sqrt(dot(side, side));
+        sum += sqrt(vector3_dot(side, side));
     }
     return sum;
 }
@@ -91,12 +87,12 @@ static bool find_apex(const corner_loop *loop, const double inside[3], double ap
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
     find_normal(loop, normal);
-    const double length = sqrt(dot(normal, normal)), around = perimeter(loop);
+    const double length = sqrt(vector3_dot(normal, normal)), around = perimeter(loop);
     if (!(length > 1e-12 * around * around)) return false;
     for (int i = 0; i < loop->count; i++)
         for (int axis = 0; axis < 3; axis++) middle[axis] += loop->places[i][axis] / loop->count;
     subtract(inside, middle, towards);
-    const bool is_below = dot(towards, normal) < -side_slack * around * length;
+    const bool is_below = vector3_dot(towards, normal) < -side_slack * around * length;
     const double height = 0.5 * around / loop->count * (is_below ? -1 : 1);
     for (int axis = 0; axis < 3; axis++) apex[axis] = middle[axis] + height * normal[axis] / length;
     return true;
@@ -209,9 +205,9 @@ static bool find_common_apex(const face_polygon *p, double out[3])
         if (!polygon_triangle(p, i, &loop, own)) continue;
         find_normal(&loop, normal);
         subtract(own, loop.places[0], height);
-        const double most = dot(height, normal);
+        const double most = vector3_dot(height, normal);
         subtract(out, loop.places[0], height);
-        if (!(dot(height, normal) / most > 0.25)) return false;
+        if (!(vector3_dot(height, normal) / most > 0.25)) return false;
     }
     return count > 0;
 }
@@ -233,7 +229,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int i = 0; i < p->count; i++)
         for (int axis = 0; axis < 3; axis++) middle[axis] += p->places[i][axis] / p->count;
     subtract(inside, middle, towards);
-    const double length = sqrt(dot(sum, sum)), width = sqrt(length), side = dot(towards, sum);
+    const double length = sqrt(vector3_dot(sum, sum)), width = sqrt(length), side = vector3_dot(towards, sum);
     int largest = 0;
     for (int axis = 1; axis < 3; axis++)
         if (fabs(sum[axis]) > fabs(sum[largest])) largest = axis;

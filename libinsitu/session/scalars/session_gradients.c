@@ -19,6 +19,7 @@
 
 #include "memory.h"
 #include "region.h"
+#include "vector3.h"
 
 enum { HIGH_BITS = 43 };
 #define LOW_UNIT 0x1p44 /* of low words, in a high one's last bit */
@@ -96,12 +97,6 @@ static bool is_before(const node *a, const node *b)
     return false;
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        out[axis] = a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3];
-}
-
 /* Adds a corner. Mirrored ends change the signs of both the sum and the determinant. */
 static void give_corner(target *to, const node *corner, const node *p, const node *q, const node *r)
 {
@@ -117,7 +112,7 @@ static void give_corner(target *to, const node *corner, const node *p, const nod
             squares += edge[i][a] * edge[i][a];
         }
     }
-    for (int i = 0; i < 3; i++) cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal[i]);
+    for (int i = 0; i < 3; i++) vector3_cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal[i]);
     const double volume = (edge[0][0] * normal[0][0] + edge[0][1] * normal[0][1]) + edge[0][2] * normal[0][2];
     const double scale = (volume < 0 ? -1 : 1) / (squares * squares);
     for (int a = 0; a < 3; a++)

@@ -12,17 +12,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "vector3.h"
+
 /* The share of the half frame that the data fills at most. */
 static const double filled = 0.95;
 
 static double length(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* Chooses up, or, where that is along the view, an axis that is not. */
@@ -145,7 +142,7 @@ static corner_reach reach_of_corners(const session_extent *e, const render_camer
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++) p[a] = (corner >> a & 1 ? 0.5 : -0.5) * (e->upper[a] - e->lower[a]);
-        const double x = dot(p, axes->right), y = dot(p, axes->up), w = -dot(p, axes->forward);
+        const double x = vector3_dot(p, axes->right), y = vector3_dot(p, axes->up), w = -vector3_dot(p, axes->forward);
         r.right = fmax(r.right, x + f->right * w);
         r.left = fmax(r.left, f->left * w - x);
         r.up = fmax(r.up, y + f->up * w);

@@ -4,11 +4,7 @@
 #include <string.h>
 
 #include "scene_convert.h"
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+#include "vector3.h"
 
 /* Finds the directions across the axis at phi = 0 and 90 degrees. The first is as near as possible to the coordinate
  * axis that follows (x -> y -> z -> x) the one nearest to the axis: for an axis along z, phi is the longitude of
@@ -19,9 +15,9 @@ static void find_plane(const double axis[3], double first[3], double second[3])
     for (int a = 1; a < 3; a++)
         if (fabs(axis[a]) > fabs(axis[nearest])) nearest = a;
     for (int a = 0; a < 3; a++) first[a] = a == (nearest + 1) % 3;
-    const double along = dot(first, axis);
+    const double along = vector3_dot(first, axis);
     for (int a = 0; a < 3; a++) first[a] -= along * axis[a];
-    const double length = sqrt(dot(first, first));
+    const double length = sqrt(vector3_dot(first, first));
     for (int a = 0; a < 3; a++) first[a] /= length;
     for (int a = 0; a < 3; a++)
         second[a] = axis[(a + 1) % 3] * first[(a + 2) % 3] - axis[(a + 2) % 3] * first[(a + 1) % 3];

@@ -1,0 +1,18 @@
+/* Products of vectors of three numbers. */
+#ifndef BASE_VECTOR3_H
+#define BASE_VECTOR3_H
+
+static inline double vector3_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* out is neither a nor b. */
+static inline void vector3_cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+#endif
