@@ -80,7 +80,7 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
 }
 
 /* The jitter, as a share of a cube's side. Cells are sound up to here; at 0.3 quads pass through the faces beside them,
- * and cells really overlap (docs/hard-cases.md). */
+ * and cells really overlap (docs/development/hard-cases.md). */
 static const double jitter_wanted = 0.2;
 
 /* ---- a ray ---- */

@@ -1,4 +1,4 @@
-/* Hard cases that no other program has; all are listed in docs/hard-cases.md. */
+/* Hard cases that no other program has; all are listed in docs/development/hard-cases.md. */
 #include "test_render_fixture.h"
 
 #include <setjmp.h>

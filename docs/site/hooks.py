@@ -18,11 +18,11 @@ import header_page  # noqa: E402
 import markdown_pages  # noqa: E402
 
 HEADERS = ["libinsitu/include/insitu/insitu.h", "libinsitu/include/insitu/status.h"]
-MOVED = {"CHANGELOG.md": "changes.md", "CONTRIBUTING.md": "contributing.md", "README.md": "README.md",
+MOVED = {"CONTRIBUTING.md": "contributing.md", "README.md": "README.md",
          **{header: "interface.md" for header in HEADERS}}
 LANGUAGES = {".c": "c", ".h": "c", ".cpp": "cpp", ".f90": "fortran", ".py": "python", ".yaml": "yaml", ".sh": "sh",
              ".txt": "cmake", ".cmake": "cmake", ".csv": "text"}
-_origins = {MOVED[name]: name for name in ("CHANGELOG.md", "CONTRIBUTING.md")}
+_origins = {MOVED["CONTRIBUTING.md"]: "CONTRIBUTING.md"}
 
 
 def _origin(src_path):

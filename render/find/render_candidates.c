@@ -20,7 +20,7 @@
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
 /* So many cells a pixel that their tree covers are small; of surfaces, cells in leaves that isovalues may cross
- * (docs/decisions/find.md). */
+ * (docs/development/decisions/find.md). */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */

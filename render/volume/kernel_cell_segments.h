@@ -43,7 +43,7 @@
  * short that it does not show.
  *
  * The error of a subinterval of length L, T being the light that comes to it from the stretch's begin
- * (docs/error_budget.md has the rest). Over the subinterval's values let extinction be from s0 to s1 and change by no
+ * (docs/development/error_budget.md has the rest). Over the subinterval's values let extinction be from s0 to s1 and change by no
  * more than s' per value, the colour by c', and let R be the colours' contrast. A field that is off by d on average
  * changes extinction by ds <= s' d, and no more than s1 - s0; light in the subinterval falls at least as exp(-s0 t), so
  * that R ds  is seen for no more than min(L, 1 / s0),    s1 dc  for min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) +

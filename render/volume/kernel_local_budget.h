@@ -1,5 +1,5 @@
 /* What segments of a ray in a hex, a wedge or a pyramid make wrong, and so how many there are to be
- * (kernel_local_segments.h has what they are, docs/error_budget.md what they may make wrong).
+ * (kernel_local_segments.h has what they are, docs/development/error_budget.md what they may make wrong).
  *
  * Let f be the field, v what segments have instead. Light changes by the integral of T g (v - f) along the ray, with g
  * = (s c)' - s' b, where b is the light of all that lies behind. On each segment v - f is of mean zero, but for what

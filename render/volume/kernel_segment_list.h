@@ -320,7 +320,7 @@ SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low,
 }
 
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
- * unit distance (docs/error_budget.md). */
+ * unit distance (docs/development/error_budget.md). */
 SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *b)
 {
     return simd_min(t->contrast * b->extinction_slope + b->extinction_high * b->colour_slope, 1e30f);
@@ -377,7 +377,7 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
     return any;
 }
 
-/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/error_budget.md: 4e-7 at
+/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/development/error_budget.md: 4e-7 at
  * most).
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f
