@@ -34,15 +34,16 @@ shows() {
     grep -qF "$1" "$folder/page" || fail "the page has no \"$1\""
 }
 
-performance=bench/pages/performance.py
+performance="bench/pages/performance.py measurements"
 accuracy=bench/pages/accuracy.py
 speeds=$(ls bench/results/*.csv | grep -v /accuracy-)
 errors=$(ls bench/results/accuracy-*.csv)
 
-same docs/performance.md $performance $speeds
+same docs/performance.md bench/pages/performance.py performance $speeds
+same docs/development/measurements.md $performance $speeds
 same docs/accuracy.md $accuracy $errors
 
-# A build of 10 ms beside 30 and 50 is 3 times as fast as the faster one: above the bar of 2. One of 20 ms is below it.
+# A build of 10 ms beside 30 and 50 is 3 times as fast as the faster one: above the goal of 2. One of 20 ms is below it.
 head=program,isa,threads,mesh,n,cells,measure,unit,count,median,min,max
 row=bench_peers,avx2,2,tets,31,20000
 cat >"$folder/held.csv" <<END
@@ -56,12 +57,12 @@ END
 sed 's/ms,5,10,9,12/ms,5,20,9,32/' "$folder/held.csv" >"$folder/missed.csv"
 $performance --partial "$folder/held.csv" >"$folder/page"
 shows '| SAH build, Mcells/s | Embree MEDIUM, the faster of binary and 8-wide | ≥ 2 | 3.00 (2.00 / 0.667) |'
-shows '0 of 1 bars are missed'
+shows '0 of 1 goals are missed'
 shows '10.0 (9.00–12.0)'
 ! grep -q 'load average' "$folder/page" || fail 'a load is taken for a machine'
 $performance --partial "$folder/missed.csv" "$folder/held.csv" >"$folder/page"
 shows '| ≥ 2 | **1.50** (1.00 / 0.667) |' # of a measure in two files the first one counts
-shows '1 of 1 bars are missed'
+shows '1 of 1 goals are missed'
 shows 'SAH build, on tets 31: 1.50, asked ≥ 2'
 
 # If there are several files the newest counts; files without a date count as the oldest.
@@ -108,6 +109,7 @@ sed 2d "$folder/held.csv" >"$folder/headless.csv"
 echo '# A machine' >"$folder/empty.csv"
 says 'is there one in bench/results?' $accuracy
 says 'are there any in bench/results?' $performance
+says 'the first argument names the page' bench/pages/performance.py "$folder/held.csv"
 says "$folder/none.csv: No such file" $performance "$folder/none.csv"
 says "$folder/none.csv: No such file" $accuracy "$folder/none.csv"
 says "no rows of render, light, steps, volumes, layers, cells, tables, scaling in $folder/held.csv" $performance "$folder/held.csv"

@@ -1,8 +1,8 @@
 #!/usr/bin/python3 -B
-"""Prints docs/performance.md, drawn from CSV files: performance.py [--partial] CSV ...
+"""Prints a page drawn from CSV files: performance.py PAGE [--partial] CSV ...
 
-Where a measure stands in several files the newest one counts. All sections must be there; --partial leaves out those
-that no file has.
+PAGE is "performance" for docs/performance.md, or "measurements" for docs/development/measurements.md. If a measure stands
+in several files the newest one counts. All sections must be there; --partial leaves out those that no file has.
 """
 
 import sys
@@ -12,6 +12,7 @@ import page
 from performance_bars import Standing, all_claims, span, span_of_speeds
 from performance_results import Mesh, Results
 
+PAGES = ("performance", "measurements")
 WIDTHS = {"avx512": "16, AVX-512", "avx2": "8, AVX2", "sse4.2": "4, SSE4.2", "plain": "4, plain C"}
 
 
@@ -81,6 +82,9 @@ def all_scalings(results):
 
 
 def draw(arguments):
+    name, arguments = arguments[0] if arguments else None, arguments[1:]
+    if name not in PAGES:
+        raise page.PageError(f"the first argument names the page: {' or '.join(PAGES)}")
     is_partial = arguments[:1] == ["--partial"]
     paths = arguments[is_partial:]
     if not paths:
@@ -90,7 +94,7 @@ def draw(arguments):
     if missing and not is_partial:
         raise page.PageError(f"no rows of {', '.join(dict.fromkeys(missing))} in {', '.join(paths)}")
     return page.fill_template(
-        "performance.md.j2", results=results, bars=Standing(all_claims(results)), hexes=Hexes(results),
+        f"{name}.md.j2", results=results, bars=Standing(all_claims(results)), hexes=Hexes(results),
         scalings=all_scalings(results), agreements=all_agreements(results["peers"].meshes),
         disagreement=count_disagreements([results["render"], results["tables sizes"]]), span_of_speeds=span_of_speeds)
 
