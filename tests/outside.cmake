@@ -15,6 +15,8 @@ set_tests_properties(outside_project_builds_and_runs PROPERTIES
 set(insitu_headers_of ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu)
 add_test(NAME exported_symbols COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu> libinsitu.so.0
   ${insitu_headers_of}/insitu.h ${insitu_headers_of}/status.h)
+add_test(NAME exported_symbols_of_archive COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu_static> -
+  ${insitu_headers_of}/insitu.h ${insitu_headers_of}/status.h)
 add_test(NAME exported_symbols_of_image COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu_image>
   libinsitu_image.so ${insitu_headers_of}/image_output.h)
 if(TARGET insitu_vtk)
@@ -27,6 +29,9 @@ endif()
 add_test(NAME packages COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/packages.sh ${CMAKE_CPACK_COMMAND} ${PROJECT_BINARY_DIR}
   ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set_tests_properties(packages PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77)
+# The lines of docs/packaging.md, run as they stand: a build from the source, an installation, and programs linked to it.
+insitu_add_long_test(packaging_by_the_letter ${CMAKE_CURRENT_SOURCE_DIR}/packaging_by_the_letter.sh ${PROJECT_SOURCE_DIR}
+  ${CMAKE_CURRENT_BINARY_DIR}/by_the_letter)
 insitu_add_long_test(packages_in_a_bare_debian ${CMAKE_CURRENT_SOURCE_DIR}/package_chroot.sh ${CMAKE_CPACK_COMMAND}
   ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_BINARY_DIR}/bare)
 set_tests_properties(packages_in_a_bare_debian PROPERTIES SKIP_RETURN_CODE 77)
