@@ -91,8 +91,9 @@ static const cyaml_schema_value_t point = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .by_default = "none", .child = &orbit_mapping)                                                                   \
     X(CYAML_FIELD_SEQUENCE("path", POINTER, scene_file_camera, path, &point, 1, 256),                                  \
       .help = "Places that the camera goes through as the run goes on. Between two of them each coordinate and the "   \
-              "angle follow a cubic whose slope at a place is the harmonic mean of the slopes to its neighbours, and " \
-              "0 at the ends and where the coordinate turns: the camera begins and ends at rest, moves without a "     \
+              "angle follow a cubic whose slope at a place is the weighted harmonic mean of the slopes to its "        \
+              "neighbours, and 0 at the ends and where the coordinate turns: the camera begins and ends at rest, "     \
+              "moves without a "                                                                                       \
               "jerk, and never beyond the coordinates of the two places. It stands at the first before, and at the "   \
               "last after. Not with `position`, `automatic` or `orbit`.",                                              \
       .by_default = "none", .child = &point_mapping)
