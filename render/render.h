@@ -89,7 +89,7 @@ typedef struct render_transfer {
     double unit_distance; /* scene units, > 0 */
 } render_transfer;
 
-enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 16, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
+enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 64, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
 enum { RENDER_MAX_GROUP = 64 };
 enum { RENDER_MAX_CLIPS = 32 };
 enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };

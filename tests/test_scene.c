@@ -623,6 +623,9 @@ static const char *const good_lines[] = {
 enum { good_line_count = sizeof good_lines / sizeof *good_lines };
 
 #define V "{volume: {field: f}}"
+#define FIFTY                                                                                                          \
+    "0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21,22,23,24,25,26,27,28,29,30,31,32,33,34,35,36,37,38,39,"   \
+    "40,41,42,43,44,45,46,47,48,49"
 #define AT_THE(keys) "{position: [0, 0, 5], focal: [0, 0, 0], " keys "}"
 #define AT "{position: [0, 0, 5], focal: [0, 0, 0]}"
 
@@ -727,17 +730,20 @@ static const struct bad_file {
     {8, "    ambient_occlusion: {radius: 0}", 8, {"ambient_occlusion.radius: \"0\"", "above 0 and at most 1e+30"}},
     {8, "    lights: [{direction: [0, 0, 1], intensity: -1}]", 8, {"lights[0].intensity: \"-1\"", "from 0 to 100"}},
     {9, "    layers: []\n    layer:", 9, {"images[0].layers: a list of 0", "1 to 20 mappings"}},
-    {10, "      - isosurface: {field: f}", 10, {"isosurface.values: missing", "a list of 1 to 16 numbers"}},
+    {10, "      - isosurface: {field: f}", 10, {"isosurface.values: missing", "a list of 1 to 64 numbers"}},
     {10, "      - isosurface: {values: [1]}", 10, {"layers[0].isosurface.field: missing", "a text"}},
     {10, "      - isosurface: {field: f, values: []}", 10, {"isosurface.values: a list of 0"}},
     {10, "      - isosurface: {field: f, values: one}", 10, {"isosurface.values: \"one\"", "a list"}},
     {10, "      - isosurface: {field: f, values: [1,\n        2, 1]}", 11, {"values[2]: 1 is there twice"}},
     {10,
-     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8]}\n"
-     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7]}",
+     "      - isosurface: {field: f, values: [" FIFTY ",50,51]}\n"
+     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8,9,10,11,12]}",
      11,
-     {"layers[1]: 17 isovalues", "at most 16"}},
-    {10, "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]}", 10, {"a list of 17"}},
+     {"layers[1]: 65 isovalues", "at most 64"}},
+    {10,
+     "      - isosurface: {field: f, values: [" FIFTY ",50,51,52,53,54,55,56,57,58,59,60,61,62,63,64]}",
+     10,
+     {"a list of 65"}},
     {10, "      - isosurface: {field: f, values: [1], colours: [[1,0,0],[0,1,0]]}", 10, {"2 colours for 1 values"}},
     {10, "      - isosurface: {field: f, values: [1], colours: [[1,0]]}", 10, {"colours[0]: a list of 2", "of 3"}},
     {10, "      - isosurface: {field: f, values: [1], colours: [[1,0,2]]}", 10, {"colours[0][2]: \"2\"", "0 to 1"}},
@@ -794,9 +800,9 @@ static const struct bad_file {
     {11, "      - surface: {opacity: -1}", 11, {"surface.opacity: \"-1\"", "from 0 to 1"}},
     {11, "      - {surface: {}, slice: {field: f, planes: [{normal: [0, 0, 1]}]}}", 11, {"holds more than one layer"}},
     {11, "      - clips: {field: f}", 11, {"layers[1]: the key \"clips\" is unknown", "isosurface, volume, slice"}},
-    {11, "      - slice: {field: f, planes: 2}", 11, {"slice.planes: \"2\"", "a list of 1 to 16 mappings"}},
+    {11, "      - slice: {field: f, planes: 2}", 11, {"slice.planes: \"2\"", "a list of 1 to 64 mappings"}},
     {11, "      - slice: {planes: [{normal: [0, 0, 1]}]}", 11, {"slice.field: missing", "a text"}},
-    {11, "      - slice: {field: f, planes: []}", 11, {"slice.planes: a list of 0", "1 to 16"}},
+    {11, "      - slice: {field: f, planes: []}", 11, {"slice.planes: a list of 0", "1 to 64"}},
     {11, "      - slice: {field: f, planes: [{}]}", 11, {"planes[0].normal: missing", "a list of 3 numbers"}},
     {11,
      "      - slice:\n          field: f\n          planes:\n            - {normal: [1, 0, 0]}\n"
@@ -816,10 +822,10 @@ static const struct bad_file {
      11,
      {"slice.range", "does not rise"}},
     {10,
-     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15]}\n"
+     "      - isosurface: {field: f, values: [" FIFTY ",50,51,52,53,54,55,56,57,58,59,60,61,62,63]}\n"
      "      - slice: {field: f, planes: [{normal: [0, 0, 1]}]}",
      11,
-     {"layers[1]: 17 isovalues, planes and outer surfaces", "at most 16"}},
+     {"layers[1]: 65 isovalues, planes and outer surfaces", "at most 64"}},
     {11, "      - " V "\n      - " V "\n      - " V "\n      - " V "\n      - " V, 15, {"5 volumes", "at most 4"}},
     {11, "      - volume: {field: f, range: [2, 1]}", 11, {"volume.range: [2, 1] does not rise", "low < high"}},
     {11, "      - volume: {field: f, opacity: [[0, 0], [0.5, 1], [0.4, 0]]}", 11, {"opacity[2]: 0.4 comes after 0.5"}},

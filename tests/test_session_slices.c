@@ -161,6 +161,78 @@ static void planes_are_true_and_one_picture_on_any_ranks(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_are_one_picture_of(kind);
 }
 
+/* ---- many ---------------------------------------------------------------------------------------------------- */
+
+enum { MANY_VALUES = 40, MANY_PLANES = 24 };
+
+static double many_value(int i)
+{
+    return -1.37 + 0.0713 * i;
+}
+
+static double many_distance(int i)
+{
+    return -0.93 + 0.0817 * i;
+}
+
+/* As many isovalues and planes as an image may have, each of opacity 0.05. */
+static const char *write_many(void)
+{
+    char text[8192];
+    int at = snprintf(text, sizeof text, "%s      - isosurface: {field: f, opacity: 0.05, values: [", IMAGE_BEGIN(""));
+    for (int i = 0; i < MANY_VALUES; i++)
+        at += snprintf(text + at, sizeof text - (size_t)at, "%s%.4f", i ? ", " : "", many_value(i));
+    at += snprintf(text + at, sizeof text - (size_t)at, "]}\n      - slice: {field: f, opacity: 0.05, planes: [");
+    for (int i = 0; i < MANY_PLANES; i++)
+        at += snprintf(text + at, sizeof text - (size_t)at, "%s{normal: [1, 0, 0], offset: %.4f}", i ? ", " : "",
+                       many_distance(i));
+    snprintf(text + at, sizeof text - (size_t)at, "]}\n" IMAGE_END);
+    return write_scene(text);
+}
+
+/* Each crossing of a ray leaves 0.95 of what is behind it. The surfaces of a linear field are planes, too. Each of at
+ * most 64 products is rounded to single precision: 64 x 2^-23 < 1e-5. */
+static bool has_many(const caught_picture *picture)
+{
+    int most = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const ray r = ray_of(pixel);
+        int crossings = 0;
+        bool is_near_border = false;
+        for (int i = 0; i < MANY_VALUES + MANY_PLANES; i++) {
+            const plane p = i < MANY_VALUES ? (plane){{0.3, -0.7, 0.5}, many_value(i) - 0.1}
+                                            : (plane){{1, 0, 0}, many_distance(i - MANY_VALUES)};
+            double at[3];
+            meet(&r, &p, at);
+            const double outside = outside_by(at);
+            is_near_border = is_near_border || fabs(outside) < 1e-4;
+            crossings += outside < 0;
+        }
+        const double expected = 1 - pow(0.95, crossings), opacity = (double)picture->rgba[4 * pixel + 3];
+        if (crossings > most) most = crossings;
+        if (is_near_border || fabs(opacity - expected) < 1e-5) continue;
+        fprintf(stderr, "pixel %d: opacity %g, expected %g\n", pixel, opacity, expected);
+        return false;
+    }
+    return most > 30;
+}
+
+static void many_isovalues_and_planes_are_all_drawn(void **state)
+{
+    (void)state;
+    const char *scene = write_many();
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input whole = {0}, part = {0};
+        make_whole(kind, 0.2, &whole);
+        take_part(&whole, TEST_RANDOM, false, &part);
+        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
+        everywhere(own_rank != 0 || has_many(&picture));
+        free_caught(&picture);
+        input_free(&part);
+        input_free(&whole);
+    }
+}
+
 /* ---- planes in faces ----------------------------------------------------------------------------------------- */
 
 /* Every ray that meets the plane in the cube has the slice once: 0.5 of opacity. */
@@ -328,6 +400,7 @@ static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(planes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(many_isovalues_and_planes_are_all_drawn),
         cmocka_unit_test(planes_in_faces_are_drawn_once),
         cmocka_unit_test(planes_on_the_border_are_drawn),
         cmocka_unit_test(planes_beside_the_data_are_warned_of),

@@ -98,7 +98,7 @@ typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES, SCENE_VERTEX } sc
 
 typedef struct scene_isosurface {
     scene_field field;
-    int value_count; /* 1 .. 16 */
+    int value_count; /* 1 .. 64 */
     double *values;
     float *colours; /* value_count × 3, linear: those given, the last repeated; or a default cycle */
     bool has_colour_by;
@@ -166,7 +166,7 @@ typedef struct scene_clip {
 
 typedef struct scene_slice {
     scene_field field;
-    int plane_count; /* 1 .. 16 */
+    int plane_count; /* 1 .. 64 */
     scene_plane *planes;
     scene_colour_map colour_map;
     float opacity;

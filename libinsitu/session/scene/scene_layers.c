@@ -8,11 +8,11 @@
 #include "colour_map.h"
 #include "memory.h"
 
-enum { max_isovalues = 16, max_volumes = 4 };
+enum { max_isovalues = 64, max_volumes = 4, cycle_length = 16 };
 
 /* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
  * from green. */
-static const float cycle[max_isovalues][3] = {
+static const float cycle[cycle_length][3] = {
     {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
     {0.55F, 0.40F, 0.30F}, {0.65F, 0.85F, 0.45F}, {0.25F, 0.35F, 0.60F}, {0.95F, 0.78F, 0.65F},
@@ -52,7 +52,7 @@ static insitu_status convert_colours(const scene_document *d, const char *path, 
     for (int i = 0; i < in->values_count; i++) {
         const int given = i < in->colours_count ? i : in->colours_count - 1;
         for (int c = 0; c < 3; c++) {
-            const float srgb = in->colours ? (float)in->colours[given][c] : cycle[(first + i) % max_isovalues][c];
+            const float srgb = in->colours ? (float)in->colours[given][c] : cycle[(first + i) % cycle_length][c];
             out->colours[3 * i + c] = colour_linear_from_srgb(srgb);
         }
     }
