@@ -88,6 +88,50 @@ static void make_nothing(session_input *in)
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = NAN;
 }
 
+/* Keeps the first face of each hex, as a quad. */
+static void make_shells(session_input *in)
+{
+    for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
+        for (int i = 0; i < 4; i++) in->part.connectivity[4 * cell + i] = in->part.connectivity[8 * cell + i];
+        in->part.types[cell] = INSITU_QUAD;
+        in->part.offsets[cell + 1] = 4 * (cell + 1);
+    }
+    in->part.connectivity_count = 4 * in->part.cell_count;
+    input_describe(in);
+}
+
+/* The values are x, and the hexes that have some above 0 become shells. */
+static void make_some_shells(session_input *in)
+{
+    int64_t at = 0;
+    for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = in->part.coordinates[3 * v];
+    for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
+        const int64_t *vertices = in->part.connectivity + 8 * cell;
+        bool is_low = true;
+        for (int i = 0; i < 8; i++) is_low = is_low && in->part.values[vertices[i]] < 0;
+        const int count = is_low ? 8 : 4;
+        for (int i = 0; i < count; i++) in->part.connectivity[at + i] = vertices[i];
+        if (!is_low) in->part.types[cell] = INSITU_QUAD;
+        in->part.offsets[cell] = at;
+        at += count;
+    }
+    in->part.offsets[in->part.cell_count] = at;
+    in->part.connectivity_count = at;
+    input_describe(in);
+}
+
+/* No value is below 0.1, which float32 has not. */
+static void make_least(session_input *in)
+{
+    for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmax(in->part.values[v], 0.1);
+}
+
+/* No value is above it. */
+static void make_most(session_input *in)
+{
+    for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmin(in->part.values[v], 0.1);
+}
+
 /* ---- warnings ------------------------------------------------------------------------------------------------ */
 
 static const struct warning_case {
@@ -137,6 +181,99 @@ static const struct warning_case {
      TEST_HEXES,
      centre_on_cells,
      {"\"f\" at 0.1 is empty: the field goes from 5 to 5"}},
+    {"an isovalue that is the least",
+     plain,
+     TEST_HEXES,
+     make_least,
+     {"the isosurface of \"f\" at 0.1 is empty: the field goes from 0.1 to ", "nothing below it"}},
+    {"an isovalue that is the least, of a full tree",
+     "tree: full\n" IMAGE("[24, 16]", "", SURFACE ", {isosurface: {field: f, values: [0.2]}}", ""),
+     TEST_TETS,
+     make_least,
+     {"the isosurface of \"f\" at 0.1 is empty: the field goes from 0.1 to "}},
+    {"an isovalue that is the greatest", plain, TEST_HEXES, make_most, {NULL}},
+    {"an isosurface of shells",
+     plain,
+     TEST_HEXES,
+     make_shells,
+     {"image \"a\": the isosurface of \"f\" shows nothing: ", "mesh \"m\"", "kind surface"}},
+    {"a volume of shells",
+     IMAGE("[24, 16]", "", VOLUME, ""),
+     TEST_HEXES,
+     make_shells,
+     {"the volume of \"f\" shows nothing: ", "kind surface"}},
+    {"a slice of shells",
+     IMAGE("[24, 16]", "", "{slice: {field: f, planes: [{normal: [1, 0, 0]}]}}", ""),
+     TEST_HEXES,
+     make_shells,
+     {"the slice of \"f\" shows nothing: ", "kind surface"}},
+    {"a surface of shells", IMAGE("[24, 16]", "", "{surface: {}}", ""), TEST_HEXES, make_shells, {NULL}},
+    {"an isovalue that shells alone have",
+     plain,
+     TEST_HEXES,
+     make_some_shells,
+     {"the isosurface of \"f\" at 0.1 is empty: the field goes from -"}},
+    {"a volume whose range lies above the field",
+     IMAGE("[24, 16]", "", "{volume: {field: f, range: [10, 20]}}", ""),
+     TEST_HEXES,
+     NULL,
+     {"image \"a\": the volume of \"f\" shows nothing: the field goes from -", "opacity is 0"}},
+    {"a volume whose range lies above the field, of a full tree",
+     "tree: full\n" IMAGE("[24, 16]", "", "{volume: {field: f, range: [10, 20]}}", ""),
+     TEST_TETS,
+     NULL,
+     {"image \"a\": the volume of \"f\" shows nothing: the field goes from -", "opacity is 0"}},
+    {"a volume without opacity",
+     IMAGE("[24, 16]", "", "{volume: {field: f, opacity: [[0, 0], [1, 0]]}}", ""),
+     TEST_HEXES,
+     NULL,
+     {"the volume of \"f\" shows nothing: the field goes from -", "opacity is 0"}},
+    {"a volume whose range lies below the field",
+     IMAGE("[24, 16]", "", "{volume: {field: f, range: [-20, -10]}}", ""),
+     TEST_HEXES,
+     NULL,
+     {NULL}},
+    {"a threshold that no cell is within",
+     IMAGE("[24, 16]", "", "{surface: {threshold: {field: f, from: 10, to: 20}}}", ""),
+     TEST_HEXES,
+     NULL,
+     {"image \"a\": a surface is empty: no cell is within its threshold, from 10 to 20 of \"f\"", "goes from -"}},
+    {"a threshold that cells are within",
+     IMAGE("[24, 16]", "", "{surface: {threshold: {field: f, from: -20, to: 20}}}", ""),
+     TEST_HEXES,
+     NULL,
+     {NULL}},
+    {"a plane that cuts all away",
+     IMAGE("[24, 16]", "    clip: {planes: [{normal: [1, 0, 0], point: [-3, 0, 0]}]}\n", SURFACE ", " VOLUME, ""),
+     TEST_HEXES,
+     NULL,
+     {"image \"a\": clip leaves nothing of the picture: the cells lie between (-1, -1, -1) and (1, 1, 1)"}},
+    {"planes that cut all away together",
+     IMAGE("[24, 16]", "",
+           "{volume: {field: f, clip: {planes: [{normal: [1, 1, 0], point: [-0.4, -0.4, 0]}, "
+           "{normal: [-1, -1, 0], point: [0.4, 0.4, 0]}]}}}, " SURFACE,
+           ""),
+     TEST_HEXES,
+     NULL,
+     {"image \"a\": clip leaves nothing of the volume of \"f\": "}},
+    {"a sphere beside the cells",
+     IMAGE("[24, 16]", "", "{isosurface: {field: f, values: [0.1], clip: {sphere: {centre: [2, 2, 2], radius: 1.7}}}}",
+           ""),
+     TEST_HEXES,
+     NULL,
+     {"clip leaves nothing of the isosurface of \"f\": "}},
+    {"a box around the cells, of which the outside is kept",
+     IMAGE("[24, 16]", "", "{surface: {clip: {box: [[-1.1, -1.1, -1.1], [1.1, 1.1, 1.1]], keep: outside}}}, " SURFACE,
+           ""),
+     TEST_HEXES,
+     NULL,
+     {"clip leaves nothing of the surface: "}},
+    {"clips that leave something",
+     IMAGE("[24, 16]", "    clip: {planes: [{normal: [1, 0, 0]}], sphere: {centre: [0, 0, 0], radius: 0.9}}\n",
+           "{isosurface: {field: f, values: [0.1], clip: {box: [[-1, -1, -1], [-0.1, 1, 1]], keep: inside}}}", ""),
+     TEST_HEXES,
+     NULL,
+     {NULL}},
     {"a logarithm of nothing",
      IMAGE("[24, 16]", "", "{surface: {colour_by: {field: f, scale: log}}}", ""),
      TEST_HEXES,

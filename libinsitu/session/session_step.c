@@ -12,10 +12,10 @@
 #include "session_checksums.h"
 #include "session_distances.h"
 #include "session_draw.h"
+#include "session_empty_layers.h"
 #include "session_events.h"
 #include "session_filled.h"
 #include "session_guard.h"
-#include "session_isovalues.h"
 #include "session_recentre.h"
 #include "session_smooth.h"
 #include "session_summary.h"
@@ -121,7 +121,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) { /* their failure, and what the phases above left, is told by the reduction after them */
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
-        status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
+        status = session_check_empty_layers(&plan, &s->meshes, team, &s->report, error);
     }
     if (!status) status = session_draw_images(&drawing, &plan, error);
     if (!status) note_drawn(s, &plan);

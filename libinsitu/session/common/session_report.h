@@ -40,19 +40,23 @@ void session_report_end(session_report *report);
 void session_report_free(session_report *report);
 
 typedef enum session_warning_kind {
-    WARNING_ORDER,    /* the vertices of cells are in another order than VTK's, as far as volumes tell */
-    WARNING_ISOVALUE, /* an isovalue lies outside of its field */
-    WARNING_PLANE,    /* a plane lies outside of the meshes that it is drawn on */
-    WARNING_SAMPLES,  /* several volumes are sampled by default, to no error */
-    WARNING_SCALE,    /* a field has no value that its logarithmic scale can show */
-    WARNING_NARROW,   /* values are too near to one another for the colours of their range */
-    WARNING_REPLACED, /* a picture takes the place of an earlier one */
-    WARNING_VIEW,     /* a camera sees no cell */
-    WARNING_GREY,     /* a surface does not have the field that colours it */
-    WARNING_OVERLAP,  /* cells overlap in some pixels */
-    WARNING_WORDS,    /* words of a picture are not drawn as they are written */
-    WARNING_WRITER,   /* rank 0 has no thread to write pictures */
-    WARNING_ISA       /* INSITU_ISA of this rank's environment is not taken */
+    WARNING_ORDER,       /* the vertices of cells are in another order than VTK's, as far as volumes tell */
+    WARNING_ISOVALUE,    /* an isovalue lies outside of its field */
+    WARNING_TRANSPARENT, /* a volume shows no value of its field */
+    WARNING_THRESHOLD,   /* no cell is within a threshold */
+    WARNING_PLANE,       /* a plane lies outside of the meshes that it is drawn on */
+    WARNING_CLIP,        /* clips leave nothing of a layer */
+    WARNING_SHELLS,      /* a layer for cells with volume is on shells alone */
+    WARNING_SAMPLES,     /* several volumes are sampled by default, to no error */
+    WARNING_SCALE,       /* a field has no value that its logarithmic scale can show */
+    WARNING_NARROW,      /* values are too near to one another for the colours of their range */
+    WARNING_REPLACED,    /* a picture takes the place of an earlier one */
+    WARNING_VIEW,        /* a camera sees no cell */
+    WARNING_GREY,        /* a surface does not have the field that colours it */
+    WARNING_OVERLAP,     /* cells overlap in some pixels */
+    WARNING_WORDS,       /* words of a picture are not drawn as they are written */
+    WARNING_WRITER,      /* rank 0 has no thread to write pictures */
+    WARNING_ISA          /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;
 
 /* The subject of a warning. Two warnings are the same if all of this is. */

@@ -38,8 +38,9 @@ void session_hanging_free(session_hanging *hanging);
 
 typedef struct session_catalogue_mesh {
     char *name;
-    int first_rank; /* that has cells of it; -1: none */
-    bool has_ids;   /* all of these give vertex ids */
+    int first_rank;        /* that has cells of it; -1: none */
+    bool has_ids;          /* all of these give vertex ids */
+    bool has_shells_alone; /* the cells that are drawn, of all ranks; found by session_check_vertex_order() */
     int field_count;
     session_catalogue_field *fields;
     session_homes homes;      /* this rank's view of the parts; known where it has been asked for since cells changed */

@@ -22,6 +22,14 @@ typedef struct session_field {
     int64_t copy_bytes;
 } session_field;
 
+/* Which of the drawn cells all of whose values are finite. */
+typedef enum session_extent_kind {
+    SESSION_SEEN,     /* all of them */
+    SESSION_POSITIVE, /* the least value over those of them all of whose values are positive */
+    SESSION_SOLID,    /* without shells */
+    SESSION_EXTENTS
+} session_extent_kind;
+
 /* low > high: there are no values. */
 typedef struct session_extremes {
     bool is_known;
@@ -64,8 +72,7 @@ typedef struct session_scalar {
     float *pairs;        /* NULL until computed */
     bool are_ranges_stale;
     int64_t unusable;
-    session_extremes extremes; /* over drawn cells all of whose values are finite */
-    session_extremes positive; /* low: over those of them whose values are positive */
+    session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
 /* A face of a cell, by its place in the cell's faces (session_cell_faces.h). */

@@ -44,20 +44,13 @@ static bool add_surface(session_scalar *scalar, const scene_isosurface *layer)
     return is_added;
 }
 
-static bool add_volume(session_scalar *scalar, const scene_volume *layer, double half_diagonal)
+static bool add_volume(session_scalar *scalar, const scene_volume *layer)
 {
-    const scene_range *range = &layer->colour_map.range;
-    session_transfer t;
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
+    const int count = session_visible_intervals(layer, intervals);
     /* A range from the data is known when all ranks have told theirs. */
-    if (!range->is_fixed) {
-        scalar->needs_all = true;
-        return true;
-    }
-    if (!session_make_transfer(half_diagonal, &layer->colour_map, range->low, range->high, layer, &t)) return false;
-    const bool is_added = add_intervals(scalar, intervals, render_visible_intervals(&t.transfer, intervals));
-    session_transfer_free(&t);
-    return is_added;
+    if (!layer->colour_map.range.is_fixed) scalar->needs_all = true;
+    return scalar->needs_all || add_intervals(scalar, intervals, count);
 }
 
 static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
@@ -69,11 +62,11 @@ static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
-static bool mark_volume(session_mesh *mesh, const scene_volume *layer, double half_diagonal)
+static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
 {
     session_scalar *scalar;
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
-    return !scalar || add_volume(scalar, layer, half_diagonal);
+    return !scalar || add_volume(scalar, layer);
 }
 
 /* The distance that is drawn is 0 or nearly so: see session_slice_distance(). */
@@ -107,8 +100,7 @@ static bool mark_image(session_mesh *mesh, const scene_image *image, const sessi
     bool is_marked = true;
     for (int i = 0; i < image->isosurface_count && is_marked; i++)
         is_marked = mark_surface(mesh, &image->isosurfaces[i]);
-    for (int i = 0; i < image->volume_count && is_marked; i++)
-        is_marked = mark_volume(mesh, &image->volumes[i], extent->half_diagonal);
+    for (int i = 0; i < image->volume_count && is_marked; i++) is_marked = mark_volume(mesh, &image->volumes[i]);
     for (int i = 0; i < image->surface_count && is_marked; i++) is_marked = mark_outer(mesh, &image->surfaces[i]);
     for (int i = 0; i < image->slice_count && is_marked; i++) is_marked = mark_slice(mesh, &image->slices[i], extent);
     return is_marked;

@@ -274,6 +274,35 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     }
 }
 
+/* Warns of a layer whose meshes have no cells but shells. */
+static void warn_of_shells(const session_catalogue *catalogue, const scene_image *image, const char *layer,
+                           const scene_field *field, session_report *report)
+{
+    const char *name = NULL;
+    bool is_empty = true;
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        if (mesh->first_rank < 0 || !find_shown(mesh, field)) continue;
+        is_empty = is_empty && mesh->has_shells_alone;
+        if (!name) name = mesh->name;
+    }
+    const session_warning warning = {WARNING_SHELLS, image->name, field->name, field->line};
+    session_warn(report, &warning, name && is_empty,
+                 "image \"%s\": the %s of \"%s\" shows nothing: the cells that have the field, as on mesh \"%s\", are "
+                 "triangles, quads and polygons, which layers of kind surface draw",
+                 image->name, layer, field->name, name ? name : "");
+}
+
+static void warn_of_shells_alone(const session_catalogue *catalogue, const scene_image *image, session_report *report)
+{
+    for (int i = 0; i < image->isosurface_count; i++)
+        warn_of_shells(catalogue, image, "isosurface", &image->isosurfaces[i].field, report);
+    for (int i = 0; i < image->volume_count; i++)
+        warn_of_shells(catalogue, image, "volume", &image->volumes[i].field, report);
+    for (int i = 0; i < image->slice_count; i++)
+        warn_of_shells(catalogue, image, "slice", &image->slices[i].field, report);
+}
+
 static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_image *image, session_report *report)
 {
     for (int i = 0; i < image->isosurface_count; i++)
@@ -289,6 +318,7 @@ static bool can_be_drawn(const session_plan_basis *basis, const scene_image *ima
     if (basis->extent->cell_count == 0) return true;
     if (check_image(basis, image, refusal) != INSITU_OK) return false;
     warn_of_grey_layers(basis->catalogue, image, report);
+    warn_of_shells_alone(basis->catalogue, image, report);
     return true;
 }
 

@@ -25,7 +25,8 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
         if (scalar && of->plane) scalar = session_find_distance(mesh, of->plane);
         if (!scalar) continue;
         double least, most;
-        session_scalar_extent(mesh, scalar, team->threads, of->is_positive, &least, &most);
+        session_scalar_extent(mesh, scalar, team->threads, of->is_positive ? SESSION_POSITIVE : SESSION_SEEN, &least,
+                              &most);
         mine[0] = fmin(mine[0], least);
         mine[1] = fmin(mine[1], -most);
     }

@@ -153,6 +153,19 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
     return true;
 }
 
+int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS])
+{
+    const scene_range *range = &volume->colour_map.range;
+    scene_colour_map map = volume->colour_map; /* the least of colours, for which no memory is taken */
+    map.is_banded = map.has_below = map.has_above = false;
+    session_transfer t;
+    session_make_transfer(1, &map, range->is_fixed ? range->low : 0, range->is_fixed ? range->high : 1, volume, &t);
+    const int count = render_visible_intervals(&t.transfer, out);
+    if (count == 0 || range->is_fixed) return count;
+    out[0] = (mmbvh_interval){-INFINITY, INFINITY};
+    return 1;
+}
+
 void session_transfer_free(session_transfer *transfer)
 {
     base_free(transfer->table);

@@ -25,6 +25,10 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
 bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 
+/* The values at which a volume is not transparent, for all that is known before the data's range is; returns how many
+ * intervals. Local, the same everywhere. */
+int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
+
 /* Tells whether the values of a range are so near to one another that float32, after the range's low end was taken from
  * them in double, shows their rounding. */
 bool session_is_too_narrow(double low, double high);

@@ -94,7 +94,7 @@ static void compare(const session_mesh *mesh, session_scalar *scalar, int thread
     scalar->checksum = checksum;
     scalar->are_ranges_stale = true;
     scalar->version++;
-    scalar->extremes.is_known = scalar->positive.is_known = false;
+    session_forget_extents(scalar);
 }
 
 void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report)

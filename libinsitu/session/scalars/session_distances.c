@@ -109,7 +109,7 @@ static bool update_distance(const session_mesh *mesh, session_scalar *scalar, in
     compute(mesh, &scalar->plane, threads, scalar->distances);
     scalar->are_values_stale = false;
     scalar->are_ranges_stale = true;
-    scalar->extremes.is_known = scalar->positive.is_known = false;
+    session_forget_extents(scalar);
     return true;
 }
 

@@ -136,8 +136,13 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-/* has_shells is false for planes, which cut no shells. */
-static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool has_shells,
+/* Planes cut no shells. */
+static bool has_shells(const session_scalar *scalar, session_extent_kind kind)
+{
+    return kind != SESSION_SOLID && !scalar->distances;
+}
+
+static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool of_shells,
                                     bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
@@ -146,7 +151,7 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
         region_enter();
 #pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
         for (int64_t cell = 0; cell < g->cell_count; cell++) {
-            if (has_shells ? !grid_is_seen(g, cell) : !grid_is_drawn(g, cell)) continue;
+            if (of_shells ? !grid_is_seen(g, cell) : !grid_is_drawn(g, cell)) continue;
             const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
             if (!of_cell.is_finite) continue;
             if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);
@@ -157,14 +162,20 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
     return (session_extremes){true, least, most};
 }
 
-void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, bool is_positive, double *low,
-                           double *high)
+void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
+                           double *low, double *high)
 {
-    session_extremes *known = is_positive ? &scalar->positive : &scalar->extremes;
+    const bool is_same = kind == SESSION_SOLID && mesh->shell_count == 0;
+    session_extremes *known = &scalar->extremes[is_same ? SESSION_SEEN : kind];
     if (!known->is_known) {
         const grid_field field = session_scalar_field(mesh, scalar);
-        *known = find_extent(&mesh->cells, &field, threads, !scalar->distances, is_positive);
+        *known = find_extent(&mesh->cells, &field, threads, has_shells(scalar, kind), kind == SESSION_POSITIVE);
     }
     *low = known->low;
     *high = known->high;
+}
+
+void session_forget_extents(session_scalar *scalar)
+{
+    for (int kind = 0; kind < SESSION_EXTENTS; kind++) scalar->extremes[kind].is_known = false;
 }

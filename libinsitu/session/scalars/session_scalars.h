@@ -42,9 +42,11 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
 /* The ranges of a scalar in use. */
 mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 
-/* Least and greatest value over the drawn cells all of whose values are finite; low > high: there are none.
- * is_positive: the least over those of them all of whose values are positive. Parallel. Local. */
-void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, bool is_positive, double *low,
-                           double *high);
+/* Least and greatest value over drawn cells all of whose values are finite; low > high: there are none. Parallel.
+ * Local. */
+void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
+                           double *low, double *high);
+/* The values have changed. */
+void session_forget_extents(session_scalar *scalar);
 
 #endif

@@ -20,7 +20,7 @@ static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD
 /* Of the cells of a type. */
 enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
 
-enum cell_sum { DRAWN, FLAT, INVERTED, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
+enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
 /* Tells whether the cell's corners agree if its vertices stand in the order, and not in the one that they are read in.
  */
@@ -70,6 +70,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     sums[DRAWN] = mesh->drawn_count - mesh->shell_count;
     sums[FLAT] = mesh->flat_count - mesh->shell_count;
     sums[INVERTED] = mesh->inverted_count;
+    sums[SHELLS] = mesh->shell_count;
     sum_orders(mesh, sums);
 }
 
@@ -144,8 +145,8 @@ static void warn_of_order(session_report *report, const char *mesh, const int64_
         mesh, inverted, drawn);
 }
 
-insitu_status session_check_vertex_order(const session_meshes *meshes, const session_catalogue *catalogue,
-                                         MPI_Comm comm, session_report *report, base_error *error)
+insitu_status session_check_vertex_order(const session_meshes *meshes, session_catalogue *catalogue, MPI_Comm comm,
+                                         session_report *report, base_error *error)
 {
     const size_t words = (size_t)catalogue->mesh_count * CELL_SUMS;
     int64_t *sums = base_calloc(words, sizeof *sums);
@@ -156,8 +157,11 @@ insitu_status session_check_vertex_order(const session_meshes *meshes, const ses
     if (!status)
         status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, (int)words, MPI_INT64_T, MPI_SUM, comm),
                              "MPI_Allreduce");
-    for (int m = 0; m < catalogue->mesh_count && !status; m++)
-        warn_of_order(report, catalogue->meshes[m].name, sums + m * CELL_SUMS);
+    for (int m = 0; m < catalogue->mesh_count && !status; m++) {
+        const int64_t *of_mesh = sums + m * CELL_SUMS;
+        catalogue->meshes[m].has_shells_alone = of_mesh[DRAWN] == 0 && of_mesh[SHELLS] > 0;
+        warn_of_order(report, catalogue->meshes[m].name, of_mesh);
+    }
     base_free(sums);
     return status;
 }

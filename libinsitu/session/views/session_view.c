@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "session_camera.h"
-#include "session_distances.h"
+#include "session_clips.h"
 
 static double length(const double v[3])
 {
@@ -174,38 +174,6 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
                  why ? why : "");
 }
 
-/* ---- clipping ------------------------------------------------------------------------------------------------ */
-
-/* The kept region is widened by twice what a slice's plane may be from its place, so that a slice in it is seen. */
-static render_clip make_clip(const session_extent *e, const scene_clip *clip)
-{
-    const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
-    render_clip out = {.is_outside = clip->is_outside, .radius = fmax(clip->radius + grown, 0)};
-    double point[3];
-    memcpy(out.centre, clip->centre, sizeof out.centre);
-    for (int axis = 0; axis < 3; axis++) {
-        const double middle = 0.5 * (clip->lower[axis] + clip->upper[axis]);
-        out.lower[axis] = fmin(clip->lower[axis] - grown, middle);
-        out.upper[axis] = fmax(clip->upper[axis] + grown, middle);
-    }
-    switch (clip->kind) {
-    case SCENE_CLIP_BOX: out.kind = RENDER_CLIP_BOX; break;
-    case SCENE_CLIP_SPHERE: out.kind = RENDER_CLIP_SPHERE; break;
-    case SCENE_CLIP_PLANE:
-        out.kind = RENDER_CLIP_PLANE;
-        session_find_plane_point(&clip->plane, e, point);
-        memcpy(out.normal, clip->plane.normal, sizeof out.normal);
-        out.distance = along(point, out.normal) + grown;
-    }
-    return out;
-}
-
-static void fill_clips(const session_extent *e, const scene_image *image, session_view *out)
-{
-    out->clip_count = image->clip_count;
-    for (int i = 0; i < out->clip_count; i++) out->clips[i] = make_clip(e, &image->clips[i]);
-}
-
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
 insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
@@ -215,7 +183,9 @@ insitu_status session_make_view(const session_space *space, const char *scene_pa
     const insitu_status status = make_camera(&space->extent, scene_path, image, &out->camera, error);
     if (status) return status;
     fill_view(space, image, out);
-    fill_clips(&space->extent, image, out);
+    out->clip_count = image->clip_count;
+    session_make_clips(&space->extent, image, out->clips);
+    session_warn_of_clips(&space->extent, image, out->clips, report);
     if (check_time(&space->extent, scene_path, image, out, team->threads, error) == INSITU_OK)
         warn_of_view(&space->extent, image, out, report);
     return INSITU_OK;

@@ -1,0 +1,283 @@
+/* Trees have the ranges of what they hold, rounded outwards to float32. A layer that shows some value of them is right.
+ * Else the range of all cells is found, once, and decides. */
+#include "session_empty_layers.h"
+
+#include <math.h>
+
+#include "memory.h"
+#include "render.h"
+#include "session_agree.h"
+#include "session_scalars.h"
+#include "session_thresholds.h"
+#include "session_transfer.h"
+
+/* The least value and the greatest negated, so that one minimum finds both. */
+typedef struct field_range {
+    double low, minus_high;
+} field_range;
+
+static const field_range no_range = {INFINITY, INFINITY};
+
+/* A layer of the plan that may be empty. One of the three is given. */
+typedef struct planned_layer {
+    const scene_image *image;
+    const scene_isosurface *isosurface;
+    const scene_volume *volume;
+    const scene_surface *surface; /* with a threshold */
+    int number;                   /* of its first warning */
+    field_range range;            /* of the surface: of 0 if any cell is within the threshold, else empty */
+    bool is_empty;                /* the surface */
+    bool is_news;                 /* it seems to show nothing by the trees, and no warning has said so yet */
+} planned_layer;
+
+/* ---- which layers ---------------------------------------------------------------------------------------------- */
+
+/* The layers are looked at so many at a time: they lie on the stack. */
+enum { WINDOW = 128 };
+
+typedef struct layer_window {
+    int first, next; /* of all layers: the first in the window, the next to be listed */
+    int count;
+    planned_layer layers[WINDOW];
+} layer_window;
+
+static void list_layer(layer_window *window, planned_layer layer)
+{
+    const int at = window->next++ - window->first;
+    if (at >= 0 && at < WINDOW) window->layers[window->count++] = layer;
+}
+
+static void list_isosurfaces(const scene_image *image, layer_window *window)
+{
+    for (int n = 0, values = 0; n < image->isosurface_count; n++) {
+        const int number = values + image->variant.isovalue;
+        list_layer(window, (planned_layer){.image = image, .isosurface = &image->isosurfaces[n], .number = number});
+        values += image->isosurfaces[n].value_count;
+    }
+}
+
+static void list_volumes(const scene_image *image, layer_window *window)
+{
+    for (int n = 0; n < image->volume_count; n++) {
+        const int number = image->variant.field * RENDER_MAX_VOLUMES + n;
+        list_layer(window, (planned_layer){.image = image, .volume = &image->volumes[n], .number = number});
+    }
+}
+
+static void list_thresholds(const scene_image *image, layer_window *window)
+{
+    for (int n = 0; n < image->surface_count; n++)
+        if (image->surfaces[n].threshold.is_given)
+            list_layer(window, (planned_layer){.image = image, .surface = &image->surfaces[n], .number = n});
+}
+
+/* Lists the layers of the window; returns how many there are in all. Views of an image share their layers, fields of a
+ * sweep its isosurfaces, isovalues its volumes, all of them its thresholds. */
+static int list_layers(const session_plan *plan, layer_window *window)
+{
+    for (int i = 0; i < plan->image_count; i++) {
+        const scene_image *image = plan->images[i];
+        if (image->variant.view > 0) continue;
+        if (image->variant.field == 0) list_isosurfaces(image, window);
+        if (image->variant.isovalue == 0) list_volumes(image, window);
+        if (scene_is_first_variant(image)) list_thresholds(image, window);
+    }
+    return window->next;
+}
+
+static const scene_field *field_of(const planned_layer *layer)
+{
+    if (layer->isosurface) return &layer->isosurface->field;
+    return layer->volume ? &layer->volume->field : &layer->surface->threshold.field;
+}
+
+/* ---- ranges ---------------------------------------------------------------------------------------------------- */
+
+static void take(double low, double high, field_range *range)
+{
+    range->low = fmin(range->low, low);
+    range->minus_high = fmin(range->minus_high, -high);
+}
+
+/* Takes the range at the root of the tree, which holds all that shows. */
+static void take_root(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
+{
+    if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
+    const mmbvh_ranges root = session_scalar_ranges(mesh, scalar);
+    take((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
+}
+
+static void take_extent(const session_mesh *mesh, session_scalar *scalar, int threads, field_range *range)
+{
+    double low, high;
+    session_scalar_extent(mesh, scalar, threads, SESSION_SOLID, &low, &high);
+    take(low, high, range);
+}
+
+static void take_faces(const session_mesh *mesh, const scene_surface *surface, field_range *range)
+{
+    const session_outer *outer =
+        scene_field_is_on(&surface->on, mesh->name) ? session_find_outer(mesh, &surface->threshold) : NULL;
+    if (outer && outer->face_count > 0) take(0, 0, range);
+}
+
+static field_range own_range(const session_meshes *meshes, const planned_layer *layer, int threads, bool of_all_cells)
+{
+    field_range range = no_range;
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        if (!mesh->is_given) continue;
+        session_scalar *scalar = session_find_scalar(mesh, field_of(layer));
+        if (layer->surface && !of_all_cells)
+            take_faces(mesh, layer->surface, &range);
+        else if (scalar && of_all_cells)
+            take_extent(mesh, scalar, threads, &range);
+        else if (scalar)
+            take_root(mesh, scalar, &range);
+    }
+    return range;
+}
+
+/* Reduces the ranges over all ranks, together with errors from before; on an error the ranges mean nothing. Collective.
+ */
+static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_window *window,
+                                   bool of_all_cells, base_error *error)
+{
+    double lows[2 * WINDOW + 1];
+    const int words = 2 * window->count + 1;
+    lows[words - 1] = error->status ? -1 : 0;
+    for (int i = 0; i < window->count && !error->status; i++) {
+        planned_layer *layer = &window->layers[i];
+        if (!of_all_cells || layer->is_news) layer->range = own_range(meshes, layer, team->threads, of_all_cells);
+    }
+    for (int i = 0; i < window->count; i++) {
+        lows[2 * i] = window->layers[i].range.low;
+        lows[2 * i + 1] = window->layers[i].range.minus_high;
+    }
+    const int code = MPI_Allreduce(MPI_IN_PLACE, lows, words, MPI_DOUBLE, MPI_MIN, team->comm);
+    const insitu_status status = code == MPI_SUCCESS && lows[words - 1] < 0 ? session_agree(team->comm, error)
+                                                                            : session_mpi(error, code, "MPI_Allreduce");
+    for (int i = 0; i < window->count; i++) window->layers[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
+    return status;
+}
+
+/* ---- what shows nothing ---------------------------------------------------------------------------------------- */
+
+/* In a sweep over isovalues each picture has one, whose number is that in the file. */
+static session_warning warning_of(const planned_layer *layer, int value)
+{
+    const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
+                                      : layer->volume   ? WARNING_TRANSPARENT
+                                                        : WARNING_THRESHOLD;
+    return (session_warning){kind, layer->image->name, NULL, layer->number + value};
+}
+
+/* A crossing belongs to the cell that reaches the value from below, so that the least value of all has none. */
+static bool is_outside(double value, const field_range *range)
+{
+    return value <= range->low || value > -range->minus_high;
+}
+
+static bool is_transparent(const scene_volume *volume, const field_range *range)
+{
+    mmbvh_interval intervals[RENDER_MAX_INTERVALS];
+    const int count = session_visible_intervals(volume, intervals);
+    for (int i = 0; i < count; i++)
+        if ((double)intervals[i].high >= range->low && (double)intervals[i].low <= -range->minus_high) return false;
+    return true;
+}
+
+/* The least value may be as much above the trees' as float32 rounds. */
+static field_range least_of_trees(const field_range *range)
+{
+    const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
+    return (field_range){range->low < low ? nextafter(low, -INFINITY) : low, range->minus_high};
+}
+
+static int value_count(const planned_layer *layer)
+{
+    return layer->isosurface ? layer->isosurface->value_count : 1;
+}
+
+/* Tells whether the layer, or this isovalue of it, shows nothing of values in the range. */
+static bool shows_nothing(const planned_layer *layer, int value, const field_range *range)
+{
+    if (layer->isosurface) return is_outside(layer->isosurface->values[value], range);
+    return layer->volume ? is_transparent(layer->volume, range) : layer->is_empty;
+}
+
+static bool find_news(const session_report *report, layer_window *window)
+{
+    bool is_any = false;
+    for (int i = 0; i < window->count; i++) {
+        planned_layer *layer = &window->layers[i];
+        layer->is_empty = layer->range.low > -layer->range.minus_high;
+        layer->range = least_of_trees(&layer->range);
+        for (int v = 0; v < value_count(layer); v++) {
+            const session_warning warning = warning_of(layer, v);
+            if (shows_nothing(layer, v, &layer->range) && !session_is_warned(report, &warning)) layer->is_news = true;
+        }
+        is_any = is_any || layer->is_news;
+    }
+    return is_any;
+}
+
+/* ---- warnings -------------------------------------------------------------------------------------------------- */
+
+static void warn_of_value(session_report *report, const planned_layer *layer, int value, bool holds)
+{
+    const session_warning warning = warning_of(layer, value);
+    const double low = layer->range.low, high = -layer->range.minus_high, at = layer->isosurface->values[value];
+    session_warn(report, &warning, holds,
+                 "image \"%s\": the isosurface of \"%s\" at %g is empty: the field goes from %g to %g%s",
+                 layer->image->name, layer->isosurface->field.name, at, low, high,
+                 at == low ? ", and a surface at its least value has nothing below it" : "");
+}
+
+static void warn_of_volume(session_report *report, const planned_layer *layer, bool holds)
+{
+    const session_warning warning = warning_of(layer, 0);
+    session_warn(report, &warning, holds,
+                 "image \"%s\": the volume of \"%s\" shows nothing: the field goes from %g to %g, where its opacity is "
+                 "0; check its range and opacity",
+                 layer->image->name, layer->volume->field.name, layer->range.low, -layer->range.minus_high);
+}
+
+static void warn_of_threshold(session_report *report, const planned_layer *layer, bool holds)
+{
+    const session_warning warning = warning_of(layer, 0);
+    const scene_threshold *threshold = &layer->surface->threshold;
+    session_warn(report, &warning, holds,
+                 "image \"%s\": a surface is empty: no cell is within its threshold, from %g to %g of \"%s\", which "
+                 "goes from %g to %g",
+                 layer->image->name, threshold->low, threshold->high, threshold->field.name, layer->range.low,
+                 -layer->range.minus_high);
+}
+
+/* Where there is no value at all, other warnings say why. */
+static void warn_of_layer(session_report *report, const planned_layer *layer)
+{
+    const bool has_values = layer->range.low <= -layer->range.minus_high || !layer->is_news;
+    for (int v = 0; v < value_count(layer); v++) {
+        const bool holds = has_values && shows_nothing(layer, v, &layer->range);
+        if (layer->isosurface) warn_of_value(report, layer, v, holds);
+        if (layer->volume) warn_of_volume(report, layer, holds);
+        if (layer->surface) warn_of_threshold(report, layer, holds);
+    }
+}
+
+insitu_status session_check_empty_layers(const session_plan *plan, const session_meshes *meshes,
+                                         const session_team *team, session_report *report, base_error *error)
+{
+    const int count = plan->cell_count ? list_layers(plan, &(layer_window){.first = 0}) : 0;
+    if (count == 0) return session_agree(team->comm, error);
+    insitu_status status = INSITU_OK;
+    for (int first = 0; first < count && !status; first += WINDOW) {
+        layer_window window = {.first = first};
+        list_layers(plan, &window);
+        status = reduce_ranges(meshes, team, &window, false, error);
+        if (!status && find_news(report, &window)) status = reduce_ranges(meshes, team, &window, true, error);
+        for (int i = 0; i < window.count && !status; i++) warn_of_layer(report, &window.layers[i]);
+    }
+    return status;
+}

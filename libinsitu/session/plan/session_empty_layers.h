@@ -1,0 +1,16 @@
+/* Warns of layers that show nothing: isovalues that no cell has, volumes that are transparent at all values, thresholds
+ * that no cell is within. */
+#ifndef SESSION_EMPTY_LAYERS_H
+#define SESSION_EMPTY_LAYERS_H
+
+#include "session_mesh.h"
+#include "session_plan.h"
+#include "session_report.h"
+#include "session_team.h"
+
+/* Warn of layers that show nothing of their fields. Called after the trees are made, whose ranges decide for most.
+ * Collective; an error in any rank's *error becomes that of all. */
+insitu_status session_check_empty_layers(const session_plan *plan, const session_meshes *meshes,
+                                         const session_team *team, session_report *report, base_error *error);
+
+#endif

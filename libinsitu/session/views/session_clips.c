@@ -1,0 +1,177 @@
+/* What a set of clips leaves of the bounds is enclosed in a box, which each clip makes smaller in turn, and again while
+ * others may have made it so. If nothing is left of the box, nothing is of the bounds. */
+#include "session_clips.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "session_distances.h"
+#include "vector3.h"
+
+/* The kept region is widened by twice what a slice's plane may be from its place, so that a slice in it is seen. */
+static render_clip make_clip(const session_extent *e, const scene_clip *clip)
+{
+    const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
+    render_clip out = {.is_outside = clip->is_outside, .radius = fmax(clip->radius + grown, 0)};
+    double point[3];
+    memcpy(out.centre, clip->centre, sizeof out.centre);
+    for (int axis = 0; axis < 3; axis++) {
+        const double middle = 0.5 * (clip->lower[axis] + clip->upper[axis]);
+        out.lower[axis] = fmin(clip->lower[axis] - grown, middle);
+        out.upper[axis] = fmax(clip->upper[axis] + grown, middle);
+    }
+    switch (clip->kind) {
+    case SCENE_CLIP_BOX: out.kind = RENDER_CLIP_BOX; break;
+    case SCENE_CLIP_SPHERE: out.kind = RENDER_CLIP_SPHERE; break;
+    case SCENE_CLIP_PLANE:
+        out.kind = RENDER_CLIP_PLANE;
+        session_find_plane_point(&clip->plane, e, point);
+        memcpy(out.normal, clip->plane.normal, sizeof out.normal);
+        out.distance = vector3_dot(point, out.normal) + grown;
+    }
+    return out;
+}
+
+void session_make_clips(const session_extent *extent, const scene_image *image, render_clip out[RENDER_MAX_CLIPS])
+{
+    for (int i = 0; i < image->clip_count; i++) out[i] = make_clip(extent, &image->clips[i]);
+}
+
+/* ---- what they leave ------------------------------------------------------------------------------------------- */
+
+typedef struct clip_box {
+    double lower[3], upper[3];
+} clip_box;
+
+static bool is_nothing(const clip_box *box)
+{
+    return box->lower[0] > box->upper[0] || box->lower[1] > box->upper[1] || box->lower[2] > box->upper[2];
+}
+
+static void make_nothing(clip_box *box)
+{
+    box->lower[0] = INFINITY;
+}
+
+static void meet_box(clip_box *box, const double lower[3], const double upper[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        box->lower[axis] = fmax(box->lower[axis], lower[axis]);
+        box->upper[axis] = fmin(box->upper[axis], upper[axis]);
+    }
+}
+
+/* The kept side has places of at most the distance along the normal. An axis reaches as far as the others, at their
+ * least, let it. */
+static void meet_plane(clip_box *box, const render_clip *clip)
+{
+    double least[3], left = clip->distance;
+    for (int axis = 0; axis < 3; axis++) {
+        const double n = clip->normal[axis];
+        least[axis] = n * (n > 0 ? box->lower[axis] : box->upper[axis]);
+        left -= least[axis];
+    }
+    if (left < 0) make_nothing(box);
+    for (int axis = 0; axis < 3 && left >= 0; axis++) {
+        const double n = clip->normal[axis], reach = (least[axis] + left) / n;
+        if (n > 0) box->upper[axis] = fmin(box->upper[axis], reach);
+        if (n < 0) box->lower[axis] = fmax(box->lower[axis], reach);
+    }
+}
+
+/* The distances from a sphere's centre to the nearest and the farthest place of the box. */
+static void find_distances(const clip_box *box, const double centre[3], double *nearest, double *farthest)
+{
+    double near[3], far[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const double below = box->lower[axis] - centre[axis], above = centre[axis] - box->upper[axis];
+        near[axis] = fmax(fmax(below, above), 0);
+        far[axis] = fmax(-below, -above);
+    }
+    *nearest = sqrt(vector3_dot(near, near));
+    *farthest = sqrt(vector3_dot(far, far));
+}
+
+static void meet_sphere(clip_box *box, const render_clip *clip)
+{
+    double nearest, farthest, lower[3], upper[3];
+    find_distances(box, clip->centre, &nearest, &farthest);
+    if (clip->is_outside ? farthest < clip->radius : nearest > clip->radius) make_nothing(box);
+    if (clip->is_outside) return;
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = clip->centre[axis] - clip->radius;
+        upper[axis] = clip->centre[axis] + clip->radius;
+    }
+    meet_box(box, lower, upper);
+}
+
+static void leave_box(clip_box *box, const render_clip *clip)
+{
+    bool is_within = true;
+    for (int axis = 0; axis < 3; axis++)
+        is_within = is_within && clip->lower[axis] < box->lower[axis] && box->upper[axis] < clip->upper[axis];
+    if (is_within) make_nothing(box);
+}
+
+static void meet(clip_box *box, const render_clip *clip)
+{
+    switch (clip->kind) {
+    case RENDER_CLIP_PLANE: meet_plane(box, clip); break;
+    case RENDER_CLIP_SPHERE: meet_sphere(box, clip); break;
+    case RENDER_CLIP_BOX:
+        if (clip->is_outside)
+            leave_box(box, clip);
+        else
+            meet_box(box, clip->lower, clip->upper);
+    }
+}
+
+static bool leave_nothing(const session_extent *e, const render_clip *clips, int count, uint32_t set)
+{
+    enum { TURNS = 8 };
+    clip_box box;
+    memcpy(box.lower, e->lower, sizeof box.lower);
+    memcpy(box.upper, e->upper, sizeof box.upper);
+    for (int turn = 0; turn < TURNS; turn++)
+        for (int i = 0; i < count && !is_nothing(&box); i++)
+            if (set >> i & 1) meet(&box, &clips[i]);
+    return is_nothing(&box);
+}
+
+/* ---- warnings -------------------------------------------------------------------------------------------------- */
+
+typedef struct clip_basis {
+    const session_extent *extent;
+    const scene_image *image;
+    const render_clip *clips;
+    session_report *report;
+    bool has_nothing; /* of any layer */
+} clip_basis;
+
+static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)
+{
+    const session_extent *e = b->extent;
+    const session_warning warning = {WARNING_CLIP, b->image->name, layer, number};
+    const bool holds = !b->has_nothing && leave_nothing(e, b->clips, b->image->clip_count, set);
+    session_warn(b->report, &warning, holds,
+                 "image \"%s\": clip leaves nothing of %s%s%s%s: the cells lie between (%g, %g, %g) and (%g, %g, %g)",
+                 b->image->name, layer, field ? " of \"" : "", field ? field : "", field ? "\"" : "", e->lower[0],
+                 e->lower[1], e->lower[2], e->upper[0], e->upper[1], e->upper[2]);
+}
+
+void session_warn_of_clips(const session_extent *extent, const scene_image *image, const render_clip *clips,
+                           session_report *report)
+{
+    clip_basis basis = {extent, image, clips, report, extent->cell_count == 0};
+    if (image->variant.view > 0 || image->clip_count == 0) return;
+    warn_of_layer(&basis, "the picture", NULL, 0, image->clips_of_all);
+    basis.has_nothing = basis.has_nothing || leave_nothing(extent, clips, image->clip_count, image->clips_of_all);
+    for (int i = 0; i < image->isosurface_count; i++)
+        warn_of_layer(&basis, "the isosurface", image->isosurfaces[i].field.name, i, image->isosurfaces[i].clips);
+    for (int i = 0; i < image->volume_count; i++)
+        warn_of_layer(&basis, "the volume", image->volumes[i].field.name, i, image->volumes[i].clips);
+    for (int i = 0; i < image->slice_count; i++)
+        warn_of_layer(&basis, "the slice", image->slices[i].field.name, i, image->slices[i].clips);
+    for (int i = 0; i < image->surface_count; i++)
+        warn_of_layer(&basis, "the surface", NULL, i, image->surfaces[i].clips);
+}
