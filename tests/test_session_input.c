@@ -470,6 +470,95 @@ static void message_stays_until_the_next_step(void **context)
     everywhere(*insitu_error(session) == '\0');
 }
 
+/* ---- other images ---------------------------------------------------------------------------------------------- */
+
+#define OF(name, layer) "  - {name: " name ", size: [24, 16], layers: [" layer "], outputs: [{path: " name ".exr}]}\n"
+/* What is on meshes of any name, and what is on "m" alone. */
+static const char several[] =
+    "images:\n" OF("f", "{isosurface: {field: f, values: [0.1]}}") OF("g", "{isosurface: {field: g, values: [0.1]}}")
+        OF("m", "{surface: {mesh: m, colour_by: {field: f}}}") OF("s", "{surface: {}}");
+
+static void mesh_is_no_mesh(session_input *in)
+{
+    in->mesh.cell_count = -1;
+}
+
+static insitu_status fill_badly(void *data, insitu_field *field)
+{
+    (void)data, (void)field;
+    return INSITU_ERROR_IO;
+}
+static void fill_fails(session_input *in)
+{
+    in->field.fill = fill_badly;
+    in->field.values.data = NULL;
+    in->field.count = 0;
+}
+static void index_is_wrong(session_input *in)
+{
+    in->field.index = in->mesh.connectivity; /* of as many vertices as it has, but its last value is lacking */
+    in->field.count = 1;
+}
+
+/* Hands over the mesh "n" with the field "g", which may be wrong. */
+static void hand_over_other(const session_input *in)
+{
+    insitu_field g = in->field;
+    g.name = "g";
+    if (insitu_set_mesh(session, "n", &in->mesh) == INSITU_OK || own_rank == rank_count - 1)
+        (void)insitu_set_field(session, "n", &g);
+}
+
+/* Draws, and tells whether rank 0 has pictures of these names alone, in this order. */
+static void step_draws(const char *names, insitu_status expected, const char *words)
+{
+    char drawn[8] = "";
+    forget_pictures();
+    const insitu_status status = insitu_step(session, 1, 0);
+    told_everywhere(session, status, expected, words);
+    for (int i = 0; i < caught_count && i < 7; i++) drawn[i] = caught[i].path[0];
+    if (own_rank == 0 && strcmp(drawn, names) != 0) fprintf(stderr, "drawn: %s, expected: %s\n", drawn, names);
+    everywhere(own_rank != 0 || strcmp(drawn, names) == 0);
+}
+
+static void images_that_need_nothing_wrong_are_drawn(void **context)
+{
+    (void)context;
+    static const struct {
+        spoil_function *spoil;
+        insitu_status status;
+        const char *drawn, *words;
+    } cases[] = {
+        {mesh_is_no_mesh, INSITU_ERROR_ARGUMENT, "fm", "mesh \"n\": cell_count is -1"},
+        {index_too_large, INSITU_ERROR_MESH, "fm", "mesh \"n\": cell 2 (hex): vertex index"},
+        {coordinate_nan, INSITU_ERROR_MESH, "fm", "coordinate that is not finite"},
+        {values_too_few, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": "},
+        {fill_fails, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": its fill returned"},
+        {index_is_wrong, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": the index of vertex"},
+    };
+    insitu_session *const before = session;
+    session = open_session(MPI_COMM_WORLD, write_scene(several));
+    session_input other;
+    input_renew(&input);
+    input_create(&other, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        everywhere(hand_over(session, &input) == INSITU_OK);
+        hand_over_other(&other);
+        step_draws("fgms", INSITU_OK, "");
+        if (own_rank == rank_count - 1) cases[i].spoil(&other);
+        hand_over_other(&other);
+        for (int again = 0; again < 2; again++) step_draws(cases[i].drawn, cases[i].status, cases[i].words);
+        input_renew(&other);
+        hand_over_other(&other);
+        step_draws("fgms", INSITU_OK, "");
+        everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
+        step_draws("gms", INSITU_ERROR_FIELD, "its mesh \"none\" is not set");
+    }
+    input_free(&other);
+    insitu_destroy(&session);
+    session = before;
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -483,6 +572,7 @@ static int run(void)
         cmocka_unit_test(bad_cell_of_a_mesh_of_one_type_is_named),
         cmocka_unit_test(flat_cells_are_counted),
         cmocka_unit_test(message_stays_until_the_next_step),
+        cmocka_unit_test(images_that_need_nothing_wrong_are_drawn),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);

@@ -102,22 +102,19 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
     return INSITU_OK;
 }
 
-static insitu_status tell_pending_error(int root, session_meshes *meshes, const session_team *team, base_error *error)
+static void tell_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *told)
 {
-    base_error told = {0};
     const base_error *mine = session_pending_error(meshes);
-    if (team->rank == root && mine) base_fail(&told, mine->status, "rank %d: %.900s", root, mine->message);
-    meshes->pending = (base_error){0};
-    const insitu_status status = session_share_error(team->comm, root, &told);
-    *error = told;
-    return status;
+    if (team->rank == root && mine) base_fail(told, mine->status, "rank %d: %.900s", root, mine->message);
+    session_share_error(team->comm, root, told);
 }
 
-insitu_status session_check_input(const session_changes *changes, session_meshes *meshes, const session_team *team,
-                                  base_error *error)
+insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,
+                                  const session_team *team, base_error *refused, base_error *error)
 {
-    if (changes->failed_rank >= 0) return tell_pending_error(changes->failed_rank, meshes, team, error);
+    if (changes->failed_rank >= 0) tell_pending_error(changes->failed_rank, meshes, team, refused);
     if (changes->cycle == changes->lowest_cycle) return INSITU_OK;
+    if (refused->status) *error = *refused;
     return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",
                      (long long)changes->lowest_cycle, (long long)changes->cycle);
 }

@@ -24,9 +24,9 @@ typedef struct session_changes {
 insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
                                    base_error *error);
 
-/* Tell every rank the error that a set call left behind on one; ranks at different cycles are an error too.
- * Collective. */
-insitu_status session_check_input(const session_changes *changes, session_meshes *meshes, const session_team *team,
-                                  base_error *error);
+/* Tell every rank the error that a set call left behind on one, in *refused: images that need neither the mesh nor the
+ * field can be drawn. Ranks at different cycles are the error that is returned. Collective. */
+insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,
+                                  const session_team *team, base_error *refused, base_error *error);
 
 #endif

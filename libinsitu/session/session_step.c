@@ -68,14 +68,48 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
     basis->let_images = session_let_images(&s->events, basis->scene);
 }
 
-static void note_drawn(insitu_session *s, const session_plan *plan)
+/* Checks what changed of the meshes' contents, and takes note of all ranks' meshes and fields. Those that are at fault
+ * are put aside: *refused is the first reason. Collective. */
+static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
+                                   base_error *error)
 {
-    for (int i = 0; i < plan->image_count; i++) s->events.drawn |= (uint64_t)1 << plan->images[i]->variant.source;
+    const session_team *team = &s->team;
+    base_error reason = {.status = INSITU_OK};
+    insitu_status status = INSITU_OK;
+    if (changes->of_cells) session_check_meshes(&s->meshes, team, &reason);
+    if (!refused->status) *refused = reason;
+    const bool of_names = changes->of_names || refused->status || s->catalogue.has_faults;
+    if (changes->of_cells) session_forget_homes(&s->catalogue);
+    if (of_names)
+        status = session_update_catalogue(&s->catalogue, &s->meshes, team,
+                                          changes->are_names_shared && !refused->status, error);
+    if (changes->of_cells && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
+    if ((changes->of_cells || of_names) && !status)
+        status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    return status;
 }
 
-/* The phases of a step in which something is due. What the plan does not name is not computed. */
+/* Makes the plan; and another one without the images of fields that turn out to be wrong as their values are taken.
+ * Collective. */
+static insitu_status make_plan(insitu_session *s, const session_plan_basis *basis, base_error *refused,
+                               session_plan *plan, base_error *error)
+{
+    insitu_status status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
+    if (status == INSITU_ERROR_FIELD || status == INSITU_ERROR_ARGUMENT) {
+        if (!refused->status) *refused = *error;
+        *error = (base_error){0};
+        session_take_back(&s->meshes);
+        status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, false, error);
+        if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
+    }
+    if (!status && refused->status) plan->refusal = *refused;
+    return status;
+}
+
+/* The phases of a step in which something is due. What the plan does not name is not computed. refused: the error of
+ * set calls. Images that need nothing that is at fault are drawn, and it is returned afterwards. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
-                                     base_error *error)
+                                     base_error *refused, base_error *error)
 {
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
@@ -83,33 +117,15 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
                                 changes->is_filled};
     base_error of_events = {.status = INSITU_OK};
-    const session_drawing drawing = {team,
-                                     s->scene_file.path,
-                                     changes->cycle,
-                                     &s->meshes,
-                                     &s->trees.parent,
-                                     &s->space,
-                                     &s->run_ranges,
-                                     &s->report,
-                                     &s->kept,
-                                     basis.scene,
-                                     &s->cinema,
-                                     &s->overwrites,
-                                     &s->writer,
-                                     &s->catalogue,
-                                     changes->writes_behind};
+    const session_drawing drawing = {
+        team,       s->scene_file.path, changes->cycle, &s->meshes,    &s->trees.parent,
+        &s->space,  &s->run_ranges,     &s->report,     &s->kept,      basis.scene,
+        &s->cinema, &s->overwrites,     &s->writer,     &s->catalogue, changes->writes_behind};
     session_plan plan = {0};
-    insitu_status status = INSITU_OK;
-    if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
-    if (changes->of_cells && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
-    if (changes->of_cells) session_forget_homes(&s->catalogue);
-    if (changes->of_names && !status)
-        status = session_update_catalogue(&s->catalogue, &s->meshes, team, changes->are_names_shared, error);
-    if ((changes->of_cells || changes->of_names) && !status)
-        status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    insitu_status status = update_meshes(s, changes, refused, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) update_events(s, &basis, &of_events);
-    if (!status) status = session_make_plan(&basis, &s->meshes, team, &s->report, &plan, error);
+    if (!status) status = make_plan(s, &basis, refused, &plan, error);
     if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan)))
         status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, error);
@@ -123,9 +139,9 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
         status = session_check_empty_layers(&plan, &s->meshes, team, &s->report, error);
     }
-    if (!status) status = session_draw_images(&drawing, &plan, error);
-    if (!status) note_drawn(s, &plan);
+    if (!status) status = session_draw_images(&drawing, &plan, &s->events.drawn, error);
     session_plan_free(&plan);
+    session_take_back(&s->meshes);
     if (!status) *error = of_events;
     return error->status;
 }
@@ -138,17 +154,22 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
     if (changes->of_scene) reload_scene(s);
     if (s->team.rank == 0) s->report.numbers.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
     session_begin_cinema(&s->cinema, changes->cycle);
-    insitu_status status = session_check_input(changes, &s->meshes, &s->team, error);
+    base_error refused = {.status = INSITU_OK};
+    insitu_status status = session_check_input(changes, &s->meshes, &s->team, &refused, error);
     const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};
     s->has_stepped = true;
     s->last_time = changes->time;
     const bool are_images_due = session_count_due(&s->scene_file.scene, &moment) > 0;
-    if (status || !(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) return status;
+    if (status) return status;
+    if (!(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) {
+        *error = refused;
+        return error->status;
+    }
     use_common_kernels(changes, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
                                    changes->are_threads_lacking || changes->of_scene, guard, &s->report, error);
     if (status) return status;
-    return draw_due_images(s, changes, &moment, error);
+    return draw_due_images(s, changes, &moment, &refused, error);
 }
 
 /* Pictures of earlier steps that could not be written are told where this step has nothing else to tell. Collective. */
@@ -175,6 +196,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status) {
         status = step(session, &changes, &guard, &session->error);
+        session_drop_pending(&session->meshes);
         if (!status && changes.are_unwritten) status = tell_unwritten(session, &session->error);
     }
     session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,

@@ -138,6 +138,7 @@ static void report_topology(session_report *out, const session_mesh *mesh)
 
 static void report_mesh(session_report *out, const session_mesh *mesh)
 {
+    if (!mesh->is_given) return;
     insitu_report *report = &out->numbers;
     int64_t unusable = 0;
     report->cells += mesh->given.cell_count;

@@ -358,8 +358,9 @@ INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *na
 INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *mesh, const insitu_field *field);
 
 /* Draw the images that are due at this cycle and time. Collective. Where nothing is due it costs one small reduction.
- * An error on any rank is returned on every rank, with the rank and the place in the message. Images that can be drawn
- * are drawn all the same, and the session stays usable: the simulation goes on.
+ * An error on any rank is returned on every rank, with the rank and the place in the message. Images that need
+ * neither the mesh nor the field that is wrong are drawn all the same, by the cameras and ranges that the other meshes
+ * give, and the session stays usable: the simulation goes on.
  *
  * Pictures are written by a thread of rank 0 while the simulation goes on, unless the scene says `writing: step`. A
  * picture that could not be written is an error of the next step that has no other error. The thread calls no MPI.

@@ -2,8 +2,9 @@
  * picture can be drawn, so that no rank misses a field in the middle of a collective call.
  *
  * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <centring> <name>"
- * is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one reduction) exchange
- * nothing; else the texts are gathered by all. */
+ * is a field of it, "e <status> 0 <message>" says what is wrong with the mesh or field before it, if there is one.
+ * Ranks whose tables are alike (the usual case, found by hashes in the step's one reduction) exchange nothing; else the
+ * texts are gathered by all. */
 #include "session_catalogue.h"
 
 #include <inttypes.h>
@@ -25,18 +26,35 @@ static size_t append_line(char *text, size_t capacity, size_t at, char kind, int
     return at + (size_t)size + 1;
 }
 
+static size_t append_fault(char *text, size_t capacity, size_t at, const base_error *fault)
+{
+    return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
+}
+
+static size_t append_mesh(char *text, size_t capacity, size_t at, const session_mesh *mesh)
+{
+    at = append_line(text, capacity, at, 'm', mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL,
+                     mesh->name);
+    at = append_fault(text, capacity, at, &mesh->problem);
+    for (int f = 0; f < mesh->field_count; f++) {
+        const insitu_field *field = &mesh->fields[f].given;
+        at = append_line(text, capacity, at, 'f', field->component_count, (int)field->centring, field->name);
+        at = append_fault(text, capacity, at, &mesh->fields[f].problem);
+    }
+    return at;
+}
+
 static size_t write_table(const session_meshes *meshes, char *text, size_t capacity)
 {
     size_t at = 0;
+    if (meshes->pending_mesh && meshes->pending_field) {
+        at = append_line(text, capacity, at, 'm', 0, 0, meshes->pending_mesh);
+        at = append_line(text, capacity, at, 'f', 0, 0, meshes->pending_field);
+    }
+    at = append_fault(text, capacity, at, &meshes->pending);
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
-        if (!mesh->is_given) continue;
-        at = append_line(text, capacity, at, 'm', mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL,
-                         mesh->name);
-        for (int f = 0; f < mesh->field_count; f++) {
-            const insitu_field *field = &mesh->fields[f].given;
-            at = append_line(text, capacity, at, 'f', field->component_count, (int)field->centring, field->name);
-        }
+        if (mesh->is_given || mesh->problem.status) at = append_mesh(text, capacity, at, mesh);
     }
     return at;
 }
@@ -82,12 +100,17 @@ void session_catalogue_free(session_catalogue *catalogue)
 {
     for (int i = 0; i < catalogue->mesh_count; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
-        for (int f = 0; f < mesh->field_count; f++) base_free(mesh->fields[f].name);
+        for (int f = 0; f < mesh->field_count; f++) {
+            base_free(mesh->fields[f].name);
+            base_free(mesh->fields[f].fault);
+        }
         base_free(mesh->fields);
+        base_free(mesh->fault);
         base_free(mesh->name);
         drop_homes(mesh);
     }
     base_free(catalogue->meshes);
+    base_free(catalogue->fault);
     *catalogue = (session_catalogue){0};
 }
 
@@ -160,11 +183,11 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
     return field;
 }
 
-static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components, insitu_centring centring,
-                       const char *name)
+static session_catalogue_field *take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components,
+                                           insitu_centring centring, const char *name)
 {
     session_catalogue_field *field = add_field(mesh, name);
-    if (!field) return false;
+    if (!field) return NULL;
     if (field->first_rank < 0) {
         field->first_rank = rank;
         field->component_count = components;
@@ -173,7 +196,7 @@ static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, i
         field->odd_rank = rank;
     }
     if (has_cells) field->last_rank = rank;
-    return true;
+    return field;
 }
 
 /* Ends a rank's table of a mesh: notes the fields that were not in it. */
@@ -188,9 +211,22 @@ static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_id
     }
 }
 
+/* Notes what is wrong on the rank; field: NULL where that is the mesh, mesh: NULL where it is not known. */
+static bool take_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
+                       int rank, insitu_status status, const char *message)
+{
+    base_error **fault = field ? &field->fault : mesh ? &mesh->fault : &catalogue->fault;
+    catalogue->has_faults = true;
+    if (*fault) return true;
+    *fault = base_calloc(1, sizeof **fault);
+    base_fail(*fault, status, "rank %d: %.900s", rank, message);
+    return *fault != NULL;
+}
+
 static bool take_table(session_catalogue *catalogue, const char *text, size_t size, int rank)
 {
     session_catalogue_mesh *mesh = NULL;
+    session_catalogue_field *field = NULL;
     bool has_cells = false, has_ids = false;
     for (const char *line = text; line < text + size; line += strlen(line) + 1) {
         char *end = NULL;
@@ -200,10 +236,14 @@ static bool take_table(session_catalogue *catalogue, const char *text, size_t si
         if (line[0] == 'm') {
             close_mesh(mesh, has_cells, has_ids, rank);
             mesh = find_mesh(catalogue, name);
+            field = NULL;
             has_cells = a != 0;
             has_ids = b != 0;
-        } else if (!take_field(mesh, has_cells, rank, (int)a, (insitu_centring)b, name)) {
-            return false;
+        } else if (line[0] == 'e') {
+            if (!take_fault(catalogue, mesh, field, rank, (insitu_status)a, name)) return false;
+        } else {
+            field = take_field(mesh, has_cells, rank, (int)a, (insitu_centring)b, name);
+            if (!field) return false;
         }
     }
     close_mesh(mesh, has_cells, has_ids, rank);
@@ -299,6 +339,14 @@ static bool take_tables(int ranks, const gathered_tables *tables, session_catalo
     return true;
 }
 
+static void put_faulty_aside(const session_catalogue *catalogue, session_meshes *meshes)
+{
+    for (int i = 0; i < catalogue->mesh_count; i++) {
+        session_mesh *mesh = catalogue->meshes[i].fault ? session_find_mesh(meshes, catalogue->meshes[i].name) : NULL;
+        if (mesh) session_put_aside(meshes, mesh);
+    }
+}
+
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error)
 {
@@ -325,6 +373,7 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     session_catalogue_free(catalogue);
     *catalogue = found;
     meshes->are_names_changed = false;
+    put_faulty_aside(catalogue, meshes);
     return INSITU_OK;
 }
 

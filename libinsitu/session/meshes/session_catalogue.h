@@ -11,10 +11,11 @@ typedef struct session_catalogue_field {
     char *name;
     int component_count;
     insitu_centring centring;
-    int first_rank;   /* that has it */
-    int last_rank;    /* that has it together with cells; -1: none */
-    int odd_rank;     /* -1, or one that has it with another centring or count of components */
-    int lacking_rank; /* -1, or one that has cells of the mesh but not the field */
+    int first_rank;    /* that has it */
+    int last_rank;     /* that has it together with cells; -1: none */
+    int odd_rank;      /* -1, or one that has it with another centring or count of components */
+    int lacking_rank;  /* -1, or one that has cells of the mesh but not the field */
+    base_error *fault; /* what is wrong with it on some rank, the lowest; NULL: nothing */
 } session_catalogue_field;
 
 /* A vertex that hangs on a quad: its value is the sum of those of the quad's corners, times weights. */
@@ -41,6 +42,7 @@ typedef struct session_catalogue_mesh {
     int first_rank;        /* that has cells of it; -1: none */
     bool has_ids;          /* all of these give vertex ids */
     bool has_shells_alone; /* the cells that are drawn, of all ranks; found by session_check_vertex_order() */
+    base_error *fault;     /* likewise: then the step does without the mesh, but knows the names of its fields */
     int field_count;
     session_catalogue_field *fields;
     session_homes homes;      /* this rank's view of the parts; known where it has been asked for since cells changed */
@@ -48,12 +50,15 @@ typedef struct session_catalogue_mesh {
 } session_catalogue_mesh;
 
 typedef struct session_catalogue {
-    bool is_known; /* by a step before this one */
+    bool is_known;     /* by a step before this one */
+    bool has_faults;   /* anywhere in it */
+    base_error *fault; /* of which it is not known what is wrong with it: no image can be drawn */
     int mesh_count;
     session_catalogue_mesh *meshes;
 } session_catalogue;
 
-/* is_shared: all ranks have the same names, by session_names_hash(). Collective. */
+/* is_shared: all ranks have the same names, by session_names_hash(), and nothing is wrong with any mesh or field.
+ * Meshes with a fault are put aside. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);

@@ -514,8 +514,13 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
 
 insitu_status session_check_meshes(const session_meshes *meshes, const session_team *team, base_error *error)
 {
-    insitu_status status = INSITU_OK;
-    for (int i = 0; i < meshes->count && !status; i++)
-        if (meshes->items[i]->is_check_stale) status = check_mesh(meshes->items[i], team->threads, error);
+    for (int i = 0; i < meshes->count; i++) {
+        session_mesh *mesh = meshes->items[i];
+        if (!mesh->is_check_stale || !mesh->is_given) continue;
+        mesh->problem = (base_error){0};
+        mesh->is_problem_of_contents = true;
+        check_mesh(mesh, team->threads, &mesh->problem);
+        if (!error->status) *error = mesh->problem;
+    }
     return session_agree(team->comm, error);
 }

@@ -6,7 +6,7 @@
 #include "session_team.h"
 
 /* Check the meshes whose cells or coordinates have changed; fill in their bounds and counts, and find their flat cells.
- * The error names the lowest bad cell. Collective. */
+ * What is wrong with one is its problem; the error is the first such of the lowest rank. Collective. */
 insitu_status session_check_meshes(const session_meshes *meshes, const session_team *team, base_error *error);
 
 #endif

@@ -177,16 +177,37 @@ bool session_next_part(session_part_walk *walk)
     return false;
 }
 
-void session_drop_contents(session_mesh *mesh)
+static void drop_cells(session_mesh *mesh)
 {
     session_drop_outers(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
-    session_drop_fields(mesh);
     session_drop_topology(&mesh->topology);
     session_drop_torn(&mesh->torn);
     base_free(mesh->flat);
     mesh->flat = NULL;
+}
+
+void session_drop_contents(session_mesh *mesh)
+{
+    drop_cells(mesh);
+    session_drop_fields(mesh);
+}
+
+void session_refuse_mesh(session_mesh *mesh)
+{
+    drop_cells(mesh);
+    for (int i = 0; i < mesh->field_count; i++) {
+        session_field *field = &mesh->fields[i];
+        const char *name = field->given.name;
+        base_free(field->patches);
+        session_drop_copy(field);
+        *field = (session_field){.given = {.name = name}};
+    }
+    mesh->is_given = false;
+    mesh->given = (insitu_mesh){0};
+    mesh->cells = (grid){0};
+    mesh->drawn_count = 0;
 }
 
 static void free_mesh(session_mesh *mesh)
@@ -229,6 +250,21 @@ static bool make_room(session_meshes *meshes)
     return true;
 }
 
+void session_keep_problem(session_field *field, const base_error *problem, base_error *first)
+{
+    field->problem = *problem;
+    field->is_problem_of_contents = true;
+    if (!first->status) *first = *problem;
+}
+
+static void insert_mesh(session_meshes *meshes, session_mesh *mesh)
+{
+    const int at = mesh_position(meshes, mesh->name);
+    memmove(meshes->items + at + 1, meshes->items + at, (size_t)(meshes->count - at) * sizeof *meshes->items);
+    meshes->items[at] = mesh;
+    meshes->count++;
+}
+
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error)
 {
     session_mesh *mesh = base_calloc(1, sizeof *mesh);
@@ -238,10 +274,7 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_er
         free_mesh(mesh);
         return NULL;
     }
-    const int at = mesh_position(meshes, name);
-    memmove(meshes->items + at + 1, meshes->items + at, (size_t)(meshes->count - at) * sizeof *meshes->items);
-    meshes->items[at] = mesh;
-    meshes->count++;
+    insert_mesh(meshes, mesh);
     return mesh;
 }
 
@@ -268,11 +301,47 @@ const base_error *session_pending_error(const session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
-        if (mesh->problem.status) return &mesh->problem;
+        if (mesh->problem.status && !mesh->is_problem_of_contents) return &mesh->problem;
         for (int f = 0; f < mesh->field_count; f++)
-            if (mesh->fields[f].problem.status) return &mesh->fields[f].problem;
+            if (mesh->fields[f].problem.status && !mesh->fields[f].is_problem_of_contents)
+                return &mesh->fields[f].problem;
     }
     return meshes->pending.status ? &meshes->pending : NULL;
+}
+
+void session_drop_pending(session_meshes *meshes)
+{
+    meshes->pending = (base_error){0};
+    base_free(meshes->pending_mesh);
+    base_free(meshes->pending_field);
+    meshes->pending_mesh = meshes->pending_field = NULL;
+}
+
+void session_keep_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field)
+{
+    session_drop_pending(meshes);
+    meshes->pending = *error;
+    if (mesh && field) {
+        meshes->pending_mesh = base_strdup(mesh);
+        meshes->pending_field = base_strdup(field);
+    }
+}
+
+void session_put_aside(session_meshes *meshes, session_mesh *mesh)
+{
+    int at = 0;
+    while (meshes->items[at] != mesh) at++;
+    meshes->count--;
+    for (int i = at; i < meshes->count + meshes->aside_count; i++) meshes->items[i] = meshes->items[i + 1];
+    meshes->items[meshes->count + meshes->aside_count++] = mesh;
+    mesh->is_needed = false;
+    for (int i = 0; i < mesh->outer_count; i++) mesh->outers[i]->is_wanted = false;
+}
+
+void session_take_back(session_meshes *meshes)
+{
+    if (meshes->aside_count) meshes->are_cells_changed = meshes->are_names_changed = true;
+    for (; meshes->aside_count; meshes->aside_count--) insert_mesh(meshes, meshes->items[meshes->count]);
 }
 
 bool session_refuse_in_fill(session_meshes *meshes, const char *call)
@@ -287,6 +356,7 @@ bool session_refuse_in_fill(session_meshes *meshes, const char *call)
 
 void session_meshes_free(session_meshes *meshes)
 {
+    session_drop_pending(meshes);
     for (int i = 0; i < meshes->count; i++) free_mesh(meshes->items[i]);
     base_free(meshes->items);
     *meshes = (session_meshes){0};

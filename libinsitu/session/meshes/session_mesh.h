@@ -11,7 +11,8 @@ typedef struct session_field {
     insitu_field given; /* name is a copy of ours, the values are borrowed */
     grid_array values;
     int64_t component_stride;
-    base_error problem; /* of the last insitu_set_field() */
+    base_error problem;          /* of the last insitu_set_field(), */
+    bool is_problem_of_contents; /* or of its values, which this step has found */
     bool has_index;
     bool is_copy_stale; /* it was made of other values or by another index */
     bool is_wanted;     /* by statistics of this step; fields of images have scalars */
@@ -145,8 +146,9 @@ typedef struct session_mesh {
     session_topology topology;
     session_torn torn;
     grid cells;
-    bool is_given;      /* false after an insitu_set_mesh() that failed: problem says why */
-    base_error problem; /* of the last insitu_set_mesh() */
+    bool is_given;               /* false after an insitu_set_mesh() that failed: problem says why */
+    base_error problem;          /* of the last insitu_set_mesh(), */
+    bool is_problem_of_contents; /* or of what the arrays hold, which the step's check has found */
     int field_count;
     session_field *fields;
 
@@ -183,10 +185,12 @@ typedef struct session_filling {
 /* All meshes of this rank. */
 typedef struct session_meshes {
     int count, capacity;
-    session_mesh **items;   /* by name */
-    bool are_cells_changed; /* or coordinates, since the last agreed extent */
-    bool are_names_changed; /* since the last agreed catalogue */
-    base_error pending;     /* the error of a set call that had no mesh to keep it; for one step */
+    session_mesh **items;               /* by name */
+    bool are_cells_changed;             /* or coordinates, since the last agreed extent */
+    bool are_names_changed;             /* since the last agreed catalogue */
+    base_error pending;                 /* the error of a set call that had no mesh to keep it; for one step */
+    char *pending_mesh, *pending_field; /* that it is about; NULL: of any */
+    int aside_count;                    /* meshes that this step does without, beyond count in items */
     session_filling filling;
 } session_meshes;
 
@@ -247,6 +251,9 @@ void session_drop_outer(session_outer *outer, bool with_faces);
 /* Drops all outer surfaces of a mesh; where cells are new, thresholds go too. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
+/* Drops all that is known of a mesh whose description is wrong, but the names of its fields: images that show these
+ * need the mesh. */
+void session_refuse_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
 /* Visits the meshes that may become parts of a picture: the caller's meshes, then the meshes of their outer faces.
@@ -272,6 +279,18 @@ static inline int64_t session_vertex_count(const session_mesh *mesh)
 
 /* The first error that a set call left behind, or NULL. */
 const base_error *session_pending_error(const session_meshes *meshes);
+
+/* Keep an error of a set call that has no mesh to keep it. field: NULL where no field is to blame alone. */
+void session_keep_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
+void session_drop_pending(session_meshes *meshes);
+
+/* Keeps what is wrong with a field's values for the rest of the step, and passes it on if it is the first. */
+void session_keep_problem(session_field *field, const base_error *problem, base_error *first);
+
+/* Takes a mesh out of the list for the rest of a step, as if this rank had no part of it. */
+void session_put_aside(session_meshes *meshes, session_mesh *mesh);
+/* Takes back the meshes that were put aside. */
+void session_take_back(session_meshes *meshes);
 
 /* Refuses a public call if a fill of the session makes it: it would change what the step reads. Returns whether it
  * does; filling.refused says so, and is what the step fails with. Local. */

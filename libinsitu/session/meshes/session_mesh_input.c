@@ -377,13 +377,11 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, const in
         take_mesh(meshes, mesh, given);
         return INSITU_OK;
     }
-    session_drop_contents(mesh);
-    mesh->is_given = false;
-    mesh->given = (insitu_mesh){0};
-    mesh->cells = (grid){0};
+    session_refuse_mesh(mesh);
     meshes->are_cells_changed = true;
     meshes->are_names_changed = true;
     mesh->problem = (base_error){0};
+    mesh->is_problem_of_contents = false;
     session_place_error(&mesh->problem, name, NULL, &what);
     *error = mesh->problem;
     return error->status;
@@ -394,10 +392,10 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, const i
     *error = (base_error){0};
     if (!name || !*name) {
         base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_mesh: the mesh has no name");
-        meshes->pending = *error;
+        session_keep_pending(meshes, error, NULL, NULL);
         return error->status;
     }
     const insitu_status status = set_mesh(meshes, name, given, error);
-    if (status == INSITU_ERROR_MEMORY) meshes->pending = *error;
+    if (status == INSITU_ERROR_MEMORY) session_keep_pending(meshes, error, NULL, NULL);
     return status;
 }

@@ -438,16 +438,19 @@ static void write_tables(const session_drawing *d, base_error *first)
     if (!first->status) *first = reason;
 }
 
-insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error)
+insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, uint64_t *drawn,
+                                  base_error *error)
 {
     base_error first = plan->refusal;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
-        if (draw_image(d, &placed, &reason) == INSITU_OK)
+        if (draw_image(d, &placed, &reason) == INSITU_OK) {
+            *drawn |= (uint64_t)1 << placed.variant.source;
             session_note_written(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,
                                  d->report->numbers.time, d->report);
+        }
         if (first.status == INSITU_OK) first = reason;
     }
     write_tables(d, &first);

@@ -34,7 +34,9 @@ typedef struct session_drawing {
 } session_drawing;
 
 /* Draw the plan's images and give them to the writer. One that fails is left out. The plan's refusal, if there is one,
- * else the first failure, is the error. Collective. */
-insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error);
+ * else the first failure, is the error. The bits of those that were drawn, by the file's image that they are of, are
+ * set in *drawn. Collective. */
+insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, uint64_t *drawn,
+                                  base_error *error);
 
 #endif

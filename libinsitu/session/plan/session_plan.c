@@ -40,9 +40,28 @@ static void list_meshes(const session_catalogue *catalogue, char names[NAMES_SIZ
     if (size == 0) snprintf(names, NAMES_SIZE, "none");
 }
 
+/* Returns the fault, or INSITU_OK if it is NULL. */
+static insitu_status refuse_fault(const base_error *fault, base_error *error)
+{
+    if (!fault) return INSITU_OK;
+    *error = *fault;
+    return error->status;
+}
+
+/* A field that is on no mesh may be that of one with a fault. */
+static const base_error *find_hidden(const session_plan_basis *basis, const scene_field *field)
+{
+    for (int m = 0; m < basis->catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
+        if (mesh->fault && scene_field_is_on(field, mesh->name)) return mesh->fault;
+    }
+    return NULL;
+}
+
 static insitu_status refuse_missing(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE];
+    if (refuse_fault(find_hidden(basis, field), error)) return error->status;
     list_fields(basis->catalogue, names);
     return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"; there are: %s", basis->scene_path,
                      field->line, field->name, names);
@@ -57,6 +76,7 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
         if (!scene_name_stands_for(name, mesh->name)) continue;
+        if (refuse_fault(mesh->fault, error)) return error->status;
         is_there = true;
         is_well = is_well || !field->name || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
     }
@@ -75,6 +95,7 @@ static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_
                                    const session_catalogue_mesh *mesh, const session_catalogue_field *found,
                                    base_error *error)
 {
+    if (refuse_fault(mesh->fault, error) || refuse_fault(found->fault, error)) return error->status;
     if (found->odd_rank >= 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "rank %d: mesh \"%s\": field \"%s\" has another centring or number of components than on "
@@ -98,14 +119,16 @@ static const session_catalogue_field *find_shown(const session_catalogue_mesh *m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Checks that some mesh has the field, and that it is sound on those on which the layer shows it. */
-static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
+/* Checks that some mesh has the field, and that it is sound on those that the layer is on. */
+static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, const scene_field *layer,
+                                 base_error *error)
 {
     bool is_there = false;
     insitu_status status = INSITU_OK;
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
-        const session_catalogue_field *shown = find_shown(mesh, field);
+        const session_catalogue_field *shown =
+            scene_field_is_on(layer, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
         is_there = is_there || session_catalogue_find(mesh, field->name);
         if (shown) status = check_on_mesh(basis, field, mesh, shown, error);
     }
@@ -114,7 +137,7 @@ static insitu_status check_field(const session_plan_basis *basis, const scene_fi
 
 static insitu_status check_layer_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
-    insitu_status status = check_field(basis, field, error);
+    insitu_status status = check_field(basis, field, field, error);
     for (int i = 0; i < field->mesh_count && !status; i++)
         status = check_named_mesh(basis, field, field->meshes[i], error);
     return status;
@@ -137,22 +160,22 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
 
 static insitu_status check_surface(const session_plan_basis *basis, const scene_surface *layer, base_error *error)
 {
-    insitu_status status = INSITU_OK;
+    insitu_status status = refuse_fault(find_hidden(basis, &layer->on), error);
     for (int i = 0; i < layer->on.mesh_count && !status; i++)
         status = check_named_mesh(basis, &layer->on, layer->on.meshes[i], error);
-    if (!status && layer->threshold.is_given) status = check_field(basis, &layer->threshold.field, error);
-    return status || !layer->has_colour_by ? status : check_field(basis, &layer->colour_by, error);
+    if (!status && layer->threshold.is_given) status = check_field(basis, &layer->threshold.field, &layer->on, error);
+    return status || !layer->has_colour_by ? status : check_field(basis, &layer->colour_by, &layer->on, error);
 }
 
 static insitu_status check_image(const session_plan_basis *basis, const scene_image *image, base_error *error)
 {
     int values = 0;
-    insitu_status status = INSITU_OK;
+    insitu_status status = refuse_fault(basis->catalogue->fault, error);
     for (int i = 0; i < image->isosurface_count && !status; i++) {
         const scene_isosurface *layer = &image->isosurfaces[i];
         values += layer->value_count;
         status = check_layer_field(basis, &layer->field, error);
-        if (!status && layer->has_colour_by) status = check_field(basis, &layer->colour_by, error);
+        if (!status && layer->has_colour_by) status = check_field(basis, &layer->colour_by, &layer->field, error);
     }
     for (int i = 0; i < image->volume_count && !status; i++)
         status = check_layer_field(basis, &image->volumes[i].field, error);
@@ -239,11 +262,17 @@ static bool is_due(const scene_image *image, const session_moment *m)
     return image->every <= 1 || m->cycle % image->every == 0;
 }
 
+/* If no rank has cells, fields are not asked for, and the picture is its background. */
+static bool has_anything(const session_plan_basis *basis)
+{
+    return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
+}
+
 insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error)
 {
     const scene *scene = basis->scene;
     insitu_status status = INSITU_OK;
-    if (basis->extent->cell_count == 0) return INSITU_OK;
+    if (!has_anything(basis)) return INSITU_OK;
     for (int i = 0; i < scene->statistics_count && !status; i++)
         if (session_is_statistics_due(&scene->statistics[i], basis->moment->cycle))
             status = check_layer_field(basis, &scene->statistics[i].field, error);
@@ -311,11 +340,10 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
         if (image->surfaces[i].has_colour_by) warn_of_grey_surface(catalogue, image, &image->surfaces[i], report);
 }
 
-/* If no rank has cells, fields are not asked for, and the picture is its background. */
 static bool can_be_drawn(const session_plan_basis *basis, const scene_image *image, session_report *report,
                          base_error *refusal)
 {
-    if (basis->extent->cell_count == 0) return true;
+    if (!has_anything(basis)) return true;
     if (check_image(basis, image, refusal) != INSITU_OK) return false;
     warn_of_grey_layers(basis->catalogue, image, report);
     warn_of_shells_alone(basis->catalogue, image, report);
@@ -359,8 +387,8 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     insitu_status status =
         basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* taking the values may be collective */
     if (!status) {
-        if (is_whole && session_fill_fields(meshes, basis->catalogue, true, error) == INSITU_OK)
-            session_copy_used(meshes, team->threads, error);
+        if (is_whole) session_fill_fields(meshes, basis->catalogue, true, error);
+        if (is_whole) session_copy_used(meshes, team->threads, error);
         status = session_agree(team->comm, error);
     }
     if (status)

@@ -52,7 +52,8 @@ int session_count_due(const scene *scene, const session_moment *moment);
 insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Find which of the due images can be drawn, mark on this rank's meshes and scalars what they need, and copy values
- * that have an index. An image that cannot be drawn is no error of this call. Collective. */
+ * that have an index. An image that cannot be drawn is no error of this call, but values
+ * that are wrong are: the fields' problems say so. Collective. */
 insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error);
 

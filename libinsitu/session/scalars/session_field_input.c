@@ -286,24 +286,38 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
         }
     }
     field->problem = (base_error){0};
+    field->is_problem_of_contents = false;
     session_place_error(&field->problem, mesh->name, given->name, &what);
     *error = field->problem;
     return error->status;
+}
+
+/* The mesh's own error is what the next step has to return. Images that show the field need the mesh, and are not
+ * drawn.
+ */
+static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, const char *name, base_error *error)
+{
+    if (session_find_field(mesh, name) < 0 && !add_field(mesh, name, error)) {
+        session_keep_pending(meshes, error, NULL, NULL);
+        return error->status;
+    }
+    return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->name);
 }
 
 insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error)
 {
     *error = (base_error){0};
     session_mesh *mesh = name ? session_find_mesh(meshes, name) : NULL;
-    if (!name || !field || !field->name || !*field->name)
+    const char *field_name = field ? field->name : NULL;
+    if (!name || !field_name || !*field_name)
         base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_field: no mesh, no field, or a field without a name");
     else if (!mesh)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field->name, name);
-    else if (!mesh->is_given) /* the mesh's own error is what the next step has to return */
-        return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", field->name, name);
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field_name, name);
+    else if (!mesh->is_given)
+        return refuse_field(meshes, mesh, field_name, error);
     else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
         return error->status;
-    meshes->pending = *error;
+    session_keep_pending(meshes, error, name, field_name && *field_name ? field_name : NULL);
     return error->status;
 }
 

@@ -55,7 +55,7 @@ insitu_status session_fill_fields(session_meshes *meshes, const session_catalogu
             base_error own = {0};
             const int index = session_find_field(mesh, all->fields[f].name);
             if (index < 0 || !mesh->fields[index].given.fill || !is_needed(mesh, index, of_images)) continue;
-            if (fill_field(meshes, mesh, index, &own) && !error->status) *error = own;
+            if (fill_field(meshes, mesh, index, &own)) session_keep_problem(&mesh->fields[index], &own, error);
         }
     }
     return error->status;
@@ -67,6 +67,8 @@ void session_forget_filled(const session_meshes *meshes)
         for (int f = 0; f < meshes->items[m]->field_count; f++) {
             session_field *field = &meshes->items[m]->fields[f];
             field->is_wanted = false;
+            if (field->is_problem_of_contents) field->problem = (base_error){0};
+            field->is_problem_of_contents = false;
             if (!field->given.fill) continue;
             field->is_filled = false;
             field->fill_problem = (base_error){0};

@@ -137,12 +137,15 @@ insitu_status session_copy_wanted(const session_meshes *meshes, int threads, bas
 
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error)
 {
-    insitu_status status = INSITU_OK;
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
-        for (int i = 0; i < mesh->scalar_count && !status; i++)
-            if (mesh->scalars[i].is_used && !session_is_distance(&mesh->scalars[i]))
-                status = update_copy(mesh, mesh->scalars[i].field, threads, error);
+        for (int i = 0; i < mesh->scalar_count; i++) {
+            const session_scalar *scalar = &mesh->scalars[i];
+            base_error own = {.status = INSITU_OK};
+            if (!scalar->is_used || session_is_distance(scalar) || mesh->fields[scalar->field].problem.status) continue;
+            if (update_copy(mesh, scalar->field, threads, &own))
+                session_keep_problem(&mesh->fields[scalar->field], &own, error);
+        }
     }
-    return status;
+    return error->status;
 }
