@@ -2,13 +2,15 @@
  * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
  * all tables of names are alike, whether any rank lacks threads, the lowest of the instruction sets, and, from rank 0,
  * the time, whether the scene file was edited, whether pictures could not be written, and whether they are written in
- * the step; and whether any field is filled on demand. After it, ranks decide alike without further messages. */
+ * the step; whether any field is filled on demand, and the lowest rank that has a warning for all. After it, ranks
+ * decide alike without further messages. */
 #include "session_changes.h"
 
 #include <string.h>
 
 #include "render_isa.h"
 #include "session_agree.h"
+#include "session_lines.h"
 
 enum change_word {
     CYCLE_HIGH,
@@ -25,6 +27,7 @@ enum change_word {
     WRITES_AT_ONCE,
     ISA_LOW, /* and the lowest rank that has it */
     ISA_HIGH,
+    TELLING,   /* session_telling_word() */
     ROOT_TIME, /* the bits of rank 0's */
     CHANGE_WORDS
 };
@@ -73,6 +76,7 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
     words[ISA_LOW] = -(render_isa_level() * more_ranks + team->rank);
     words[ISA_HIGH] = render_isa_level();
+    words[TELLING] = session_telling_word(&session->report, team);
     words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
 }
 
@@ -98,7 +102,8 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .writes_behind = !all[WRITES_AT_ONCE] && !all[SCENE_CHANGED],
                              .isa_level = (int)(-all[ISA_LOW] / more_ranks),
                              .isa_rank = (int)(-all[ISA_LOW] % more_ranks),
-                             .isa_best = (int)all[ISA_HIGH]};
+                             .isa_best = (int)all[ISA_HIGH],
+                             .telling_rank = session_telling_rank((int)all[TELLING], &session->team)};
     return INSITU_OK;
 }
 

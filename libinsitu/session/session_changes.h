@@ -18,6 +18,7 @@ typedef struct session_changes {
     int isa_level;      /* the lowest of the ranks' instruction sets (render_isa.h) */
     int isa_rank;       /* the lowest rank that has no better */
     int isa_best;       /* the highest of the ranks' */
+    int telling_rank;   /* the lowest that has warnings for all ranks; -1: none */
 } session_changes;
 
 /* One small reduction. Collective. */

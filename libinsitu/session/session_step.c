@@ -4,6 +4,7 @@
  * (session_agree.h), so that all of them leave the step at the same place. The first phase is one small reduction;
  * nothing else is exchanged where no image is due and nothing has failed. */
 #include "cpu.h"
+#include "render.h"
 #include "render_isa.h"
 #include "session.h"
 #include "session_agree.h"
@@ -16,6 +17,7 @@
 #include "session_events.h"
 #include "session_filled.h"
 #include "session_guard.h"
+#include "session_lines.h"
 #include "session_recentre.h"
 #include "session_smooth.h"
 #include "session_summary.h"
@@ -52,6 +54,13 @@ static void use_common_kernels(const session_changes *changes, session_report *r
                  "kernels are %s, the best that all ranks have: rank %d has no better, others have %s",
                  cpu_isa_name((cpu_isa)changes->isa_level), changes->isa_rank,
                  cpu_isa_name((cpu_isa)changes->isa_best));
+}
+
+static void warn_of_environment(const session_team *team, session_report *report)
+{
+    const char *isa = render_isa_warning();
+    session_warn_own(report, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "rank %d: %s", team->rank,
+                     isa);
 }
 
 /* Finds the statistics that are due, and the images whose conditions hold. An error here does not keep images from
@@ -137,7 +146,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) { /* their failure, and what the phases above left, is told by the reduction after them */
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
-        status = session_check_empty_layers(&plan, &s->meshes, team, &s->report, error);
+        status = session_check_layers(&plan, &s->catalogue, &s->meshes, team, &s->report, error);
     }
     if (!status) status = session_draw_images(&drawing, &plan, &s->events.drawn, error);
     session_plan_free(&plan);
@@ -193,7 +202,10 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_report_begin(&session->report, cycle, time);
     session_changes changes;
     session_writer_collect(&session->writer, &session->report);
+    warn_of_environment(&session->team, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
+    if (!status && changes.telling_rank >= 0)
+        status = session_share_lines(&session->report, changes.telling_rank, &session->team, &session->error);
     if (!status) {
         status = step(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);

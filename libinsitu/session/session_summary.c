@@ -89,9 +89,6 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
         session_text_add(&out->copied_why, "mesh \"%s\": distances of vertices from a slice: %lld bytes", mesh->name,
                          (long long)bytes);
     }
-    if (scalar->is_used && scalar->wants_ranges && scalar->unusable)
-        session_text_add(&out->warnings, "mesh \"%s\": %lld cells are not drawn: values of field \"%s\" are not finite",
-                         mesh->name, (long long)scalar->unusable, name);
 }
 
 static void report_outer(session_report *out, const session_mesh *mesh)
@@ -174,8 +171,6 @@ void session_summarize(const session_meshes *meshes, const mmbvh *parent, sessio
 {
     insitu_report *report = &out->numbers;
     if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
-    const char *isa = render_isa_warning();
-    session_warn(out, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "%s", isa);
     for (int i = 0; i < meshes->count; i++) report_mesh(out, meshes->items[i]);
     report->bytes_trees += mmbvh_bytes(parent);
     report->bytes_pictures = session_writer_bytes(writer, &report->pictures_waiting);

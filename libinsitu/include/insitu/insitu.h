@@ -301,9 +301,8 @@ typedef struct insitu_report {
     const char *copied_why;   /* "" or a list of what was copied and why; valid until the next step */
     const char *left_out;     /* "" or a list of what the scene does not need and was left out; valid as long */
     const char *warnings; /* "" or one warning a line; valid as long. A warning is given when it begins to be true, and
-                             again if it has ceased to be in between. Two are given at every step: that an edit of the
-                             scene file is broken, and how many cells of this rank have values that are not finite. All
-                             but these two are the same on every rank. */
+                             again if it has ceased to be in between. One is given at every step: that an edit of the
+                             scene file is broken. All are the same on every rank. */
 } insitu_report;
 
 /* An open session: its scene, the meshes and fields handed over, and what is kept from step to step. */

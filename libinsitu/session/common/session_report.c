@@ -82,6 +82,7 @@ void session_report_free(session_report *report)
     free_text(&report->copied_why);
     free_text(&report->left_out);
     free_text(&report->warnings);
+    free_text(&report->own);
     base_free(report->told);
 }
 
@@ -114,21 +115,38 @@ static void add_told(session_report *report, uint64_t key)
     told[report->told_count++] = key;
 }
 
-void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+static void warn(session_report *report, session_text *text, const session_warning *warning, bool holds,
+                 const char *format, va_list arguments)
 {
     const uint64_t key = key_of(warning);
     const int at = find_told(report, key);
     if (holds && at == report->told_count) {
         char line[1024];
-        va_list arguments;
-        va_start(arguments, format);
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
         vsnprintf(line, sizeof line, format, arguments);
-        va_end(arguments);
-        session_text_add(&report->warnings, "%s", line);
+#pragma GCC diagnostic pop
+        session_text_add(text, "%s", line);
         add_told(report, key);
     } else if (!holds && at < report->told_count) {
         report->told[at] = report->told[--report->told_count];
     }
+}
+
+void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    warn(report, &report->warnings, warning, holds, format, arguments);
+    va_end(arguments);
+}
+
+void session_warn_own(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    warn(report, &report->own, warning, holds, format, arguments);
+    va_end(arguments);
 }
 
 bool session_is_warned(const session_report *report, const session_warning *warning)
@@ -139,4 +157,5 @@ bool session_is_warned(const session_report *report, const session_warning *warn
 void session_forget_warnings(session_report *report)
 {
     report->told_count = 0;
+    report->unusable_key = 0;
 }

@@ -1,8 +1,8 @@
 /* The report of a step while it is written: its numbers, its lists of words, and which warnings were told.
  *
- * A warning says that something is drawn as asked but hardly as meant. All but the last three are the same on every
- * rank, because they are found from what ranks share. A warning is told in the first step in which it holds. It is told
- * again if it has not held in between, or if the scene was edited. */
+ * A warning says that something is drawn as asked but hardly as meant. All are the same on every rank:
+ * most are found from what ranks share, the others are shared (session_lines.h). A warning is told in the first step in
+ * which it holds. It is told again if it has not held in between, or if the scene was edited. */
 #ifndef SESSION_REPORT_H
 #define SESSION_REPORT_H
 
@@ -21,8 +21,10 @@ typedef struct session_text {
 typedef struct session_report {
     insitu_report numbers; /* its texts are set at the end of a step */
     session_text copied_why, left_out, warnings;
+    session_text own; /* warnings that this rank alone knows of, until session_share_lines() */
     int told_count;
-    uint64_t *told; /* hashes of the warnings that were told and have held since */
+    uint64_t *told;        /* hashes of the warnings that were told and have held since */
+    uint64_t unusable_key; /* session_unusable_key() when warnings of it were told; 0: of nothing */
 } session_report;
 
 /* Add a line. */
@@ -45,6 +47,7 @@ typedef enum session_warning_kind {
     WARNING_TRANSPARENT, /* a volume shows no value of its field */
     WARNING_THRESHOLD,   /* no cell is within a threshold */
     WARNING_PLANE,       /* a plane lies outside of the meshes that it is drawn on */
+    WARNING_UNUSABLE,    /* values of cells are not finite */
     WARNING_CLIP,        /* clips leave nothing of a layer */
     WARNING_SHELLS,      /* a layer for cells with volume is on shells alone */
     WARNING_SAMPLES,     /* several volumes are sampled by default, to no error */
@@ -56,6 +59,7 @@ typedef enum session_warning_kind {
     WARNING_OVERLAP,     /* cells overlap in some pixels */
     WARNING_WORDS,       /* words of a picture are not drawn as they are written */
     WARNING_WRITER,      /* rank 0 has no thread to write pictures */
+    WARNING_THREADS,     /* fewer threads than the scene or OpenMP asks for */
     WARNING_ISA          /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;
 
@@ -66,7 +70,10 @@ typedef struct session_warning {
     int number;
 } session_warning;
 
-/* Tell a warning where it holds and has not been told. Local. */
+/* Tell a warning where it holds and has not been told; on every rank alike, or, of what one rank alone knows, by
+ * session_warn_own(): then all ranks tell it once the ranks share such lines. Local. */
+void session_warn_own(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
 void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 

@@ -12,11 +12,8 @@ static insitu_status duplicate(MPI_Comm comm, MPI_Comm *out, base_error *error)
 
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error)
 {
-    *out = (session_team){.comm = MPI_COMM_NULL,
-                          .compositing_comm = MPI_COMM_NULL,
-                          .node_ranks = 1,
-                          .cores = 1,
-                          .each_node_ranks = 1};
+    *out = (session_team){
+        .comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .cores = 1, .each_node_ranks = 1};
     insitu_status status = duplicate(comm, &out->comm, error);
     if (!status) status = duplicate(out->comm, &out->compositing_comm, error);
     if (status) return status;

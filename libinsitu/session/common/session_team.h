@@ -9,8 +9,8 @@
 #include "error.h"
 
 typedef struct session_team {
-    MPI_Comm comm;             /* the session's own; MPI's errors are returned */
-    MPI_Comm compositing_comm; /* on which compositing alone talks */
+    MPI_Comm comm;              /* the session's own; MPI's errors are returned */
+    MPI_Comm compositing_comm;  /* on which compositing alone talks */
     struct comp_claims *claims; /* compositing's (comp.h); the session's */
     int rank, ranks;
     int node_ranks;      /* ranks on this rank's node, itself among them */

@@ -177,14 +177,13 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
 /* Chooses the number of threads of this step; the report says so if there are fewer than asked for. */
 static int choose_threads(const session_threads *threads, int asked, int wanted, session_report *report)
 {
-    if (asked > wanted)
-        session_text_add(&report->warnings, "the scene asks for %d threads, at most %d are used: %s", asked, wanted,
-                         cap_of_team().reason);
-    if (threads->count >= wanted) return wanted;
-    session_text_add(&report->warnings,
+    const bool are_enough = threads->count >= wanted;
+    session_warn_own(report, &(session_warning){WARNING_THREADS, NULL, NULL, 0}, asked > wanted,
+                     "the scene asks for %d threads, at most %d are used: %s", asked, wanted, cap_of_team().reason);
+    session_warn_own(report, &(session_warning){WARNING_THREADS, NULL, NULL, 1}, !are_enough,
                      "%d of %d threads are used: no more can be started, by the limits of memory, processes or threads",
                      threads->count, wanted);
-    return threads->count;
+    return are_enough ? wanted : threads->count;
 }
 
 /* ---- stacks -------------------------------------------------------------------------------------------------- */

@@ -26,10 +26,9 @@ typedef struct session_threads {
  * it names none: then it wants its share of the cores, or fewer if OpenMP would take fewer. Local. */
 bool session_lacks_threads(const session_threads *threads, int asked, int cores);
 
-/* Find out how many threads can be started, and set team->threads. The report says so if there are fewer than asked for. If is_new (some rank lacks
- * threads, or the scene was edited), threads are tried, started and their stacks measured; too small ones are an
- * error.
- * Collective. */
+/* Find out how many threads can be started, and set team->threads. The report says so if there are fewer than asked
+ * for. If is_new (some rank lacks threads, or the scene was edited), threads are tried, started and their stacks
+ * measured; too small ones are an error. Collective. */
 insitu_status session_begin_threads(session_threads *threads, session_team *team, int asked, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error);
 

@@ -16,6 +16,7 @@
 #include "session_files.h"
 #include "session_frame.h"
 #include "session_layers.h"
+#include "session_lines.h"
 #include "session_view.h"
 
 /* Fragments that a rank makes at once for pixels in which cells overlap: 64 MiB. */
@@ -453,6 +454,7 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         }
         if (first.status == INSITU_OK) first = reason;
     }
+    if (!d->writes_behind) session_share_lines(d->report, 0, d->team, &first);
     write_tables(d, &first);
     if (first.status) *error = first;
     return error->status;

@@ -235,8 +235,8 @@ static void warn(const session_files *files, session_report *report)
 {
     const session_warning warning = {WARNING_WORDS, files->image.name, NULL, 0};
     if (files->has_picture)
-        session_warn(report, &warning, *files->warning.message != '\0', "image \"%s\": %.900s", files->image.name,
-                     files->warning.message);
+        session_warn_own(report, &warning, *files->warning.message != '\0', "image \"%s\": %.900s", files->image.name,
+                         files->warning.message);
 }
 
 void session_writer_give(session_writer *w, session_files *files, session_report *report, base_error *error)
@@ -286,7 +286,8 @@ void session_writer_collect(session_writer *w, session_report *report)
         session_files_free(files);
         files = next;
     }
-    session_warn(report, &warning, w->is_refused, "pictures are written in the step: no thread can be started for it");
+    session_warn_own(report, &warning, w->is_refused,
+                     "pictures are written in the step: no thread can be started for it");
 }
 
 base_error session_writer_failure(session_writer *w)

@@ -7,9 +7,11 @@
 #include "memory.h"
 #include "render.h"
 #include "session_agree.h"
+#include "session_lines.h"
 #include "session_scalars.h"
 #include "session_thresholds.h"
 #include "session_transfer.h"
+#include "session_unusable.h"
 
 /* The least value and the greatest negated, so that one minimum finds both. */
 typedef struct field_range {
@@ -138,14 +140,22 @@ static field_range own_range(const session_meshes *meshes, const planned_layer *
     return range;
 }
 
-/* Reduces the ranges over all ranks, together with errors from before; on an error the ranges mean nothing. Collective.
- */
+/* What ranks also tell each other. */
+typedef struct layer_news {
+    bool has_other_cells; /* that are not shown, on any rank; see session_unusable.h */
+    int telling;          /* the greatest session_telling_word() */
+} layer_news;
+
+/* Reduces the ranges over all ranks, together with errors from before and the news; on an error the rest means nothing.
+ * Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_window *window,
-                                   bool of_all_cells, base_error *error)
+                                   bool of_all_cells, layer_news *news, base_error *error)
 {
-    double lows[2 * WINDOW + 1];
-    const int words = 2 * window->count + 1;
-    lows[words - 1] = error->status ? -1 : 0;
+    double lows[2 * WINDOW + 3];
+    const int last = 2 * window->count;
+    lows[last] = error->status ? -1 : 0;
+    lows[last + 1] = news->has_other_cells ? -1 : 0;
+    lows[last + 2] = -news->telling;
     for (int i = 0; i < window->count && !error->status; i++) {
         planned_layer *layer = &window->layers[i];
         if (!of_all_cells || layer->is_news) layer->range = own_range(meshes, layer, team->threads, of_all_cells);
@@ -154,10 +164,11 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
         lows[2 * i] = window->layers[i].range.low;
         lows[2 * i + 1] = window->layers[i].range.minus_high;
     }
-    const int code = MPI_Allreduce(MPI_IN_PLACE, lows, words, MPI_DOUBLE, MPI_MIN, team->comm);
-    const insitu_status status = code == MPI_SUCCESS && lows[words - 1] < 0 ? session_agree(team->comm, error)
-                                                                            : session_mpi(error, code, "MPI_Allreduce");
+    const int code = MPI_Allreduce(MPI_IN_PLACE, lows, last + 3, MPI_DOUBLE, MPI_MIN, team->comm);
+    const insitu_status status = code == MPI_SUCCESS && lows[last] < 0 ? session_agree(team->comm, error)
+                                                                       : session_mpi(error, code, "MPI_Allreduce");
     for (int i = 0; i < window->count; i++) window->layers[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
+    *news = (layer_news){lows[last + 1] < 0, (int)-lows[last + 2]};
     return status;
 }
 
@@ -266,18 +277,24 @@ static void warn_of_layer(session_report *report, const planned_layer *layer)
     }
 }
 
-insitu_status session_check_empty_layers(const session_plan *plan, const session_meshes *meshes,
-                                         const session_team *team, session_report *report, base_error *error)
+insitu_status session_check_layers(const session_plan *plan, const session_catalogue *catalogue,
+                                   const session_meshes *meshes, const session_team *team, session_report *report,
+                                   base_error *error)
 {
     const int count = plan->cell_count ? list_layers(plan, &(layer_window){.first = 0}) : 0;
-    if (count == 0) return session_agree(team->comm, error);
+    layer_news news = {false, session_telling_word(report, team)};
+    if (count && !error->status) news.has_other_cells = session_unusable_key(plan, meshes) != report->unusable_key;
     insitu_status status = INSITU_OK;
-    for (int first = 0; first < count && !status; first += WINDOW) {
+    for (int first = 0; (first == 0 || first < count) && !status; first += WINDOW) {
         layer_window window = {.first = first};
-        list_layers(plan, &window);
-        status = reduce_ranges(meshes, team, &window, false, error);
-        if (!status && find_news(report, &window)) status = reduce_ranges(meshes, team, &window, true, error);
+        if (count) list_layers(plan, &window);
+        status = reduce_ranges(meshes, team, &window, false, &news, error);
+        if (!status && find_news(report, &window)) status = reduce_ranges(meshes, team, &window, true, &news, error);
         for (int i = 0; i < window.count && !status; i++) warn_of_layer(report, &window.layers[i]);
     }
+    if (!status && news.telling)
+        status = session_share_lines(report, session_telling_rank(news.telling, team), team, error);
+    if (!status && news.has_other_cells)
+        status = session_warn_of_unusable(plan, catalogue, meshes, team, report, error);
     return status;
 }

@@ -3,14 +3,16 @@
 #ifndef SESSION_EMPTY_LAYERS_H
 #define SESSION_EMPTY_LAYERS_H
 
-#include "session_mesh.h"
+#include "session_catalogue.h"
 #include "session_plan.h"
 #include "session_report.h"
 #include "session_team.h"
 
-/* Warn of layers that show nothing of their fields. Called after the trees are made, whose ranges decide for most.
- * Collective; an error in any rank's *error becomes that of all. */
-insitu_status session_check_empty_layers(const session_plan *plan, const session_meshes *meshes,
-                                         const session_team *team, session_report *report, base_error *error);
+/* Warn of layers that show nothing of their fields, and of cells that they do not show (session_unusable.h). Called
+ * after the trees are made, whose ranges decide for most. Collective; an error in any rank's *error becomes that of
+ * all. */
+insitu_status session_check_layers(const session_plan *plan, const session_catalogue *catalogue,
+                                   const session_meshes *meshes, const session_team *team, session_report *report,
+                                   base_error *error);
 
 #endif

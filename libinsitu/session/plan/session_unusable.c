@@ -1,0 +1,78 @@
+#include "session_unusable.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_hash.h"
+#include "session_scalars.h"
+
+/* Visits the fields of the plan's isosurfaces and volumes. Views of an image share their layers. */
+typedef struct field_walk {
+    const session_plan *plan;
+    int image, layer;
+} field_walk;
+
+static const scene_field *next_field(field_walk *walk)
+{
+    for (; walk->image < walk->plan->image_count; walk->image++, walk->layer = 0) {
+        const scene_image *image = walk->plan->images[walk->image];
+        const int layer = walk->layer++;
+        if (image->variant.view > 0) continue;
+        if (layer < image->isosurface_count) return &image->isosurfaces[layer].field;
+        if (layer < image->isosurface_count + image->volume_count)
+            return &image->volumes[layer - image->isosurface_count].field;
+    }
+    return NULL;
+}
+
+static int64_t unusable_of(const session_mesh *mesh, const scene_field *field)
+{
+    const session_scalar *scalar = mesh && mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+    return scalar ? scalar->unusable : 0;
+}
+
+uint64_t session_unusable_key(const session_plan *plan, const session_meshes *meshes)
+{
+    uint64_t key = 0;
+    field_walk walk = {.plan = plan};
+    for (const scene_field *field; (field = next_field(&walk)) != NULL;)
+        for (int m = 0; m < meshes->count; m++) {
+            const session_mesh *mesh = meshes->items[m];
+            const int64_t count = unusable_of(mesh, field);
+            if (!count) continue;
+            if (!key) key = SESSION_HASH_BEGIN;
+            session_hash_bytes(&key, mesh->name, strlen(mesh->name) + 1);
+            session_hash_bytes(&key, field->name, strlen(field->name) + 1);
+            session_hash_bytes(&key, &field->component, sizeof field->component);
+        }
+    return key;
+}
+
+static void warn(const char *mesh, const scene_field *field, int64_t count, session_report *report)
+{
+    session_warn(report, &(session_warning){WARNING_UNUSABLE, field->name, mesh, field->component}, count > 0,
+                 "mesh \"%s\": %lld cells are not drawn: values of field \"%s\" are not finite", mesh, (long long)count,
+                 field->name);
+}
+
+insitu_status session_warn_of_unusable(const session_plan *plan, const session_catalogue *catalogue,
+                                       const session_meshes *meshes, const session_team *team, session_report *report,
+                                       base_error *error)
+{
+    const int mesh_count = catalogue->mesh_count;
+    int64_t *counts = base_alloc((size_t)(mesh_count + 1) * sizeof *counts);
+    if (!counts) session_no_memory(error, (mesh_count + 1) * (int64_t)sizeof *counts, "counts of cells");
+    insitu_status status = session_agree(team->comm, error);
+    field_walk walk = {.plan = plan};
+    for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
+        for (int m = 0; m < mesh_count; m++)
+            counts[m] = unusable_of(session_find_mesh(meshes, catalogue->meshes[m].name), field);
+        const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
+        status = session_mpi(error, code, "MPI_Allreduce");
+        for (int m = 0; m < mesh_count && !status; m++) warn(catalogue->meshes[m].name, field, counts[m], report);
+    }
+    base_free(counts);
+    if (!status) report->unusable_key = session_unusable_key(plan, meshes);
+    return status;
+}
