@@ -14,6 +14,11 @@ target_link_libraries(test_scene_shorthand PRIVATE insitu_flags insitu_internal 
 add_test(NAME scene_shorthand COMMAND test_scene_shorthand)
 set_tests_properties(scene_shorthand PROPERTIES TIMEOUT 60)
 
+add_executable(test_scene_mistakes test_scene_mistakes.c)
+target_link_libraries(test_scene_mistakes PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME scene_mistakes COMMAND test_scene_mistakes)
+set_tests_properties(scene_mistakes PROPERTIES TIMEOUT 60)
+
 add_executable(test_scene_series test_scene_series.c)
 target_link_libraries(test_scene_series PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA m)
 add_test(NAME scene_series COMMAND test_scene_series)

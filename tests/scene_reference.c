@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "scene_document.h"
+#include "scene_words.h"
 
 static const char introduction[] =
     "# The scene file\n"

@@ -647,7 +647,7 @@ static const struct bad_file {
     {1, "threads: !!int 1", 1, {"a tag (!)"}},
     {1, "threads: 1\nthreads: 2", 2, {"the key \"threads\" is given twice"}},
     {1, "threads: 1\n---", 2, {"a second document"}},
-    {1, "threads: \"1", 18, {"not valid YAML"}},
+    {1, "threads: \"1", 1, {"the text \"1 has no end", "expected \" at its end"}},
     {1, "[[[[[[[[[[[[[[[[[[[[ ", 1, {"too deep", "16"}},
     {1, "threads: \x01", 1, {"not valid YAML", "control characters"}},
     {2, "pictures:", 2, {"the key \"pictures\" is unknown"}},

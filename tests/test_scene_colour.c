@@ -277,7 +277,7 @@ static void files_are_read_once_and_then_passed_on(void **state)
 /* Keys of line 7, and words that the message must hold after "maps/scene.yaml:7:
  * images[0].layers[0].isosurface.colour_by." */
 static const char *const bad_keys[][3] = {
-    {", map: jet", "map: \"jet\" is not allowed, expected one of viridis, plasma",
+    {", map: jet", "map: \"jet\" is not allowed (did you mean turbo?), expected one of viridis, plasma",
      "; or a mapping with the keys colours, at"},
     {", map: [1, 2]", "map: a list is not allowed, expected one of viridis", "or a mapping"},
     {", map: {}", "map: holds neither, expected one of colours and file", ""},
@@ -319,7 +319,7 @@ static const char *const bad_keys[][3] = {
     {", map: {file: list.json}", "map.file: list.json:1: expected a colour map", ""},
     {", map: {file: empty.json}", "map.file: empty.json:1: is empty", ""},
     {", map: {file: none.json}", "map.file: none.json:1: holds no colour map", ""},
-    {", reversed: 1", "reversed: \"1\" is not allowed, expected true or false", ""},
+    {", reversed: 1", "reversed: \"1\" is not allowed (did you mean true?), expected true or false", ""},
     {", discrete: 0", "discrete: \"0\" is not allowed, expected a whole number from 1 to 64", ""},
     {", scale: ln", "scale: \"ln\" is not allowed, expected one of linear, log, symlog", ""},
     {", scale: symlog", "threshold: missing, expected a number above 0 for scale: symlog", ""},

@@ -13,8 +13,10 @@
 
 #include "memory.h"
 #include "scene_shorthand.h"
+#include "scene_syntax.h"
+#include "scene_words.h"
 
-enum { path_size = 256, quote_size = 48, question_size = 96, most_words = 64 };
+enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, most_words = 64 };
 
 /* Memory of the structs; what is behind it is aligned for anything. */
 struct scene_block {
@@ -42,12 +44,15 @@ static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *pa
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
-    const bool is_encoding = parser->error == YAML_READER_ERROR; /* such errors know an offset, but no line */
-    const size_t line = is_encoding ? lines_before(text, size, parser->problem_offset) : parser->problem_mark.line;
-    char what[300];
-    snprintf(what, sizeof what, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
-             parser->context ? " " : "", parser->context ? parser->context : "");
-    return bad_line(d, line + 1, what);
+    size_t line;
+    char what[SCENE_SYNTAX_SIZE];
+    if (parser->error == YAML_READER_ERROR) { /* such errors know an offset, but no line */
+        line = lines_before(text, size, parser->problem_offset) + 1;
+        snprintf(what, sizeof what, "not valid YAML: %.100s", parser->problem ? parser->problem : "unreadable");
+    } else {
+        scene_syntax_words(parser, text, size, &line, what);
+    }
+    return bad_line(d, line, what);
 }
 
 static const char *event_fault(const yaml_event_t *event, int *depth, int *documents)
@@ -101,7 +106,7 @@ static insitu_status scan_events(const scene_document *d, const char *text, size
 insitu_status scene_document_open(scene_document *d, const char *text, size_t size, const char *file_name,
                                   base_error *error)
 {
-    *d = (scene_document){.file_name = file_name, .error = error};
+    *d = (scene_document){.file_name = file_name, .error = error, .text = text, .size = size};
     if (size > SCENE_MAX_BYTES) {
         return base_fail(error, INSITU_ERROR_SCENE, "%.300s:1: the file has %zu bytes, expected at most %d", file_name,
                          size, SCENE_MAX_BYTES);
@@ -286,6 +291,10 @@ static void ask_for_meant(const yaml_node_t *word, const char *const *candidates
 static int list_choices(const cyaml_schema_value_t *value, const scene_key *key, const char **words, int most)
 {
     int count = 0;
+    if (value->type == CYAML_BOOL && most > 1) {
+        words[count++] = "true";
+        words[count++] = "false";
+    }
     if (value->type == CYAML_ENUM)
         for (uint32_t i = 0; i < value->enumeration.count && count < most; i++)
             words[count++] = value->enumeration.strings[i].str;
@@ -294,14 +303,76 @@ static int list_choices(const cyaml_schema_value_t *value, const scene_key *key,
     return count;
 }
 
+/* Writes the numbers of a text such as "640x480" or "0 0 5" as the list that the value is to be; "" if they are none.
+ */
+static void list_of_numbers(const char *text, const cyaml_schema_value_t *value, char list[list_size])
+{
+    static const char between[] = " ,;x*()";
+    size_t used = 0;
+    uint32_t count = 0;
+    list[0] = '\0';
+    for (const char *at = text + strspn(text, between); *at; at += strspn(at, between)) {
+        const size_t length = strcspn(at, between);
+        if (strspn(at, "+-.0123456789eE") != length || used + length + 4 > list_size) count = value->sequence.max;
+        if (count++ == value->sequence.max) break;
+        used += (size_t)snprintf(list + used, list_size - used, "%s%.*s", used ? ", " : "[", (int)length, at);
+        at += length;
+    }
+    const bool is_right = count >= value->sequence.min && count <= value->sequence.max;
+    snprintf(list + used, list_size - used, "]");
+    if (!is_right) list[0] = '\0';
+}
+
+/* Asks whether an empty value lacks quotes, as #ff0000 does, or its keys' indentation. */
+static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
+                           char question[question_size])
+{
+    size_t length;
+    const char *colour = scene_syntax_comment(d->text, d->size, (size_t)line_of(node), &length);
+    if (colour)
+        snprintf(question, question_size, " (did you mean \"%.*s\" in quotes?)", (int)length, colour);
+    else if (value->type == CYAML_MAPPING)
+        snprintf(question, question_size, " (its keys stand on the next lines, further in, or in { })");
+}
+
+/* Asks whether a value was meant that is written otherwise: in quotes, as a list, or as a list's entry. */
+static void ask_for_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
+                         const scene_key *key, char question[question_size])
+{
+    const bool is_list = value->type == CYAML_SEQUENCE || value->type == CYAML_SEQUENCE_FIXED;
+    const cyaml_type_e entry = is_list ? value->sequence.entry->type : CYAML_IGNORE;
+    char list[list_size] = "";
+    if (node->type == YAML_SCALAR_NODE && node->data.scalar.length == 0) {
+        ask_of_nothing(d, node, value, question);
+    } else if (node->type == YAML_SCALAR_NODE && is_list) {
+        const char *text = text_of(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
+        if (entry == CYAML_INT || entry == CYAML_FLOAT) list_of_numbers(text, value, list);
+        if (scene_is_colour(value, key) && strspn(digits, "0123456789abcdefABCDEF") == 6 && !digits[6])
+            snprintf(question, question_size, " (did you mean \"#%s\" in quotes?)", digits);
+        else if (*list)
+            snprintf(question, question_size, " (did you mean %s?)", list);
+    } else if (node->type == YAML_MAPPING_NODE && entry == CYAML_MAPPING) {
+        snprintf(question, question_size, " (is a \"- \" missing before its first key?)");
+    } else if (node->type == YAML_MAPPING_NODE && node->data.mapping.pairs.top - node->data.mapping.pairs.start == 1) {
+        const yaml_node_t *name = node_of(d, node->data.mapping.pairs.start->key);
+        const yaml_node_t *rest = node_of(d, node->data.mapping.pairs.start->value);
+        if (name->type == YAML_SCALAR_NODE && rest->type == YAML_SCALAR_NODE && rest->data.scalar.length == 0)
+            snprintf(question, question_size, " (did you mean \"{%.32s}\" in quotes?)", text_of(name));
+    }
+}
+
 static insitu_status bad_value(const scene_document *d, const char *path, const yaml_node_t *node,
                                const cyaml_schema_value_t *value, const scene_key *key)
 {
     const char *words[most_words];
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
     quote(node, quoted);
-    scene_value_words(value, key, expected);
-    ask_for_meant(node, words, list_choices(value, key, words, most_words), question);
+    scene_expected_words(path, value, key, expected);
+    int count = list_choices(value, key, words, most_words);
+    const bool is_switch = count == 0 && strstr(expected, "true or false");
+    if (is_switch) words[count++] = "true", words[count++] = "false";
+    ask_for_meant(node, words, count, question);
+    if (!*question) ask_for_form(d, node, value, key, question);
     return scene_bad(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
@@ -488,7 +559,9 @@ static insitu_status check_pair(scene_document *d, const char *path, const yaml_
         const char *fault = name->type == YAML_SCALAR_NODE ? why_gone(text_of(name)) : NULL;
         return bad_key(d, path, name, mapping, fault ? fault : "unknown");
     }
-    if (*seen & 1u << i) return bad_key(d, path, name, mapping, "given twice");
+    if (*seen & 1u << i)
+        return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key \"%s\" is given twice, expected it once",
+                         d->file_name, line_of(name), path, *path ? ": " : "", mapping->fields[i].key);
     *seen |= 1u << i;
     char value_path[path_size];
     snprintf(value_path, sizeof value_path, "%s%s%s", path, *path ? "." : "", mapping->fields[i].key);
@@ -513,7 +586,7 @@ static insitu_status check_mapping(scene_document *d, const char *path, const ya
     for (int i = 0; mapping->fields[i].key && status == INSITU_OK; i++) {
         if (seen & 1u << i || mapping->fields[i].value.flags & CYAML_FLAG_OPTIONAL) continue;
         char expected[SCENE_WORDS_SIZE];
-        scene_value_words(&mapping->fields[i].value, &mapping->keys[i], expected);
+        scene_expected_words(mapping->fields[i].key, &mapping->fields[i].value, &mapping->keys[i], expected);
         status = scene_bad(d, path, mapping->fields[i].key, "missing, expected %s", expected);
     }
     return status;
@@ -541,97 +614,4 @@ insitu_status scene_document_read(scene_document *d, scene_file **file)
     const scene_key key = {.child = &scene_top};
     const yaml_node_t *root = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
     return check_value(d, "", root, &scene_top_value, &key, file);
-}
-
-/* ---- the schema in words, for messages and for docs/scene.md alike --------------------------------------------- */
-
-__attribute__((format(printf, 2, 3))) static void append(char words[SCENE_WORDS_SIZE], const char *format, ...)
-{
-    const size_t used = strlen(words);
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(words + used, SCENE_WORDS_SIZE - used, format, arguments);
-    va_end(arguments);
-}
-
-static void append_range(char words[SCENE_WORDS_SIZE], const scene_key *key)
-{
-    if (!key || (key->low == 0 && key->high == 0)) return;
-    append(words, key->is_low_excluded ? " above %.10g" : " from %.10g", key->low);
-    const char *const high = key->is_high_excluded ? " and below" : key->is_low_excluded ? " and at most" : " to";
-    append(words, "%s %.10g", high, key->high);
-}
-
-static void append_choices(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *value)
-{
-    append(words, "one of");
-    for (uint32_t i = 0; i < value->enumeration.count; i++) {
-        append(words, "%s %s", i ? "," : "", value->enumeration.strings[i].str);
-    }
-}
-
-static void append_mapping(char words[SCENE_WORDS_SIZE], const scene_mapping *mapping)
-{
-    append(words, "a mapping with the keys");
-    for (const cyaml_schema_field_t *f = mapping->fields; f->key; f++) {
-        append(words, "%s %s", f == mapping->fields ? "" : ",", f->key);
-    }
-}
-
-/* Lists of 3 or 4 numbers from 0 to 1 are colours, for which scene_shorthand.c takes names too. */
-static bool is_colour(const cyaml_schema_value_t *list, const scene_key *key)
-{
-    const cyaml_type_e type = list->sequence.entry->type;
-    return list->sequence.min == 3 && type == CYAML_FLOAT && key && key->low == 0 && key->high == 1;
-}
-
-static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *list, const scene_key *key)
-{
-    const cyaml_schema_value_t *entry = list->sequence.entry;
-    append(words, "a list of %u", list->sequence.min);
-    if (list->sequence.max != list->sequence.min) append(words, " to %u", list->sequence.max);
-    switch (entry->type) {
-    case CYAML_MAPPING: append(words, " mappings"); return;
-    case CYAML_INT: append(words, " whole numbers"); break;
-    case CYAML_SEQUENCE_FIXED: append(words, " lists of %u numbers", entry->sequence.max); break;
-    default: append(words, " numbers"); break;
-    }
-    append_range(words, key);
-    if (is_colour(list, key)) append(words, ", or the name of a colour, or \"#rrggbb\" in quotes");
-}
-
-static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)
-{
-    for (int i = 0; i < key->form_count; i++) {
-        char form[SCENE_WORDS_SIZE];
-        scene_value_words(&key->forms[i].value, &key->forms[i].key, form);
-        append(words, "%s%s", i ? "; or " : "", form);
-    }
-}
-
-void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE])
-{
-    words[0] = '\0';
-    switch (value->type) {
-    case CYAML_INT:
-        append(words, "a whole number");
-        append_range(words, key);
-        break;
-    case CYAML_FLOAT:
-        append(words, "a number");
-        append_range(words, key);
-        break;
-    case CYAML_BOOL: append(words, "true or false"); break;
-    case CYAML_STRING: append(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
-    case CYAML_ENUM: append_choices(words, value); break;
-    case CYAML_IGNORE:
-        if (key->forms) {
-            append_forms(words, key);
-            break;
-        }
-        append(words, "a text of 1 to %d bytes or a list of 1 to %d of them", SCENE_NAME_BYTES, SCENE_MAX_NAMES);
-        break;
-    case CYAML_MAPPING: append_mapping(words, key->child); break;
-    default: append_list(words, value, key); break;
-    }
 }

@@ -11,15 +11,18 @@
 typedef struct scene_block scene_block;
 
 typedef struct scene_document {
-    const char *file_name;                 /* borrowed */
+    const char *file_name; /* borrowed */
+    const char *text;      /* borrowed until the document is closed; of `size` bytes */
+    size_t size;
     base_error *error;                     /* borrowed; where messages go */
     struct scene_attachments *attachments; /* borrowed; NULL: none may be named */
     yaml_document_t yaml;
     scene_block *blocks; /* memory of what was read */
 } scene_document;
 
-/* Read text into *d: one YAML document, of bounded size and depth, without anchors, aliases and tags. On an error there
- * is nothing to close. Numbers are read in the thread's locale, which must be one with a decimal point, from here on.
+/* Read text, which is borrowed, into *d: one YAML document, of bounded size and depth, without anchors, aliases and
+ * tags. On an error there is nothing to close. Numbers are read in the thread's locale, which must be one with a
+ * decimal point, from here on.
  */
 insitu_status scene_document_open(scene_document *d, const char *text, size_t size, const char *file_name,
                                   base_error *error);
@@ -50,10 +53,5 @@ insitu_status scene_bad(const scene_document *d, const char *parent, const char 
 
 /* Records that memory ran out while the scene was read; returns INSITU_ERROR_MEMORY. */
 insitu_status scene_no_memory(const scene_document *d);
-
-/* Describes in words the values that a key takes: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1".
- */
-enum { SCENE_WORDS_SIZE = 640 };
-void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
 
 #endif

@@ -2,6 +2,7 @@
  * things for which one short form could stand. Nodes are named by their numbers, because adding one may move all. */
 #include "scene_shorthand.h"
 
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -194,39 +195,51 @@ static void expand_slice(rewrite *r, int *value)
 
 /* ---- all of a document ------------------------------------------------------------------------------------------ */
 
+static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = "true or false";
+
 static const struct {
     const char *key;
     void (*expand)(rewrite *r, int *value);
+    const char *words; /* the short form, where the schema's words do not have it */
 } rules[] = {
-    {"colour", expand_colour},
-    {"background", expand_colour},
-    {"below", expand_colour},
-    {"above", expand_colour},
-    {"nan", expand_colour},
-    {"colours", expand_colours},
-    {"normal", expand_axis},
-    {"direction", expand_axis},
-    {"up", expand_axis},
-    {"axis", expand_axis},
-    {"colour_bar", expand_switch},
-    {"scale_bar", expand_switch},
-    {"ambient_occlusion", expand_switch},
-    {"edges", expand_switch},
-    {"automatic", expand_switch},
-    {"camera", expand_camera},
-    {"values", expand_values},
-    {"planes", expand_mappings},
-    {"lights", expand_mappings},
-    {"outputs", expand_mappings},
-    {"text", expand_mappings},
-    {"slice", expand_slice},
+    {"colour", expand_colour, NULL},
+    {"background", expand_colour, NULL},
+    {"below", expand_colour, NULL},
+    {"above", expand_colour, NULL},
+    {"nan", expand_colour, NULL},
+    {"colours", expand_colours, "names of colours, or \"#rrggbb\" in quotes"},
+    {"normal", expand_axis, axis_words},
+    {"direction", expand_axis, axis_words},
+    {"up", expand_axis, axis_words},
+    {"axis", expand_axis, axis_words},
+    {"colour_bar", expand_switch, switch_words},
+    {"scale_bar", expand_switch, switch_words},
+    {"ambient_occlusion", expand_switch, switch_words},
+    {"edges", expand_switch, switch_words},
+    {"automatic", expand_switch, switch_words},
+    {"camera", expand_camera, "automatic"},
+    {"values", expand_values, "one number"},
+    {"planes", expand_mappings, NULL},
+    {"lights", expand_mappings, NULL},
+    {"outputs", expand_mappings, NULL},
+    {"text", expand_mappings, NULL},
+    {"slice", expand_slice, NULL},
 };
 
-/* Replaces the first `from` in the text by the longer or equally long `to`. */
+const char *scene_shorthand_words(const char *key, size_t length)
+{
+    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++)
+        if (strlen(rules[i].key) == length && memcmp(rules[i].key, key, length) == 0) return rules[i].words;
+    return NULL;
+}
+
+/* Replaces the first word `from` in the text, whose words _ joins, by the longer or equally long `to`. */
 static void respell(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
+    const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* colors */
+    if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
     memcpy(at, to, strlen(to));
 }
@@ -304,8 +317,82 @@ static int count_edits(const char *a, const char *b)
     return rows[m % 3][n];
 }
 
+static bool is_same_word(const char *a, const char *b)
+{
+    while (*a && tolower((unsigned char)*a) == tolower((unsigned char)*b)) a++, b++;
+    return !*a && !*b;
+}
+
+/* Words of other programs, and what they are called here. */
+static const char *const synonyms[][2] = {{"resolution", "size"},
+                                          {"width", "size"},
+                                          {"height", "size"},
+                                          {"contour", "isosurface"},
+                                          {"contours", "isosurface"},
+                                          {"iso", "isosurface"},
+                                          {"array", "field"},
+                                          {"variable", "field"},
+                                          {"scalar", "field"},
+                                          {"scalars", "field"},
+                                          {"field", "colour_by"},
+                                          {"colormap", "map"},
+                                          {"colour_map", "map"},
+                                          {"color_map", "map"},
+                                          {"cmap", "map"},
+                                          {"lut", "map"},
+                                          {"jet", "turbo"},
+                                          {"rainbow", "turbo"},
+                                          {"coolwarm", "cool_to_warm"},
+                                          {"gray", "grey"},
+                                          {"parallel", "orthographic"},
+                                          {"ortho", "orthographic"},
+                                          {"eye", "position"},
+                                          {"from", "position"},
+                                          {"look_at", "focal"},
+                                          {"target", "focal"},
+                                          {"to", "focal"},
+                                          {"fov", "angle"},
+                                          {"file", "path"},
+                                          {"filename", "path"},
+                                          {"file_name", "path"},
+                                          {"isovalue", "values"},
+                                          {"isovalues", "values"},
+                                          {"levels", "values"},
+                                          {"normal", "planes"},
+                                          {"origin", "point"},
+                                          {"plane", "planes"},
+                                          {"logarithmic", "log"},
+                                          {"alpha", "opacity"},
+                                          {"transparency", "opacity"},
+                                          {"position", "at"},
+                                          {"location", "at"},
+                                          {"position", "direction"},
+                                          {"auto", "data"},
+                                          {"direction", "automatic"},
+                                          {"color", "colour"},
+                                          {"yes", "true"},
+                                          {"on", "true"},
+                                          {"1", "true"},
+                                          {"no", "false"},
+                                          {"off", "false"},
+                                          {"0", "false"},
+                                          {"step", "cycle"},
+                                          {"frequency", "every"},
+                                          {"interval", "every"}};
+
+/* The first of the candidates that a word of another program stands for. */
+static const char *find_synonym(const char *word, const char *const *candidates, int count)
+{
+    for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
+        for (int k = 0; k < count; k++)
+            if (is_same_word(word, synonyms[i][0]) && strcmp(candidates[k], synonyms[i][1]) == 0) return candidates[k];
+    return NULL;
+}
+
 const char *scene_nearest_word(const char *word, const char *const *candidates, int count)
 {
+    const char *synonym = find_synonym(word, candidates, count);
+    if (synonym) return synonym;
     const int length = (int)strlen(word);
     const char *nearest = NULL;
     int fewest = length / 3 + 1;

@@ -3,6 +3,7 @@
 #define SCENE_SCENE_SHORTHAND_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <yaml.h>
 
 /* Rewrites the document's short forms in place; new nodes keep the lines of those that they replace, so that messages
@@ -10,8 +11,12 @@
  */
 bool scene_expand_shorthand(yaml_document_t *document);
 
-/* Returns the candidate that the word was probably meant to be: the nearest by edits of a letter (insert, remove,
- * replace, or swap of two neighbours), if a third of the letters or fewer differ. NULL: there is none. */
+/* The short forms that a key's value may have, in words, as "true or false"; NULL: none. */
+const char *scene_shorthand_words(const char *key, size_t length);
+
+/* Returns the candidate that the word was probably meant to be: what other programs call so, or the nearest by edits of
+ * a letter (insert, remove, replace, or swap of two neighbours), if a third of the letters or fewer differ. NULL: there
+ * is none. */
 const char *scene_nearest_word(const char *word, const char *const *candidates, int count);
 
 #endif

@@ -1,0 +1,378 @@
+/* libyaml reports where it could not go on, which is often lines behind the mistake, and in words of the grammar. So
+ * its report only chooses the lines that are looked at here: from where the structure begins that it could not end, to
+ * where it stopped. The mistakes that people make are sought in them, the surest first; what is none of them is told in
+ * libyaml's own words. */
+#include "scene_syntax.h"
+
+#include <ctype.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { longest_quote = 40 };
+
+/* A line of the text, without its end. */
+typedef struct text_line {
+    const char *start;
+    size_t length;
+    size_t indent; /* blanks and tabs before its first other character; length: it has none */
+    size_t number; /* from 0 */
+} text_line;
+
+typedef struct fault {
+    const yaml_parser_t *parser;
+    const char *text;
+    size_t size;
+    size_t first, last; /* the lines to look at, from 0 */
+    bool is_flow;       /* in { } or [ ] */
+    size_t *line;
+    char *words;
+} fault;
+
+static text_line line_from(const char *start, const char *end, size_t number)
+{
+    const char *stop = memchr(start, '\n', (size_t)(end - start));
+    text_line l = {.start = start, .length = (size_t)((stop ? stop : end) - start), .number = number};
+    while (l.length > 0 && l.start[l.length - 1] == '\r') l.length--;
+    while (l.indent < l.length && (l.start[l.indent] == ' ' || l.start[l.indent] == '\t')) l.indent++;
+    return l;
+}
+
+/* The next line; an empty one behind the last. */
+static text_line line_behind(text_line l, const char *end)
+{
+    const char *stop = memchr(l.start, '\n', (size_t)(end - l.start));
+    return line_from(stop ? stop + 1 : end, end, l.number + 1);
+}
+
+static text_line line_at(const char *text, size_t size, size_t number)
+{
+    text_line l = line_from(text, text + size, 0);
+    while (l.number < number) l = line_behind(l, text + size);
+    return l;
+}
+
+static bool has_content(text_line l)
+{
+    return l.indent < l.length && l.start[l.indent] != '#';
+}
+
+/* Records the words for a line. Returns true, so that a rule can end with it. */
+__attribute__((format(printf, 3, 4))) static bool tell(const fault *f, size_t line, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(f->words, SCENE_SYNTAX_SIZE, format, arguments);
+    va_end(arguments);
+    *f->line = line + 1;
+    return true;
+}
+
+static int quoted_length(size_t length)
+{
+    return (int)(length < longest_quote ? length : longest_quote);
+}
+
+/* ---- the mistakes: each rule tells of one and returns true, or returns false ------------------------------------ */
+
+static bool is_tab(const fault *f, text_line l)
+{
+    const char *tab = memchr(l.start, '\t', l.indent);
+    if (!tab || !has_content(l)) return false;
+    return tell(f, l.number, "a tab stands before \"%.*s\", expected blanks: tabs are not allowed there",
+                quoted_length(l.length - l.indent), l.start + l.indent);
+}
+
+/* Tells whether p is within quotes, or one of them, going on from the character before; *quote: the one that is open.
+ */
+static bool is_in_quotes(text_line l, const char *p, char *quote)
+{
+    const bool begins = p == l.start || strchr(" \t[{,:", p[-1]);
+    if (!*quote && begins && (*p == '"' || *p == '\'')) return *quote = *p, true;
+    if (!*quote) return false;
+    if (*quote == *p) *quote = '\0';
+    return true;
+}
+
+static const char *find_colour_comment(text_line l, size_t *length)
+{
+    char quote = '\0';
+    for (size_t i = 1; i < l.length; i++) {
+        if (is_in_quotes(l, l.start + i, &quote) || l.start[i] != '#' || !strchr(" \t[{,", l.start[i - 1])) continue;
+        size_t digits = 0;
+        while (i + 1 + digits < l.length && isxdigit((unsigned char)l.start[i + 1 + digits])) digits++;
+        const bool is_colour = digits == 3 || digits == 6 || digits == 8;
+        *length = digits + 1;
+        return is_colour ? l.start + i : NULL;
+    }
+    return NULL;
+}
+
+const char *scene_syntax_comment(const char *text, size_t size, size_t line, size_t *length)
+{
+    return find_colour_comment(line_at(text, size, line - 1), length);
+}
+
+static bool is_colour_comment(const fault *f, text_line l)
+{
+    size_t length;
+    const char *colour = find_colour_comment(l, &length);
+    if (!colour) return false;
+    return tell(f, l.number, "a # behind a blank begins a comment, expected the colour in quotes: \"%.*s\"",
+                (int)length, colour);
+}
+
+/* The length of a placeholder such as {cycle:04} at the start of a text; 0: there is none. */
+static size_t placeholder_length(const char *at, const char *end)
+{
+    const char *p = at + 1;
+    if (at >= end || *at != '{') return 0;
+    while (p < end && (isalnum((unsigned char)*p) || *p == '_' || *p == ':' || *p == '.')) p++;
+    const bool is_one = p > at + 1 && p < end && *p == '}' && isalpha((unsigned char)at[1]);
+    return is_one ? (size_t)(p - at) + 1 : 0;
+}
+
+/* The length of a text of placeholders and other characters up to a blank, comma or bracket. */
+static size_t word_length(const char *at, const char *end)
+{
+    const char *p = at;
+    while (p < end) {
+        const size_t placeholder = placeholder_length(p, end);
+        if (placeholder == 0 && strchr(" \t,{}[]\"'", *p)) break;
+        p += placeholder ? placeholder : 1;
+    }
+    return (size_t)(p - at);
+}
+
+/* The length of a text that begins with a word, and goes on to the end of the line unless a comma or another key does.
+ */
+static size_t text_length(const char *at, size_t word, const char *end)
+{
+    while (end > at && (end[-1] == ' ' || end[-1] == '\t')) end--;
+    for (const char *p = at + word; p < end; p++)
+        if (*p == ',' || *p == '#' || (*p == ':' && p + 1 < end && p[1] == ' ')) return word;
+    return (size_t)(end - at);
+}
+
+/* A text with a placeholder outside of quotes: path: {name}.png. */
+static bool is_bare_placeholder(const fault *f, text_line l)
+{
+    const char *end = l.start + l.length;
+    char quote = '\0';
+    for (const char *p = l.start + l.indent; p < end; p++) {
+        if (is_in_quotes(l, p, &quote)) continue;
+        const bool begins = p > l.start && strchr(" \t[{,", p[-1]) && !strchr(" \t,{}[]", *p);
+        const bool is_placeholder = *p == '{' && placeholder_length(p, end) > 0;
+        if (!begins && !is_placeholder) continue;
+        const size_t length = word_length(p, end);
+        if (!memchr(p, '{', length)) continue;
+        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* a mapping, maybe */
+        return tell(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
+                    (int)(f->is_flow ? length : text_length(p, length, end)), p);
+    }
+    return false;
+}
+
+static bool is_unended_quote(const fault *f, text_line l)
+{
+    const char *context = f->parser->context ? f->parser->context : "";
+    if (!strstr(context, "quoted scalar")) return false;
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    if (strstr(problem, "escape"))
+        return tell(
+            f, f->parser->problem_mark.line,
+            "a \\ in double quotes begins a special character, expected \\\\, or single quotes around the text");
+    const size_t column = f->parser->context_mark.column;
+    const size_t length = column < l.length ? l.length - column : 0;
+    return tell(f, l.number, "the text %.*s has no end, expected %c at its end", quoted_length(length),
+                l.start + column, column < l.length ? l.start[column] : '"');
+}
+
+/* A " of an earlier line that the " of the line at fault has ended. */
+static bool is_unended_before(const fault *f, text_line l)
+{
+    const char *quote = NULL; /* that is open */
+    text_line opened = l;
+    for (text_line other = line_at(f->text, f->size, 0); other.number < l.number;
+         other = line_behind(other, f->text + f->size))
+        for (size_t i = 0; i < other.length && has_content(other); i++) {
+            if (other.start[i] != '"') continue;
+            quote = quote ? NULL : other.start + i;
+            opened = other;
+        }
+    if (!quote) return false;
+    return tell(f, opened.number, "the text %.*s has no end, expected \" at its end",
+                quoted_length((size_t)(opened.start + opened.length - quote)), quote);
+}
+
+/* A line above that ends in a bracket, behind which something else than a value follows. */
+static bool is_left_open(const fault *f)
+{
+    bool is_told = false;
+    for (text_line l = line_at(f->text, f->size, 0); l.number < f->last; l = line_behind(l, f->text + f->size)) {
+        const char last = has_content(l) ? l.start[l.length - 1] : ' ';
+        if (last == '[' || last == '{')
+            is_told =
+                tell(f, l.number, "the %c of this line is not closed, expected %c", last, last == '[' ? ']' : '}');
+    }
+    return is_told;
+}
+
+static bool is_unended_bracket(const fault *f, text_line l)
+{
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    if (f->is_flow && strstr(problem, "node content")) return is_left_open(f);
+    if (!f->is_flow || !strstr(problem, "expected ','")) return false;
+    const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
+    const text_line stop = line_at(f->text, f->size, f->last);
+    size_t column = f->parser->problem_mark.column;
+    if (column < stop.length && stop.start[column] == ':') /* the key before it is what stands too near */
+        while (column > stop.indent && !strchr(" {[,", stop.start[column - 1])) column--;
+    const size_t length = column < stop.length ? stop.length - column : 0;
+    if (l.number == stop.number && length > 0)
+        return tell(f, l.number, "expected a comma or %c before \"%.*s\"", close, quoted_length(length),
+                    stop.start + column);
+    return tell(f, l.number, "the %c of this line is not closed, expected %c", open, close);
+}
+
+/* The last line before `number` that has content; that line itself if there is none. */
+static text_line line_before(const fault *f, size_t number)
+{
+    text_line found = line_at(f->text, f->size, number);
+    for (text_line l = line_at(f->text, f->size, 0); l.number < number; l = line_behind(l, f->text + f->size))
+        if (has_content(l)) found = l;
+    return found;
+}
+
+static bool is_item(text_line l)
+{
+    return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
+}
+
+/* The line above whose item, or key, stands nearest to where that of the line stands; that of items is 2 further in.
+ * Sets *expected to where. */
+static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
+{
+    text_line nearest = l;
+    size_t least = (size_t)-1;
+    for (text_line other = line_at(f->text, f->size, 0); other.number < l.number;
+         other = line_behind(other, f->text + f->size)) {
+        if (!has_content(other) || (is_item(l) && !is_item(other))) continue;
+        const size_t at = other.indent + (is_item(other) && !is_item(l) ? 2 : 0);
+        const size_t distance = at > l.indent ? at - l.indent : l.indent - at;
+        if (distance > least) continue;
+        least = distance;
+        *expected = at;
+        nearest = other;
+    }
+    return nearest;
+}
+
+/* The line above, to which nothing can be added: it lacks its colon, or the blank of its item. */
+static bool is_bad_line_above(const fault *f, text_line l)
+{
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    if (!strstr(problem, "not allowed") && !strstr(problem, "did not find expected")) return false;
+    const text_line other = line_before(f, l.number);
+    const char *start = other.start + other.indent, *end = other.start + other.length;
+    if (other.number == l.number || strchr("\"'[]{}", end[-1])) return false;
+    if (start + 1 < end && *start == '-' && isalpha((unsigned char)start[1]))
+        return tell(f, other.number, "no blank behind the - of a list, expected \"- %.*s\"",
+                    quoted_length((size_t)(end - start) - 1), start + 1);
+    start += is_item(other) ? 2 : 0;
+    if (memchr(start, ':', (size_t)(end - start))) return false;
+    return tell(f, other.number, "\"%.*s\" has no colon, expected \"%.*s:\"", quoted_length((size_t)(end - start)),
+                start, (int)strcspn(start, " =;\r\n"), start);
+}
+
+static const char *plural(size_t count)
+{
+    return count == 1 ? "" : "s";
+}
+
+static bool is_bad_indent(const fault *f, text_line l)
+{
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    const bool is_deeper = strstr(problem, "mapping values are not allowed") != NULL;
+    const size_t key_length = strcspn(l.start + l.indent, ":\r\n");
+    const size_t column = f->parser->problem_mark.column;
+    if (is_deeper ? column > l.indent + key_length : column != l.indent) return false;
+    if (!is_deeper && !strstr(problem, "did not find expected")) return false;
+    size_t expected = l.indent;
+    const text_line other = nearest_indent(f, l, &expected);
+    if (expected == l.indent) return false;
+    return tell(f, l.number, "wrong indentation: %zu blank%s before \"%.*s\", expected %zu, as in line %zu", l.indent,
+                plural(l.indent), quoted_length(key_length), l.start + l.indent, expected, other.number + 1);
+}
+
+/* Something behind a value that has ended: title: "a" b, or a text with a colon: title: a: b. */
+static bool is_bare_text(const fault *f, text_line l)
+{
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    const bool has_colon = strstr(problem, "mapping values are not allowed") != NULL;
+    if (!has_colon && !strstr(problem, "did not find expected")) return false;
+    if (!has_colon && is_unended_before(f, l)) return true;
+    const char *colon = memchr(l.start + l.indent, ':', l.length - l.indent);
+    if (!colon) return false;
+    const char *value = colon + 1;
+    while (value < l.start + l.length && *value == ' ') value++;
+    const size_t length = (size_t)(l.start + l.length - value);
+    if (length == 0) return false;
+    if (has_colon)
+        return tell(f, l.number, "a text with \": \" needs quotes, expected \"%.*s\"", quoted_length(length), value);
+    return tell(f, l.number, "the value ends before the line does, found %.*s, expected quotes around all of it",
+                quoted_length(length), value);
+}
+
+static bool is_key_without_colon(const fault *f)
+{
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    if (!strstr(problem, "could not find expected ':'")) return false;
+    const text_line l = line_at(f->text, f->size, f->parser->context_mark.line);
+    const size_t column = f->parser->context_mark.column;
+    const size_t length = column < l.length ? l.length - column : 0;
+    const char *colon = memchr(l.start + column, ':', length);
+    if (colon)
+        return tell(f, l.number, "no blank behind the colon in \"%.*s\", expected \"%.*s: ...\"", quoted_length(length),
+                    l.start + column, quoted_length((size_t)(colon - l.start) - column), l.start + column);
+    return tell(f, l.number, "\"%.*s\" has no colon, expected \"key: value\"", quoted_length(length), l.start + column);
+}
+
+static bool is_bad_start(const fault *f)
+{
+    const char *problem = f->parser->problem ? f->parser->problem : "";
+    const text_line l = line_at(f->text, f->size, f->parser->problem_mark.line);
+    const size_t column = f->parser->problem_mark.column;
+    if (strstr(problem, "block sequence entries are not allowed"))
+        return tell(f, l.number, "a list's \"-\" behind a key, expected it on a line of its own, or the list in [ ]");
+    if (!strstr(problem, "cannot start any token") || column >= l.length) return false;
+    return tell(f, l.number, "no text begins with %c, expected quotes around \"%.*s\"", l.start[column],
+                (int)word_length(l.start + column, l.start + l.length), l.start + column);
+}
+
+/* ---- the search ------------------------------------------------------------------------------------------------- */
+
+static bool is_in_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
+{
+    for (text_line l = line_at(f->text, f->size, f->first); l.number <= f->last; l = line_behind(l, f->text + f->size))
+        if (rule(f, l)) return true;
+    return false;
+}
+
+void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t size, size_t *line,
+                        char words[SCENE_SYNTAX_SIZE])
+{
+    const char *context = parser->context ? parser->context : "";
+    fault f = {.parser = parser, .text = text, .size = size, .line = line, .words = words};
+    f.is_flow = strstr(context, "flow") != NULL;
+    f.last = parser->problem_mark.line;
+    const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last;
+    f.first = is_before ? parser->context_mark.line : f.last;
+    const text_line begin = line_at(text, size, f.first), stop = line_at(text, size, f.last);
+    if (is_in_lines(&f, is_tab) || is_in_lines(&f, is_colour_comment) || is_in_lines(&f, is_bare_placeholder)) return;
+    if (is_unended_quote(&f, begin) || is_unended_bracket(&f, begin) || is_bad_line_above(&f, stop)) return;
+    if (is_bad_indent(&f, stop) || is_key_without_colon(&f) || is_bad_start(&f) || is_bare_text(&f, stop)) return;
+    tell(&f, f.last, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
+         *context ? " " : "", context);
+}

@@ -1,0 +1,118 @@
+#include "scene_words.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "scene_shorthand.h"
+
+__attribute__((format(printf, 2, 3))) static void append(char words[SCENE_WORDS_SIZE], const char *format, ...)
+{
+    const size_t used = strlen(words);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(words + used, SCENE_WORDS_SIZE - used, format, arguments);
+    va_end(arguments);
+}
+
+static void append_range(char words[SCENE_WORDS_SIZE], const scene_key *key)
+{
+    if (!key || (key->low == 0 && key->high == 0)) return;
+    append(words, key->is_low_excluded ? " above %.10g" : " from %.10g", key->low);
+    const char *const high = key->is_high_excluded ? " and below" : key->is_low_excluded ? " and at most" : " to";
+    append(words, "%s %.10g", high, key->high);
+}
+
+static void append_choices(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *value)
+{
+    append(words, "one of");
+    for (uint32_t i = 0; i < value->enumeration.count; i++) {
+        append(words, "%s %s", i ? "," : "", value->enumeration.strings[i].str);
+    }
+}
+
+static void append_mapping(char words[SCENE_WORDS_SIZE], const scene_mapping *mapping)
+{
+    append(words, "a mapping with the keys");
+    for (const cyaml_schema_field_t *f = mapping->fields; f->key; f++) {
+        append(words, "%s %s", f == mapping->fields ? "" : ",", f->key);
+    }
+}
+
+bool scene_is_colour(const cyaml_schema_value_t *list, const scene_key *key)
+{
+    const cyaml_type_e type = list->sequence.entry->type;
+    return list->sequence.min == 3 && type == CYAML_FLOAT && key && key->low == 0 && key->high == 1;
+}
+
+static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *list, const scene_key *key)
+{
+    const cyaml_schema_value_t *entry = list->sequence.entry;
+    append(words, "a list of %u", list->sequence.min);
+    if (list->sequence.max != list->sequence.min) append(words, " to %u", list->sequence.max);
+    switch (entry->type) {
+    case CYAML_MAPPING: append(words, " mappings"); return;
+    case CYAML_INT: append(words, " whole numbers"); break;
+    case CYAML_SEQUENCE_FIXED: append(words, " lists of %u numbers", entry->sequence.max); break;
+    default: append(words, " numbers"); break;
+    }
+    append_range(words, key);
+    if (scene_is_colour(list, key)) append(words, ", or the name of a colour, or \"#rrggbb\" in quotes");
+}
+
+static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)
+{
+    for (int i = 0; i < key->form_count; i++) {
+        char form[SCENE_WORDS_SIZE];
+        scene_value_words(&key->forms[i].value, &key->forms[i].key, form);
+        append(words, "%s%s", i ? "; or " : "", form);
+    }
+}
+
+void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE])
+{
+    words[0] = '\0';
+    switch (value->type) {
+    case CYAML_INT:
+        append(words, "a whole number");
+        append_range(words, key);
+        break;
+    case CYAML_FLOAT:
+        append(words, "a number");
+        append_range(words, key);
+        break;
+    case CYAML_BOOL: append(words, "true or false"); break;
+    case CYAML_STRING: append(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
+    case CYAML_ENUM: append_choices(words, value); break;
+    case CYAML_IGNORE:
+        if (key->forms) {
+            append_forms(words, key);
+            break;
+        }
+        append(words, "a text of 1 to %d bytes or a list of 1 to %d of them", SCENE_NAME_BYTES, SCENE_MAX_NAMES);
+        break;
+    case CYAML_MAPPING: append_mapping(words, key->child); break;
+    default: append_list(words, value, key); break;
+    }
+}
+
+/* The last key of a path; "" for an entry of a list. */
+static const char *last_key(const char *path)
+{
+    const char *dot = strrchr(path, '.'), *key = dot ? dot + 1 : path;
+    return *key && path[strlen(path) - 1] == ']' ? "" : key;
+}
+
+void scene_expected_words(const char *path, const cyaml_schema_value_t *value, const scene_key *key,
+                          char expected[SCENE_WORDS_SIZE])
+{
+    scene_value_words(value, key, expected);
+    if (value->type == CYAML_SEQUENCE && value->sequence.entry->type == CYAML_MAPPING && key->child) {
+        const scene_key entry = {.child = key->child};
+        char keys[SCENE_WORDS_SIZE];
+        scene_value_words(value->sequence.entry, &entry, keys);
+        append(expected, "%s", keys + strlen("a mapping"));
+    }
+    const char *name = last_key(path), *short_form = scene_shorthand_words(name, strlen(name));
+    if (short_form) append(expected, ", or %s", short_form);
+}
