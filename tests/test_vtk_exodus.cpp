@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -101,8 +102,9 @@ void put(int status)
     if (status < 0) throw std::runtime_error("the Exodus library cannot write");
 }
 
-/* Two steps; at the second f is twice as large. The field of the cells is the cell's number in its block. */
-void write_exodus(const std::string &path, const std::vector<block> &blocks)
+/* Two steps; at the second f is twice as large. The field of the cells is the cell's number in its block. A second
+ * field of the nodes, of zeros, has the names of a displacement's components if it is moved. */
+void write_exodus(const std::string &path, const std::vector<block> &blocks, bool is_moved = false)
 {
     int word = 8, io_word = 8;
     const int file = ex_create(path.c_str(), EX_CLOBBER, &word, &io_word);
@@ -131,14 +133,18 @@ void write_exodus(const std::string &path, const std::vector<block> &blocks)
         put(ex_put_conn(file, EX_ELEM_BLOCK, id, list.data(), nullptr, nullptr));
         first += static_cast<int>(b.nodes.size());
     }
-    put(ex_put_variable_param(file, EX_NODAL, 1));
-    put(ex_put_variable_name(file, EX_NODAL, 1, "f"));
+    const char *const names[] = {"f", "disp_x", "disp_y", "disp_z"};
+    const int fields = is_moved ? 4 : 1;
+    put(ex_put_variable_param(file, EX_NODAL, fields));
+    for (int i = 0; i < fields; i++) put(ex_put_variable_name(file, EX_NODAL, i + 1, names[i]));
     put(ex_put_variable_param(file, EX_ELEM_BLOCK, 1));
     put(ex_put_variable_name(file, EX_ELEM_BLOCK, 1, "number"));
     for (int step = 1; step <= 2; step++) {
         const double time = step;
         put(ex_put_time(file, step, &time));
         put(ex_put_var(file, step, EX_NODAL, 1, 1, nodes, f.data()));
+        const std::vector<double> none(f.size());
+        for (int i = 1; i < fields; i++) put(ex_put_var(file, step, EX_NODAL, i + 1, 1, nodes, none.data()));
         for (double &value : f) value *= 2;
         for (size_t i = 0; i < blocks.size(); i++) {
             std::vector<double> numbers;
@@ -229,10 +235,10 @@ void add_cell(vtkUnstructuredGrid *grid, vtkIdType cell, sums &all)
     all.cells++;
 }
 
-sums sums_of(const std::string &path, size_t step)
+sums sums_of(const std::string &path, size_t step, int piece = 0, int pieces = 1)
 {
     const auto file = open_data_file(path);
-    const auto data = grids_of(file->read(step, 0, 1), path);
+    const auto data = grids_of(file->read(step, piece, pieces), path);
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!composite) throw std::runtime_error("no blocks");
     sums all;
@@ -346,6 +352,56 @@ void elements_that_cannot_be_read_are_refused_by_name(void **)
     expect_refusal("PYRAMID", 4);
 }
 
+std::string why_refused(const std::string &path)
+{
+    try {
+        (void)sums_of(path, 0);
+    } catch (const std::exception &e) {
+        return e.what();
+    }
+    return "";
+}
+
+/* Any of the files of a parallel run stands for all, each of which is a piece. The second step has 2 f. */
+void files_of_a_parallel_run_are_pieces(void **)
+{
+    const std::string start = folder + "/run.e-s002.12.";
+    for (int p = 0; p < 12; p++)
+        write_exodus(start + (p < 10 ? "0" : "") + std::to_string(p), {{"HEX8", divide(hexes, 8, p)}});
+    const sums all = sums_of(start + "07", 1);
+    assert_true(is_near(all.size, 12));
+    assert_true(std::fabs(all.integral - 2 * (12 * 1.5 + 66)) < 1e-10); /* sums of some hundred */
+    assert_int_equal(open_data_file(start + "00")->pieces(0), 12);
+    for (int piece = 0; piece < 3; piece++) assert_true(is_near(sums_of(start + "00", 0, piece, 3).size, 4));
+    assert_int_equal(std::remove((start + "03").c_str()), 0);
+    const std::string why = why_refused(start + "07");
+    if (why.find("run.e-s002.12.03: No such file") != std::string::npos && why.find("12 pieces") != std::string::npos)
+        return;
+    print_error("%s\n", why.c_str());
+    assert_true(false);
+}
+
+void files_of_meshes_that_change_are_read(void **)
+{
+    const std::string path = folder + "/changing.e-s002";
+    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}});
+    assert_true(is_near(sums_of(path, 0).size, 1));
+    assert_true(why_refused(folder + "/changing.e-t002").find("No such file") != std::string::npos);
+}
+
+void a_displacement_that_is_applied_is_told(void **)
+{
+    const std::string path = folder + "/moved.e";
+    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}}, true);
+    const std::string told = open_data_file(path)->take_warnings();
+    if (told.find("moved.e: points are moved by the displacement \"disp_\"") == std::string::npos) {
+        print_error("%s\n", told.c_str());
+        assert_true(false);
+    }
+    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}});
+    assert_string_equal(open_data_file(path)->take_warnings().c_str(), "");
+}
+
 int begin(void **)
 {
     folder = fresh_folder("vtk_exodus");
@@ -363,6 +419,9 @@ int main()
         cmocka_unit_test(names_of_types_are_taken_as_codes_write_them),
         cmocka_unit_test(blocks_of_many_kinds_stand_side_by_side),
         cmocka_unit_test(elements_that_cannot_be_read_are_refused_by_name),
+        cmocka_unit_test(files_of_a_parallel_run_are_pieces),
+        cmocka_unit_test(files_of_meshes_that_change_are_read),
+        cmocka_unit_test(a_displacement_that_is_applied_is_told),
     };
     return cmocka_run_group_tests(tests, begin, nullptr);
 }

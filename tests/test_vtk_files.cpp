@@ -3,9 +3,11 @@
  *
  *     test_vtk_files [random cuts of each file] */
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -277,6 +279,100 @@ void cut_foam_files_are_errors_or_the_same(void **)
     assert_int_equal(wrong, 0);
 }
 
+/* The message of what cannot be opened or read, or "". */
+std::string why_refused(const std::string &name)
+{
+    try {
+        (void)open_data_file(folder + "/" + name)->read(0, 0, 1);
+    } catch (const std::exception &e) {
+        return e.what();
+    }
+    return "";
+}
+
+void expect_told(const std::string &told, const std::string &what)
+{
+    if (told.find(what) != std::string::npos) return;
+    print_error("expected '%s' in:\n%s\n", what.c_str(), told.c_str());
+    assert_true(false);
+}
+
+vtkIdType count_cells(vtkDataObject *data)
+{
+    vtkIdType count = 0;
+    auto *composite = vtkCompositeDataSet::SafeDownCast(data);
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+        count += vtkUnstructuredGrid::SafeDownCast(it->GetCurrentDataObject())->GetNumberOfCells();
+    return count;
+}
+
+/* The second processor has no step 0.5 at first. */
+void foam_cases_of_parallel_runs_are_read_by_processors(void **)
+{
+    namespace fs = std::filesystem;
+    const std::string parallel = folder + "/parallel", second = parallel + "/processor1";
+    for (const int p : {0, 1}) write_foam(parallel + "/processor" + std::to_string(p), 2 * p);
+    write_file(parallel + "/dec.foam", "");
+    fs::rename(second + "/0.5", folder + "/kept");
+    auto file = open_data_file(parallel + "/dec.foam");
+    assert_int_equal(file->times().size(), 1);
+    expect_told(file->take_warnings(), "dec.foam: processor1/ has no step 0.5: left out");
+    fs::rename(folder + "/kept", second + "/0.5");
+    file = open_data_file(parallel + "/dec.foam");
+    assert_int_equal(file->times().size(), 2);
+    assert_int_equal(file->pieces(0), 2);
+    const auto all = grids_of(file->read(1, 0, 1), "dec");
+    assert_int_equal(count_cells(all), 6);
+    double bounds[6];
+    vtkMultiBlockDataSet::SafeDownCast(all)->GetBounds(bounds);
+    assert_true(bounds[0] == 0 && bounds[1] == 4);
+    const auto piece = only_grid(grids_of(file->read(1, 1, 2), "dec"));
+    assert_true(piece->GetBounds()[0] == 2);
+    assert_true(piece->GetCellData()->GetArray("p")->GetComponent(2, 0) == 6);
+
+    write_foam(parallel); /* a case whose last step is as late */
+    assert_int_equal(open_data_file(parallel + "/dec.foam")->pieces(0), 1);
+    fs::remove_all(parallel + "/0.5");
+    file = open_data_file(parallel + "/dec.foam");
+    assert_int_equal(file->pieces(0), 2);
+    expect_told(file->take_warnings(), "the folders of its processors are read, which go on to 0.5");
+}
+
+void foam_cases_that_lack_folders_are_refused_by_their_names(void **)
+{
+    namespace fs = std::filesystem;
+    const std::string parallel = folder + "/lacking";
+    for (const int p : {0, 2}) write_foam(parallel + "/processor" + std::to_string(p), 2 * p);
+    write_file(parallel + "/dec.foam", "");
+    expect_told(why_refused("lacking/dec.foam"), "dec.foam: processor1/ is missing, as there is processor2/");
+    fs::create_directories(parallel + "/processor1");
+    expect_told(why_refused("lacking/dec.foam"), "dec.foam: processor1/constant/polyMesh/ is missing");
+    for (const char *name : {"/processor0", "/processor1", "/processor2"}) fs::remove_all(parallel + name);
+    fs::create_directories(parallel + "/processors4");
+    expect_told(why_refused("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
+}
+
+void cgns_zones_whose_boundary_comes_first_are_refused(void **)
+{
+    write_cgns_elements(folder + "/wall.cgns", hexes(lattice::curved), true);
+    expect_told(why_refused("wall.cgns"),
+                "wall.cgns: cannot be read: zone Base/Zone: its section \"Wall\" of QUAD_4 has "
+                "the elements 1 to 20, which VTK's reader takes for its cells");
+}
+
+/* The .vtm of a run that writes a table of its residuals beside the grid. */
+void tables_beside_grids_are_left_out(void **)
+{
+    write_file(folder + "/residuals.vtt",
+               "<VTKFile type=\"Table\" version=\"1.0\"><Table><Piece NumberOfRows=\"1\"><RowData><DataArray "
+               "type=\"Float64\" Name=\"r\" format=\"ascii\">3</DataArray></RowData></Piece></Table></VTKFile>\n");
+    write_file(folder + "/table.vtm", "<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet>"
+                                      "<DataSet index=\"0\" file=\"residuals.vtt\"/><DataSet index=\"1\" "
+                                      "file=\"raw.vtu\"/></vtkMultiBlockDataSet></VTKFile>\n");
+    assert_int_equal(read_grid("table.vtm")->GetNumberOfCells(), 60);
+}
+
 /* Entries of one time are parts of one step, and steps come in the order of their times. */
 void series_have_the_times_of_their_entries(void **)
 {
@@ -468,6 +564,51 @@ void ensight_file_sets_are_read_step_by_step(void **)
     assert_true(why_set_is_refused().find("set.f: has steps of different sizes") != std::string::npos);
 }
 
+/* A cube, with values in `section` of a binary file: what stands before the values, and the values. */
+void write_ensight_cube(const std::string &section, const std::string &values)
+{
+    using floats = std::vector<float>;
+    using ints = std::vector<int32_t>;
+    const std::string part = ensight_line("part") + bytes_of(ints{1});
+    write_file(folder + "/cube.geo",
+               ensight_line("C Binary") + ensight_line("a") + ensight_line("b") + ensight_line("node id assign") +
+                   ensight_line("element id assign") + part + ensight_line("c") + ensight_line("coordinates") +
+                   bytes_of(ints{8}) + bytes_of(floats{0, 1, 1, 0, 0, 1, 1, 0}) +
+                   bytes_of(floats{0, 0, 1, 1, 0, 0, 1, 1}) + bytes_of(floats{0, 0, 0, 0, 1, 1, 1, 1}) +
+                   ensight_line("hexa8") + bytes_of(ints{1, 1, 2, 3, 4, 5, 6, 7, 8}));
+    write_file(folder + "/cube.f", ensight_line("f") + part + ensight_line(section) + values);
+    write_file(folder + "/cube.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: cube.geo\nVARIABLE\n"
+                                      "scalar per node: f cube.f\n");
+}
+
+void ensight_values_that_are_undefined_are_nan(void **)
+{
+    const std::vector<float> all = {0, 1, 2, -9, 4, -9, 6, 7};
+    write_ensight_cube("coordinates undef", bytes_of(std::vector<float>{-9}) + bytes_of(all));
+    const auto undefined = read_grid("cube.case");
+    write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{6, 1, 2, 3, 5, 7, 8}) +
+                                                  bytes_of(std::vector<float>{0, 1, 2, 4, 6, 7}));
+    const auto partial = read_grid("cube.case");
+    for (const auto &grid : {undefined, partial})
+        for (vtkIdType i = 0; i < 8; i++) {
+            const double value = grid->GetPointData()->GetArray("f")->GetComponent(i, 0);
+            assert_true(i == 3 || i == 5 ? std::isnan(value) : value == static_cast<double>(i));
+        }
+    write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{9}));
+    expect_told(why_refused("cube.case"), "cube.f: has 9 values for 8 nodes or elements");
+    write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{2, 1}));
+    expect_told(why_refused("cube.case"), "cube.f: is cut short");
+    write_ensight_cube("coordinates some", bytes_of(all));
+    expect_told(why_refused("cube.case"), "cube.f: \"coordinates some\" is not understood");
+}
+
+void ensight_names_in_quotes_are_refused_with_their_line(void **)
+{
+    write_ensight_cube("coordinates", bytes_of(std::vector<float>(8)));
+    write_file(folder + "/cube.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: \"my cube.geo\"\n");
+    expect_told(why_refused("cube.case"), "cube.case: line 4: names in quotes are not read, found \"my cube.geo\"");
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -486,6 +627,12 @@ int main(int argc, char **argv)
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
         cmocka_unit_test(ensight_numbers_without_the_letter_are_refused),
         cmocka_unit_test(ensight_file_sets_are_read_step_by_step),
+        cmocka_unit_test(ensight_values_that_are_undefined_are_nan),
+        cmocka_unit_test(ensight_names_in_quotes_are_refused_with_their_line),
+        cmocka_unit_test(foam_cases_of_parallel_runs_are_read_by_processors),
+        cmocka_unit_test(foam_cases_that_lack_folders_are_refused_by_their_names),
+        cmocka_unit_test(cgns_zones_whose_boundary_comes_first_are_refused),
+        cmocka_unit_test(tables_beside_grids_are_left_out),
     };
     return cmocka_run_group_tests(tests, write_all, nullptr);
 }

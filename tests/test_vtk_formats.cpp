@@ -151,6 +151,19 @@ void foam_cases_are_drawn_step_by_step(void **)
     assert_true(picture(0) != picture(1));
 }
 
+/* A rank reads one processor's folder, or several ranks share one. */
+void foam_cases_of_parallel_runs_look_the_same_on_any_ranks(void **)
+{
+    for (const int p : {0, 1}) write_foam(folder + "/parallel/processor" + std::to_string(p), 2 * p);
+    write_file(folder + "/parallel/dec.foam", "");
+    std::string first;
+    for (const int ranks : {1, 2, 3}) {
+        expect(run_tool(ranks, "cells.yaml parallel/dec.foam"), 0, "dec.foam  cycle 1  time 0.5  6 cells");
+        if (ranks == 1) first = picture(1);
+        assert_true(picture(1) == first && first.size() > 300);
+    }
+}
+
 void steps_of_series_are_chosen_by_number(void **)
 {
     write_file(folder + "/run.pvd",
@@ -232,6 +245,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(polyhedra_beside_other_cells_are_drawn_on_any_ranks),
         cmocka_unit_test(pieces_without_cells_change_nothing),
         cmocka_unit_test(foam_cases_are_drawn_step_by_step),
+        cmocka_unit_test(foam_cases_of_parallel_runs_look_the_same_on_any_ranks),
         cmocka_unit_test(steps_of_series_are_chosen_by_number),
         cmocka_unit_test(info_leaves_hidden_cells_out),
         cmocka_unit_test(cut_files_end_all_ranks),

@@ -394,7 +394,42 @@ std::string foam_file(const std::string &kind, const std::string &name, const st
 
 } // namespace
 
-void write_foam(const std::string &folder)
+void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, bool is_boundary_first)
+{
+    int file = 0, base = 0, zone = 0, solution = 0, number = 0;
+    const cgsize_t sizes[3] = {point_count, cell_count, 0}, quads = (size[0] - 1) * (size[1] - 1);
+    std::vector<cgsize_t> boundary, cells;
+    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
+        vtkIdType count = 0;
+        const vtkIdType *points = nullptr;
+        grid->GetCellPoints(i, count, points);
+        for (vtkIdType k = 0; k < count; k++) cells.push_back(points[k] + 1);
+        for (vtkIdType k = 0; i < quads && k < 4; k++) boundary.push_back(points[3 - k] + 1);
+    }
+    cg_open(path.c_str(), CG_MODE_WRITE, &file);
+    cg_base_write(file, "Base", 3, 3, &base);
+    cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Unstructured), &zone);
+    for (int axis = 0; axis < 3; axis++) {
+        std::vector<float> values;
+        for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); i++)
+            values.push_back(static_cast<float>(grid->GetPoint(i)[axis]));
+        const std::string name = std::string("Coordinate") + "XYZ"[axis];
+        cg_coord_write(file, base, zone, CGNS_ENUMV(RealSingle), name.c_str(), values.data(), &number);
+    }
+    const cgsize_t wall = is_boundary_first ? 1 : cell_count + 1, fluid = is_boundary_first ? quads + 1 : 1;
+    cg_section_write(file, base, zone, "Wall", CGNS_ENUMV(QUAD_4), wall, wall + quads - 1, 0, boundary.data(), &number);
+    cg_section_write(file, base, zone, "Fluid", CGNS_ENUMV(HEXA_8), fluid, fluid + cell_count - 1, 0, cells.data(),
+                     &number);
+    cg_sol_write(file, base, zone, "AtVertices", CGNS_ENUMV(Vertex), &solution);
+    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "x",
+                   grid->GetPointData()->GetArray("x")->GetVoidPointer(0), &number);
+    cg_sol_write(file, base, zone, "InCells", CGNS_ENUMV(CellCenter), &solution);
+    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "c",
+                   grid->GetCellData()->GetArray("c")->GetVoidPointer(0), &number);
+    cg_close(file);
+}
+
+void write_foam(const std::string &folder, int first)
 {
     namespace fs = std::filesystem;
     const std::string mesh = folder + "/constant/polyMesh/";
@@ -404,10 +439,10 @@ void write_foam(const std::string &folder)
                foam_file("dictionary", "controlDict",
                          "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0.5;\n"
                          "deltaT 0.5;\nwriteControl timeStep;\nwriteInterval 1;\nwriteFormat ascii;\n"));
-    write_file(mesh + "points",
-               foam_file("vectorField", "points",
-                         "12\n(\n(0 0 0)\n(0 1 0)\n(0 1 1)\n(0 0 1)\n(1 0 0)\n(1 1 0)\n(1 1 1)\n(1 0 1)\n"
-                         "(2 0 0)\n(2 1 0)\n(2 1 1)\n(2 0 1)\n)\n"));
+    std::string points = "12\n(\n";
+    for (int x = first; x < first + 3; x++)
+        for (const char *yz : {" 0 0)\n", " 1 0)\n", " 1 1)\n", " 0 1)\n"}) points += "(" + std::to_string(x) + yz;
+    write_file(mesh + "points", foam_file("vectorField", "points", points + ")\n"));
     /* Inner faces first: the two triangles, then the quad between the wedges. */
     write_file(mesh + "faces", foam_file("faceList", "faces",
                                          "14\n(\n3(4 5 6)\n3(4 6 7)\n4(4 8 10 6)\n4(0 3 2 1)\n4(0 1 5 4)\n4(1 2 6 5)\n"
@@ -434,6 +469,7 @@ std::vector<sample> write_samples(const std::string &folder)
     write_unstructured(folder, curved);
     write_ensight_text(folder, curved);
     write_cgns(folder + "/g.cgns", curved);
+    write_cgns_elements(folder + "/elements.cgns", curved, false);
     std::vector<sample> all = {{"g.vti", {"g.vti"}, image},
                                {"g.vtr", {"g.vtr"}, axes},
                                {"g.vts", {"g.vts"}, curved},
@@ -447,6 +483,7 @@ std::vector<sample> write_samples(const std::string &folder)
                                {"e.case", files_like(folder, "e."), curved},
                                {"t.case", files_like(folder, "t."), curved},
                                {"g.cgns", {"g.cgns"}, curved},
+                               {"elements.cgns", {"elements.cgns"}, curved},
                                {"p.pvtu", {"p.pvtu", "p0.vtu", "p1.vtu"}, write_polyhedra(folder)}};
     for (const std::string start : {"binary_", "text_"}) {
         all.push_back({start + "image.vtk", {start + "image.vtk"}, image});

@@ -33,8 +33,13 @@ std::vector<sample> write_samples(const std::string &folder);
 
 void write_vtu(const std::string &path, vtkUnstructuredGrid *grid);
 
-/* Writes an OpenFOAM case to folder: a cube and, beside it, two wedges whose triangles together are the cube's face, so
- * that the cube has seven faces. The field p is the cell's number at time 0, and twice that at 0.5. */
-void write_foam(const std::string &folder);
+/* Writes hexes() as an unstructured zone of CGNS, with a section of the quads at its bottom. */
+void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, bool is_boundary_first);
+
+/* Writes an OpenFOAM case to folder: a cube that begins at x = first and, beside it, two wedges whose triangles
+ * together are the cube's face, so that the cube has seven faces. The field p is the cell's number at time 0, twice
+ * that at 0.5.
+ */
+void write_foam(const std::string &folder, int first = 0);
 
 #endif

@@ -12,6 +12,7 @@
 
 #include <vtkBoundingBox.h>
 #include <vtkCellData.h>
+#include <vtkCellType.h>
 #include <vtkCellTypes.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
@@ -158,9 +159,16 @@ data_summary summarize(vtkDataObject *data)
     return all;
 }
 
-/* The name "QuadraticTetra" for "vtkQuadraticTetra", with VTK's number. */
+/* The name "QuadraticTetra" for "vtkQuadraticTetra". VTK 9.1 names types from 60 on as others. */
 std::string cell_name(int type)
 {
+    static const char *const orders[] = {"Lagrange", "Bezier"};
+    static const char *const shapes[] = {"Curve",      "Triangle", "Quadrilateral", "Tetrahedron",
+                                         "Hexahedron", "Wedge",    "Pyramid"};
+    if (type >= VTK_LAGRANGE_CURVE && type <= VTK_BEZIER_PYRAMID) {
+        const int number = type - VTK_LAGRANGE_CURVE;
+        return std::string(orders[number / 7]) + shapes[number % 7];
+    }
     const std::string name = vtkCellTypes::GetClassNameFromTypeId(type);
     return name.rfind("vtk", 0) == 0 ? name.substr(3) : name;
 }

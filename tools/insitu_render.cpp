@@ -313,6 +313,8 @@ void show_info(const options &o)
             throw std::runtime_error(path + ": has no step " + std::to_string(step));
         const auto data = file->read(step, 0, 1);
         print_info(path + ": " + data->GetClassName(), grids_of(data, path), file->times());
+        std::istringstream notes(file->take_warnings());
+        for (std::string line; std::getline(notes, line);) std::printf("  note   %s\n", line.c_str());
     }
 }
 

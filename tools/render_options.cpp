@@ -9,9 +9,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <numeric>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "data_file.h"
+#include "part_files.h"
 
 namespace render_tool
 {
@@ -61,14 +65,6 @@ void parse_camera(const std::string &text, options &o)
     o.direction = direction;
 }
 
-bool is_scene(const std::string &name)
-{
-    const auto ends_with = [&](const std::string &end) {
-        return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
-    };
-    return ends_with(".yaml") || ends_with(".yml");
-}
-
 /* A name's runs of digits, and the name with '#' for each run. */
 struct numbered_name {
     std::string path, shape;
@@ -110,6 +106,18 @@ void order_by_number(std::vector<std::string> &files)
     for (size_t i = 0; i < files.size(); i++) files[i] = sorted[i].path;
 }
 
+/* Leaves one of the files of a parallel run's Exodus output, any of which stands for all. */
+void leave_one_of_each_run(options &o)
+{
+    std::set<std::string> runs;
+    std::vector<std::string> left;
+    nemesis_name name;
+    for (const std::string &file : o.files)
+        if (!parse_nemesis(file, name) || runs.insert(name.start).second) left.push_back(file);
+    if (left.size() == 1 && !runs.empty()) o.pieces = false;
+    o.files = left;
+}
+
 void parse_partition_name(const std::string &text, options &o)
 {
     if (!parse_partition(text, o.how))
@@ -137,6 +145,37 @@ struct help_formatter : CLI::Formatter {
     std::string make_positionals(const CLI::App *) const override { return ""; } // the usage has them
 };
 
+/* The number of letters to insert, remove or replace that makes one word the other. */
+size_t count_edits(const std::string &a, const std::string &b)
+{
+    std::vector<size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), size_t{0});
+    for (size_t i = 0; i < a.size(); i++) {
+        size_t diagonal = std::exchange(row[0], i + 1);
+        for (size_t j = 0; j < b.size(); j++) {
+            const size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+            diagonal = row[j + 1];
+            row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+        }
+    }
+    return row.back();
+}
+
+[[noreturn]] void refuse_unknown(const CLI::App &app, const std::string &given)
+{
+    const std::string name = given.substr(0, given.find('='));
+    std::string nearest;
+    size_t least = name.size() / 3 + 1;
+    for (const CLI::Option *option : app.get_options()) {
+        const std::string known = option->get_positional() ? "" : option->get_name();
+        const size_t edits = count_edits(name, known);
+        if (known.size() < 3 || edits >= least) continue;
+        least = edits;
+        nearest = " (did you mean " + known + "?)";
+    }
+    throw std::runtime_error(name + ": unknown option" + nearest + "; see insitu-render --help");
+}
+
 using value_reader = void (*)(const std::string &text, options &o);
 
 /* Adds an option; if it is given twice, the last value counts. */
@@ -153,6 +192,7 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
     app.formatter(std::make_shared<help_formatter>());
     app.footer("Files read: " + known_endings() + "\nExit status: 0, or 1 after a message on stderr.");
     app.set_help_flag();
+    app.allow_extras();
     app.add_flag("--info", o.info, "list cells by type, bounds, fields with their ranges, and times");
     add_value(app, o, "--steps", "A:B", parse_steps, "only steps A to B, counting from 0; A:, :B and A do too");
     app.add_flag("--pieces", o.pieces, "the files are pieces of one step, not steps");
@@ -170,6 +210,23 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
     app.add_option("file", names);
 }
 
+/* Takes the scene, if there is one, out of the names: the one with a scene's ending, or a first one that is no data. */
+void take_scene(std::vector<std::string> &names, options &o)
+{
+    if (names.empty()) throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
+    auto scene = std::find_if(names.begin(), names.end(), is_scene);
+    if (scene == names.end()) {
+        const std::string why_not = why_not_data(names.front());
+        if (why_not.empty()) return;
+        if (names.size() == 1 || has_known_ending(names.front())) throw std::runtime_error(why_not);
+        scene = names.begin();
+    }
+    o.scene = *scene;
+    scene = names.erase(scene);
+    scene = std::find_if(scene, names.end(), is_scene);
+    if (scene != names.end()) throw std::runtime_error(*scene + ": a second scene file beside " + o.scene);
+}
+
 } // namespace
 
 options parse_options(int argc, char **argv)
@@ -183,20 +240,16 @@ options parse_options(int argc, char **argv)
     } catch (const CLI::ParseError &error) {
         throw std::runtime_error(std::string(error.what()) + "; see insitu-render --help");
     }
+    if (!app.remaining().empty()) refuse_unknown(app, app.remaining().front());
     if (o.help || o.version) return o;
-    if (!o.info) {
-        if (names.empty())
-            throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
-        const std::string why_not = why_not_data(names.front());
-        if (!is_scene(names.front()) && !why_not.empty() && (names.size() == 1 || has_known_ending(names.front())))
-            throw std::runtime_error(why_not);
-        if (!why_not.empty()) {
-            o.scene = names.front();
-            names.erase(names.begin());
-        }
-    }
+    if (!o.info) take_scene(names, o);
+    for (const char *option : {"--field", "--size", "--camera"})
+        if (!o.scene.empty() && app.get_option(option)->count() > 0)
+            throw std::runtime_error(std::string(option) + ": given with the scene file " + o.scene +
+                                     ", which says that itself, expected one of the two");
     if (names.empty()) throw std::runtime_error("data files are missing; see insitu-render --help");
     o.files = names;
+    leave_one_of_each_run(o);
     if (!o.pieces) order_by_number(o.files);
     return o;
 }

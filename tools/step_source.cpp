@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include <vtkDataObject.h>
 #include <vtkMultiBlockDataSet.h>
@@ -23,6 +24,15 @@ std::string file_name(const std::string &path)
     return path.substr(path.find_last_of('/') + 1);
 }
 
+/* A warning where a run whose mesh changes goes on in a file beside this one (run.e-s002) that is not given, or "". */
+std::string warn_of_next(const std::string &file, const std::vector<std::string> &given)
+{
+    const std::string next = file + "-s002";
+    if (!has_known_ending(next) || std::count(given.begin(), given.end(), next) > 0 || !why_not_data(next).empty())
+        return "";
+    return file + ": the run goes on in " + file_name(next) + ", which is not given\n";
+}
+
 } // namespace
 
 step_source::step_source(const options &o, int rank, int ranks) : options_(o), rank_(rank), ranks_(ranks)
@@ -30,6 +40,7 @@ step_source::step_source(const options &o, int rank, int ranks) : options_(o), r
     for (const std::string &file : o.files) {
         const std::string why_not = why_not_data(file);
         if (!why_not.empty()) throw std::runtime_error(why_not);
+        warnings_ += warn_of_next(file, o.files);
     }
     int64_t cycle = 0;
     const size_t file_count = o.pieces ? 1 : o.files.size();
@@ -86,6 +97,7 @@ step_source::result step_source::read(size_t index)
     const step &s = steps_[index];
     const auto fallback = static_cast<double>(s.cycle);
     result r;
+    r.warnings = std::exchange(warnings_, "");
     if (options_.pieces) {
         r.data = read_pieces(r.warnings);
         r.time = fallback;
@@ -94,7 +106,7 @@ step_source::result step_source::read(size_t index)
     data_file &file = open(s.file);
     const bool is_by_pieces = ranks_ > 1 && options_.how == partition::block && file.pieces(s.inside) >= ranks_;
     const auto data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
-    r.warnings = file.take_warnings();
+    r.warnings += file.take_warnings();
     r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(data, fallback);
     const auto grids = grids_of(data, file.step_path(s.inside));
     r.data = is_by_pieces ? grids : deal(grids, options_.how, rank_, ranks_);

@@ -46,6 +46,7 @@ class step_source
     options options_;
     int rank_, ranks_;
     std::vector<step> steps_;
+    std::string warnings_;            // of the files given, for the first step read
     std::unique_ptr<data_file> open_; // the file read last
     size_t open_index_ = 0;
 };

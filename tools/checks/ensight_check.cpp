@@ -8,7 +8,8 @@
  *              | type n [n ids] n × nodes ints            (nsided, nfaced: counts, then nodes)
  *
  * A variable's file has a description, and then for some parts: "part" number, and for nodes "coordinates" or "block",
- * for elements each type or "block", followed by one value a node or element and component. */
+ * for elements each type or "block", followed by one value a node or element and component. With "undef" behind that
+ * word a value that stands for none comes first, with "partial" a count and the numbers of those that have values. */
 #include "ensight_check.h"
 
 #include <algorithm>
@@ -199,10 +200,42 @@ struct named_file {
     bool is_per_node = false;
 };
 
-/* The values of one step. */
-void walk_values(ensight_stream &in, const geometry &parts, int components, bool is_per_node)
+/* A section's word, as "coordinates", and whether "undef" or "partial" follows it. */
+struct values_section {
+    std::string word;
+    bool has_undefined = false, is_partial = false;
+};
+
+values_section section_of(const std::string &line)
 {
-    std::string line;
+    std::istringstream in(line);
+    values_section s;
+    std::string more;
+    in >> s.word >> more;
+    s.has_undefined = more == "undef";
+    s.is_partial = more == "partial";
+    if (!more.empty() && !s.has_undefined && !s.is_partial) s.word = line;
+    return s;
+}
+
+/* Walks the values of a section, of which the part has `count`. */
+void skip_values(ensight_stream &in, const values_section &section, int64_t count, int components)
+{
+    if (section.has_undefined) in.skip_numbers(1);
+    if (section.is_partial) {
+        const int64_t all = count;
+        count = in.integer();
+        if (count > all)
+            in.refuse("has " + std::to_string(count) + " values for " + std::to_string(all) + " nodes or elements");
+        in.skip_numbers(count);
+    }
+    for (int c = 0; c < components; c++) in.skip_numbers(count);
+}
+
+/* The values of one step. Returns the last section that is partial, or "". */
+std::string walk_values(ensight_stream &in, const geometry &parts, int components, bool is_per_node)
+{
+    std::string line, partial;
     const part_sizes *part = nullptr;
     bool has_values = false;
     while (in.next_line(line)) {
@@ -217,15 +250,18 @@ void walk_values(ensight_stream &in, const geometry &parts, int components, bool
             continue;
         }
         if (!part) in.refuse("\"" + line + "\" is not understood");
-        const auto element = part->elements.find(line);
-        const bool is_block = line == "block", is_points = is_per_node && (is_block || line == "coordinates");
+        const values_section section = section_of(line);
+        const auto element = part->elements.find(section.word);
+        const bool is_block = section.word == "block",
+                   is_points = is_per_node && (is_block || section.word == "coordinates");
         if (!is_points && !(!is_per_node && (is_block || element != part->elements.end())))
             in.refuse("\"" + line + "\" is not understood");
-        const int64_t count = is_points ? part->points : is_block ? part->block_cells : element->second;
-        for (int c = 0; c < components; c++) in.skip_numbers(count);
+        skip_values(in, section, is_points ? part->points : is_block ? part->block_cells : element->second, components);
+        if (section.is_partial) partial = line;
         has_values = true;
     }
     if (!has_values) in.refuse("is cut short: a part has no values");
+    return partial;
 }
 
 /* Steps beyond those of the geometry are on its last one. VTK's reader skips earlier steps by the sizes of the one that
@@ -234,11 +270,14 @@ void walk_variable(const std::string &path, encoding how, const std::vector<geom
 {
     ensight_stream in(path, how);
     size_t step = 0;
+    std::string partial;
     for (std::string line = first_line(in, how); is_next(in, line, step == 0); line = "", step++) {
         const geometry &parts = steps[std::min(step, steps.size() - 1)];
         if (step > 0 && !(parts == steps[0]))
             in.refuse("has steps of different sizes in one file, which are not read: a file for each step is");
-        walk_values(in, parts, file.components, file.is_per_node);
+        if (!partial.empty())
+            in.refuse("\"" + partial + "\" in a file of several steps is not read: a file for each step is");
+        partial = walk_values(in, parts, file.components, file.is_per_node);
     }
 }
 
@@ -265,9 +304,15 @@ std::vector<named_file> files_of(const std::string &case_path)
     std::vector<named_file> files;
     std::ifstream in(case_path);
     bool is_gold = false;
+    int number = 0;
     for (std::string line; std::getline(in, line);) {
         const size_t colon = line.find(':'), start = line.find_first_not_of(" \t");
+        number++;
         if (colon == std::string::npos || line[start] == '#') continue;
+        if (line.find('"', colon) != std::string::npos)
+            throw std::runtime_error(case_path + ": line " + std::to_string(number) +
+                                     ": names in quotes are not read, found " + line.substr(line.find('"', colon)) +
+                                     ", expected names without blanks");
         const std::string key = line.substr(start, colon - start);
         const std::vector<std::string> words = words_of(line.substr(colon + 1));
         if (key == "type") is_gold = words.size() == 2 && words[0] == "ensight" && words[1] == "gold";

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
@@ -20,11 +21,15 @@
 #include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkUnstructuredGrid.h>
 
+#ifdef INSITU_VTK_EXODUS
+#include "exodus_reader.h"
+#endif
 #include "file_kinds.h"
 #include "file_length.h"
 #ifdef INSITU_VTK_HDF
 #include "hdf_file.h"
 #endif
+#include "part_files.h"
 #include "piece_files.h"
 #include "vtk_messages.h"
 
@@ -66,12 +71,24 @@ class vtk_file : public data_file
             const double *first = info->Get(pipeline::TIME_STEPS());
             times_.assign(first, first + info->Length(pipeline::TIME_STEPS()));
         }
+#ifdef INSITU_VTK_EXODUS
+        if (!times_.empty()) warnings_ = warn_of_exodus(path, reader_);
+#endif
         if (kind.piece_tag) pieces_ = count_tags(path, kind.piece_tag);
     }
 
-    const std::vector<double> &times() const override { return times_; }
-    std::string step_path(size_t) const override { return path_; }
-    int pieces(size_t) override { return pieces_; }
+    const std::vector<double> &times() const override
+    {
+        return times_;
+    }
+    std::string step_path(size_t) const override
+    {
+        return path_;
+    }
+    int pieces(size_t) override
+    {
+        return pieces_;
+    }
     vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) override
     {
         const quiet_stderr quiet;
@@ -128,6 +145,12 @@ bool has_known_ending(const std::string &path)
     return kind_of(path) != nullptr;
 }
 
+bool is_scene(const std::string &path)
+{
+    const std::string ending = std::filesystem::path(path).extension().string();
+    return ending == ".yaml" || ending == ".yml";
+}
+
 bool may_hold_steps(const std::string &path)
 {
     const file_kind *kind = kind_of(path);
@@ -140,6 +163,8 @@ std::string why_not_data(const std::string &path)
     if (stat(path.c_str(), &info) != 0) return path + ": " + std::strerror(errno);
     if (S_ISDIR(info.st_mode)) return path + ": is a directory, expected a file";
     if (access(path.c_str(), R_OK) != 0) return path + ": " + std::strerror(errno);
+    if (is_scene(path))
+        return path + ": is a scene file, expected data: a file with one of the endings " + known_endings();
     if (!kind_of(path)) return path + ": unknown ending, expected one of " + known_endings();
     return "";
 }
@@ -153,12 +178,21 @@ std::unique_ptr<data_file> open_data_file(const std::string &path)
     if (ending == ".pvtu") return open_pvtu(path);
     if (ending == ".pvd") return open_pvd(path);
     if (ending == ".series") return open_series(path);
+    nemesis_name parts_name;
+    if (parse_nemesis(path, parts_name)) return open_nemesis(path, parts_name);
+    if (ending == ".foam")
+        if (auto parts = open_decomposed_foam(path)) return parts;
 #ifdef INSITU_VTK_HDF
     if (ending == ".vtkhdf")
         if (auto grids = open_hdf(path)) return grids;
 #endif
     if (ending == ".vtu" && is_empty_vtu(path)) return std::make_unique<empty_file>(path);
-    return std::make_unique<vtk_file>(path, kind);
+    return open_by_vtk(path);
+}
+
+std::unique_ptr<data_file> open_by_vtk(const std::string &path)
+{
+    return std::make_unique<vtk_file>(path, *kind_of(path));
 }
 
 double time_of(vtkDataObject *data, double fallback)

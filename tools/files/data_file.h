@@ -24,6 +24,9 @@ std::string known_endings();
 /* Tells whether a reader has the file's ending. */
 bool has_known_ending(const std::string &path);
 
+/* Tells whether the name is that of a scene file. */
+bool is_scene(const std::string &path);
+
 /* Tells whether files of this ending hold time steps, or name files that are steps. */
 bool may_hold_steps(const std::string &path);
 
@@ -54,6 +57,10 @@ class data_file
 
 /* Throws as data_file::read() does. */
 std::unique_ptr<data_file> open_data_file(const std::string &path);
+
+/* Opens path by VTK's reader for its ending, which must be known. The file need not exist if the reader goes by its
+ * folder alone. Throws as data_file::read() does. */
+std::unique_ptr<data_file> open_by_vtk(const std::string &path);
 
 /* A data set's time, from its field data TimeValue, or fallback where there is none. */
 double time_of(vtkDataObject *data, double fallback);

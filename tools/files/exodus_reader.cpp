@@ -272,4 +272,18 @@ vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path)
     return r;
 }
 
+/* VTK's reader moves the points by the first vector at nodes whose name begins with "dis". */
+std::string warn_of_exodus(const std::string &path, vtkAlgorithm *algorithm)
+{
+    auto *r = vtkExodusIIReader::SafeDownCast(algorithm);
+    for (int i = 0; r && r->GetApplyDisplacements() && i < r->GetNumberOfPointResultArrays(); i++) {
+        const std::string name = r->GetPointResultArrayName(i);
+        if (upper(name.substr(0, 3)) != "DIS" ||
+            r->GetNumberOfObjectArrayComponents(vtkExodusIIReader::NODAL, i) != r->GetDimensionality())
+            continue;
+        return path + ": points are moved by the displacement \"" + name + "\" of the file\n";
+    }
+    return "";
+}
+
 } // namespace render_tool

@@ -16,6 +16,9 @@ namespace render_tool
  * element has fewer nodes than corners; the reader reports the same for types that neither VTK nor this file has. */
 vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path);
 
+/* What is worth a warning of the file of a reader that make_exodus() made, a line each: that its points are moved. */
+std::string warn_of_exodus(const std::string &path, vtkAlgorithm *reader);
+
 } // namespace render_tool
 
 #endif

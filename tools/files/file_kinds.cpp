@@ -2,8 +2,6 @@
  * unless asked. Readers that Debian's VTK may lack are compiled in only where CMake found them. */
 #include "file_kinds.h"
 
-#include <stdexcept>
-
 #include <vtkAlgorithm.h>
 #include <vtkGenericDataObjectReader.h>
 #include <vtkXMLImageDataReader.h>
@@ -24,11 +22,7 @@
 #include "exodus_reader.h"
 #endif
 #ifdef INSITU_VTK_CGNS
-#include <vtkCGNSReader.h>
-#include <vtk_cgns.h>
-// clang-format off
-#include VTK_CGNS(cgns_io.h)
-// clang-format on
+#include "cgns_reader.h"
 #endif
 #ifdef INSITU_VTK_ENSIGHT
 #include <vtkGenericEnSightReader.h>
@@ -36,6 +30,8 @@
 #ifdef INSITU_VTK_OPENFOAM
 #include <vtkOpenFOAMReader.h>
 #endif
+
+#include "part_files.h"
 
 namespace render_tool
 {
@@ -72,30 +68,6 @@ reader make_amr(const std::string &path)
     r->SetMaximumLevelsToReadByDefault(0); // all
     return r;
 }
-
-#ifdef INSITU_VTK_CGNS
-/* VTK's reader ends the program where a file cannot be opened, so it is opened here first. */
-void check_cgns(const std::string &path)
-{
-    int type = CGIO_FILE_NONE, file = 0;
-    if (cgio_check_file(path.c_str(), &type) != CGIO_ERR_NONE ||
-        cgio_open_file(path.c_str(), CGIO_MODE_READ, type, &file) != CGIO_ERR_NONE)
-        throw std::runtime_error(path + ": cannot be read: is no CGNS file, or is cut short");
-    (void)cgio_close_file(file);
-}
-
-reader make_cgns(const std::string &path)
-{
-    check_cgns(path);
-    auto r = vtkSmartPointer<vtkCGNSReader>::New();
-    r->SetFileName(path.c_str());
-    r->UpdateInformation();
-    r->EnableAllBases();
-    r->EnableAllPointArrays();
-    r->EnableAllCellArrays();
-    return r;
-}
-#endif
 
 #ifdef INSITU_VTK_ENSIGHT
 reader make_ensight(const std::string &path)
@@ -173,7 +145,7 @@ const std::vector<file_kind> &file_kinds()
 
 const file_kind *kind_of(const std::string &path)
 {
-    const std::string name = path.substr(path.find_last_of('/') + 1);
+    const std::string name = plain_name(path.substr(path.find_last_of('/') + 1));
     const size_t dot = name.find_last_of('.');
     if (dot == std::string::npos) return nullptr;
     for (const file_kind &kind : file_kinds())

@@ -1,0 +1,154 @@
+/* Each processor's folder has the layout of a case, so VTK's reader of whole cases reads one alone, by the name of a
+ * file in it that need not exist. Its own reader of decomposed cases takes all folders on every rank.
+ *
+ *     case/dec.foam
+ *     case/processor0/constant/polyMesh/points ...
+ *     case/processor0/0.5/p ...
+ *     case/processor1/... */
+#include "part_files.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+#include <system_error>
+#include <vector>
+
+namespace render_tool
+{
+
+namespace
+{
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> folders_in(const fs::path &folder)
+{
+    std::vector<std::string> names;
+    std::error_code code;
+    for (fs::directory_iterator at(folder, code), end; !code && at != end; at.increment(code))
+        if (at->is_directory(code)) names.push_back(at->path().filename().string());
+    return names;
+}
+
+bool are_digits(const std::string &text)
+{
+    return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+}
+
+/* The folders of steps by their times. */
+std::map<double, std::string> steps_in(const fs::path &folder)
+{
+    std::map<double, std::string> steps;
+    for (const std::string &name : folders_in(folder)) {
+        char *end = nullptr;
+        const double time = std::strtod(name.c_str(), &end);
+        if (std::isdigit(static_cast<unsigned char>(name[0])) && !*end) steps[time] = name;
+    }
+    return steps;
+}
+
+/* Tells whether a case has a mesh, or meshes of regions. */
+bool has_mesh(const fs::path &folder)
+{
+    std::error_code code;
+    const fs::path constant = folder / "constant";
+    if (fs::is_directory(constant / "polyMesh", code)) return true;
+    const auto regions = folders_in(constant);
+    return std::any_of(regions.begin(), regions.end(),
+                       [&](const std::string &name) { return fs::is_directory(constant / name / "polyMesh", code); });
+}
+
+std::string number_text(double number)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g", number);
+    return text;
+}
+
+std::string folder_of(size_t processor)
+{
+    return "processor" + std::to_string(processor);
+}
+
+/* The numbers of the processors that have a folder, in order. */
+std::vector<int> processors_in(const fs::path &folder)
+{
+    std::vector<int> numbers;
+    for (const std::string &name : folders_in(folder))
+        if (name.compare(0, 9, "processor") == 0 && are_digits(name.substr(9)) && name.size() < 18)
+            numbers.push_back(std::atoi(name.c_str() + 9));
+    std::sort(numbers.begin(), numbers.end());
+    return numbers;
+}
+
+void check_processors(const std::string &path, const fs::path &folder, const std::vector<int> &numbers)
+{
+    for (size_t i = 0; i < numbers.size(); i++) {
+        const std::string name = folder_of(i);
+        if (numbers[i] != static_cast<int>(i))
+            throw std::runtime_error(path + ": " + name + "/ is missing, as there is processor" +
+                                     std::to_string(numbers.back()) + "/");
+        if (!has_mesh(folder / name)) throw std::runtime_error(path + ": " + name + "/constant/polyMesh/ is missing");
+    }
+}
+
+/* Throws where there are no folders of single processors, but one that holds several in OpenFOAM's collated format. */
+void check_collated(const std::string &path, const fs::path &folder)
+{
+    for (const std::string &name : folders_in(folder))
+        if (name.compare(0, 10, "processors") == 0 && std::isdigit(static_cast<unsigned char>(name[10])))
+            throw std::runtime_error(path + ": " + name +
+                                     "/ is of OpenFOAM's collated format, which is not read: run reconstructPar first");
+}
+
+/* Opens the case with the steps that all processors have. */
+std::unique_ptr<parts_file> open_processors(const fs::path &path, size_t count)
+{
+    const fs::path folder = path.parent_path();
+    std::vector<std::string> parts, warnings;
+    std::map<double, std::string> common = steps_in(folder / folder_of(0));
+    for (size_t p = 0; p < count; p++) {
+        parts.push_back((folder / folder_of(p) / path.filename()).string());
+        const auto steps = steps_in(folder / folder_of(p));
+        for (auto at = common.begin(); at != common.end();) {
+            const bool is_there = steps.count(at->first) > 0;
+            if (!is_there) warnings.push_back(folder_of(p) + "/ has no step " + at->second + ": left out");
+            at = is_there ? std::next(at) : common.erase(at);
+        }
+    }
+    std::vector<double> times;
+    for (const auto &step : common) times.push_back(step.first);
+    auto file = std::make_unique<parts_file>(path.string(), parts, times);
+    for (const std::string &warning : warnings) file->warn(warning);
+    return file;
+}
+
+} // namespace
+
+std::unique_ptr<data_file> open_decomposed_foam(const std::string &path)
+{
+    const fs::path folder = fs::absolute(path).parent_path();
+    const std::vector<int> numbers = processors_in(folder);
+    const bool is_whole = has_mesh(folder);
+    if (numbers.empty()) {
+        if (!is_whole) check_collated(path, folder);
+        return nullptr;
+    }
+    const auto own = steps_in(folder), of_first = steps_in(folder / "processor0");
+    const auto last = [](const std::map<double, std::string> &steps) {
+        return steps.empty() ? -1 : steps.rbegin()->first;
+    };
+    if (is_whole && last(own) >= last(of_first)) return nullptr;
+    check_processors(path, folder, numbers);
+    auto file = open_processors(path, numbers.size());
+    if (is_whole)
+        file->warn("the folders of its processors are read, which go on to " + number_text(last(of_first)) +
+                   ": the case itself has no step after " + (own.empty() ? "its mesh" : number_text(last(own))));
+    return file;
+}
+
+} // namespace render_tool
