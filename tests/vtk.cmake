@@ -61,6 +61,12 @@ target_link_libraries(test_vtk_images PRIVATE
   insitu_flags PkgConfig::CMOCKA ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
 insitu_add_split_test(vtk_images $<TARGET_FILE:test_vtk_images> $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
 
+add_executable(test_vtk_default test_vtk_default.cpp test_vtk_run.cpp)
+target_include_directories(test_vtk_default SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
+target_link_libraries(test_vtk_default PRIVATE
+  insitu_flags PkgConfig::CMOCKA VTK::IOXML ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
+add_test(NAME vtk_default COMMAND test_vtk_default $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
+
 # Real grids as the renderer's tests have their meshes. The C headers are not C++'s style, hence SYSTEM.
 add_library(test_data_mesh STATIC test_data_mesh.cpp test_vtk_session_stub.cpp)
 target_include_directories(test_data_mesh SYSTEM PRIVATE ${PROJECT_SOURCE_DIR}/libinsitu/base)
@@ -76,7 +82,7 @@ endforeach()
 target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
 set_tests_properties(vtk_images_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" SKIP_RETURN_CODE 77)
-set_tests_properties(vtk_tool vtk_images PROPERTIES
+set_tests_properties(vtk_tool vtk_images vtk_default PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
 
 # The manual page names the options of --help, and is well formed.

@@ -9,16 +9,7 @@
 #include <sstream>
 #include <system_error>
 
-#include <vtkCellData.h>
-#include <vtkCompositeDataIterator.h>
-#include <vtkCompositeDataSet.h>
-#include <vtkDataArray.h>
-#include <vtkDataSet.h>
-#include <vtkPointData.h>
-
-#include "data_file.h"
 #include "file_kinds.h"
-#include "grids_of.h"
 
 namespace render_tool
 {
@@ -43,39 +34,6 @@ std::string quoted(const std::string &text)
     return out + '"';
 }
 
-/* Arrays of ids, and VTK's own flags, are no fields to look at. */
-bool is_field(vtkDataArray *array)
-{
-    const std::string name = array && array->GetName() ? array->GetName() : "";
-    return !name.empty() && name.rfind("vtk", 0) != 0 && name != "GlobalNodeId" && name != "GlobalElementId" &&
-           name != "ObjectId" && name != "PedigreeNodeId" && name != "PedigreeElementId";
-}
-
-std::string first_field(vtkFieldData *fields)
-{
-    for (int i = 0; fields && i < fields->GetNumberOfArrays(); i++)
-        if (is_field(fields->GetArray(i))) return fields->GetArray(i)->GetName();
-    return "";
-}
-
-std::string first_field_of(vtkDataObject *data)
-{
-    std::string at_points, in_cells;
-    const auto look = [&](vtkDataSet *grid) {
-        if (!grid) return;
-        if (at_points.empty()) at_points = first_field(grid->GetPointData());
-        if (in_cells.empty()) in_cells = first_field(grid->GetCellData());
-    };
-    if (auto *composite = vtkCompositeDataSet::SafeDownCast(data)) {
-        const auto leaves = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-        for (leaves->InitTraversal(); !leaves->IsDoneWithTraversal(); leaves->GoToNextItem())
-            look(vtkDataSet::SafeDownCast(leaves->GetCurrentDataObject()));
-    } else {
-        look(vtkDataSet::SafeDownCast(data));
-    }
-    return at_points.empty() ? in_cells : at_points;
-}
-
 double dot(const std::array<double, 3> &a, const std::array<double, 3> &b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -92,39 +50,62 @@ std::array<double, 3> unit(const std::array<double, 3> &a)
     return {a[0] / length, a[1] / length, a[2] / length};
 }
 
-/* The camera from which the box of the extent fills about 0.8 of the picture: a title, numbers beside the colour bar
+std::string list_of(const std::array<double, 3> &v)
+{
+    std::ostringstream text;
+    text.precision(17);
+    text << '[' << v[0] << ", " << v[1] << ", " << v[2] << ']';
+    return text.str();
+}
+
+/* What the box's corners need, so that the box fills about 0.8 of the picture: a title, numbers beside the colour bar
  * and the text at the bottom have the rest. */
-std::string fixed_camera(const options &o, const data_extent &e)
+struct framing {
+    double distance = 0; // of the eye, in a perspective picture
+    double height = 0;   // of an orthographic one
+};
+
+framing frame(const options &o, const std::array<double, 3> &half, const std::array<double, 3> &towards,
+              const std::array<double, 3> &up)
 {
     constexpr double angle = 40, filled = 0.8, pi = 3.14159265358979323846; // the scene's default angle, in degrees
-    std::array<double, 3> towards{};
-    if (std::sscanf(o.direction.c_str(), "%lf, %lf, %lf", &towards[0], &towards[1], &towards[2]) != 3) return "";
-    towards = unit(towards);
-    std::array<double, 3> up = {0, 1, 0};
-    if (std::hypot(towards[0], towards[2]) < 1e-6) up = {0, 0, 1};
     const auto right = unit(cross(up, towards)), above = cross(towards, right);
     const double high = filled * std::tan(angle * pi / 360), wide = high * o.width / o.height;
-    std::array<double, 3> middle{}, half{};
-    double distance = 0;
+    framing needed;
+    for (int corner = 0; corner < 8; corner++) {
+        std::array<double, 3> at{};
+        for (size_t i = 0; i < 3; i++) at[i] = (corner >> i) & 1 ? half[i] : -half[i];
+        const double x = std::fabs(dot(at, right)), y = std::fabs(dot(at, above));
+        needed.distance = std::max(needed.distance, dot(at, towards) + std::max(x / wide, y / high));
+        needed.height = std::max(needed.height, 2 * std::max(x * o.height / o.width, y) / filled);
+    }
+    return needed;
+}
+
+/* The camera for all steps, "" if they span nothing. */
+std::string fixed_camera(const options &o, const default_look &look, const data_extent &e)
+{
+    const auto towards = unit(eye_direction(o, look));
+    const auto up = up_direction(o, look);
+    std::array<double, 3> middle{}, half{}, eye{};
     for (size_t i = 0; i < 3; i++) {
         middle[i] = (e.low[i] + e.high[i]) / 2;
         half[i] = (e.high[i] - e.low[i]) / 2;
     }
-    for (int corner = 0; corner < 8; corner++) {
-        std::array<double, 3> at{};
-        for (size_t i = 0; i < 3; i++) at[i] = (corner >> i) & 1 ? half[i] : -half[i];
-        const double needed = std::max(std::fabs(dot(at, right)) / wide, std::fabs(dot(at, above)) / high);
-        distance = std::max(distance, dot(at, towards) + needed);
-    }
+    const framing needed = frame(o, half, towards, up);
+    for (size_t i = 0; i < 3; i++) eye[i] = middle[i] + needed.distance * towards[i];
+    if (needed.distance <= 0) return "";
     std::ostringstream text;
     text.precision(17);
-    for (const char *key : {"position", "focal"}) {
-        const double out = key[0] == 'p' ? distance : 0;
-        text << (out > 0 ? "{" : ", ") << key << ": [" << middle[0] + out * towards[0] << ", "
-             << middle[1] + out * towards[1] << ", " << middle[2] + out * towards[2] << "]";
-    }
-    text << ", up: [" << up[0] << ", " << up[1] << ", " << up[2] << "]}";
-    return distance > 0 ? text.str() : "";
+    text << "{position: " << list_of(eye) << ", focal: " << list_of(middle) << ", up: " << list_of(up);
+    if (look.flat_axis >= 0) text << ", projection: orthographic, height: " << needed.height;
+    return text.str() + "}";
+}
+
+std::string automatic_camera(const options &o, const default_look &look)
+{
+    return "{automatic: {fit: box, direction: " + list_of(eye_direction(o, look)) +
+           "}, up: " + list_of(up_direction(o, look)) + (look.flat_axis >= 0 ? ", projection: orthographic}" : "}");
 }
 
 /* Eight hexadecimal digits of a text (FNV-1a). */
@@ -165,32 +146,30 @@ std::string picture_name(const std::filesystem::path &file)
 
 } // namespace
 
-std::string default_field(const options &o)
-{
-    if (!o.field.empty()) return o.field;
-    const auto file = open_data_file(o.files.front());
-    const size_t steps = file->times().size();
-    const size_t step = steps ? std::min(static_cast<size_t>(o.first_step), steps - 1) : 0;
-    return first_field_of(grids_of(file->read(steps ? step : 0, 0, 1), o.files.front()));
-}
-
-std::string default_scene(const options &o, const std::string &field, const data_extent *extent)
+std::string default_scene(const options &o, const default_look &look, const data_extent *extent)
 {
     const std::filesystem::path file(o.files.front());
-    std::string camera = extent && extent->has_bounds() ? fixed_camera(o, *extent) : "";
-    if (camera.empty()) camera = "{automatic: {fit: box, direction: [" + o.direction + "]}}";
-    std::ostringstream scene;
-    scene.precision(17);
+    std::string camera = extent && extent->has_bounds() ? fixed_camera(o, look, *extent) : "";
+    if (camera.empty()) camera = automatic_camera(o, look);
+    std::ostringstream colour, scene;
+    colour.precision(17);
+    if (!look.field.empty()) colour << "field: " << quoted(look.field);
+    if (!look.field.empty() && extent && extent->has_range())
+        colour << ", range: [" << extent->low[3] << ", " << extent->high[3] << "]";
+    const std::string plane = "planes: [{normal: [" + std::to_string(look.cut[0]) + ", " + std::to_string(look.cut[1]) +
+                              ", " + std::to_string(look.cut[2]) + "]}]";
     scene << "images:\n  - name: " << quoted(picture_name(file)) << "\n    size: [" << o.width << ", " << o.height
-          << "]\n"
-          << "    camera: " << camera << "\n    layers: [{surface: {";
-    if (!field.empty()) scene << "colour_by: {field: " << quoted(field);
-    if (!field.empty() && extent && extent->has_range())
-        scene << ", range: [" << extent->low[3] << ", " << extent->high[3] << "]";
-    scene << (field.empty() ? "" : "}")
-          << "}}]\n    decorations: {title: " << quoted(file.stem().string().substr(0, 60))
-          << ", text: [{text: \"t = {time}\"}], outline: true, axes: true" << (field.empty() ? "" : ", colour_bar: {}")
-          << "}\n    outputs: [{path: \"{name}_{cycle:04}.png\"}]\n";
+          << "]\n    camera: " << camera << "\n";
+    if (look.is_cut()) scene << "    clip: {" << plane << "}\n";
+    scene << "    layers:\n      - surface: {" << (look.field.empty() ? "" : "colour_by: {" + colour.str() + "}");
+    if (look.flat_axis >= 0)
+        scene << (look.field.empty() ? "" : ", ") << "material: {ambient: 1, diffuse: 0, specular: 0}";
+    scene << "}\n";
+    if (look.is_cut()) scene << "      - slice: {" << colour.str() << ", " << plane << "}\n";
+    scene << "    decorations: {title: " << quoted(file.stem().string().substr(0, 60))
+          << ", text: [{text: \"t = {time}\"}], "
+          << (look.flat_axis >= 0 ? "rulers: true" : "outline: true, axes: true")
+          << (look.field.empty() ? "" : ", colour_bar: {}") << "}\n    outputs: [{path: \"{name}_{cycle:04}.png\"}]\n";
     return scene.str();
 }
 

@@ -272,21 +272,22 @@ data_extent extent_of(const world &w, step_source &source, const std::string &fi
     return extent;
 }
 
-/* Collective: the text of the default scene. All steps are read ahead, so that one range and one camera serve them. */
+/* Collective: the text of the default scene, on rank 0. All steps are read ahead, so that one range and one camera
+ * serve them. */
 std::string text_of_default(const world &w, const options &o, step_source &source)
 {
-    std::string field;
+    default_look look;
     all_do(w, [&] {
-        if (w.is_root()) field = default_field(o);
+        if (w.is_root()) look = choose_look(o);
     });
-    int length = static_cast<int>(field.size());
+    int length = static_cast<int>(look.field.size());
     MPI_Bcast(&length, 1, MPI_INT, 0, w.comm);
-    field.resize(static_cast<size_t>(length));
-    MPI_Bcast(field.data(), length, MPI_CHAR, 0, w.comm);
-    if (source.count() == 1) return default_scene(o, field, nullptr);
+    look.field.resize(static_cast<size_t>(length));
+    MPI_Bcast(look.field.data(), length, MPI_CHAR, 0, w.comm);
+    if (source.count() == 1) return default_scene(o, look, nullptr);
     if (w.is_root()) std::printf("reading %zu steps ahead, for one range of colours and one camera\n", source.count());
-    const data_extent extent = extent_of(w, source, field);
-    return default_scene(o, field, &extent);
+    const data_extent extent = extent_of(w, source, look.field);
+    return default_scene(o, look, &extent);
 }
 
 void draw(const world &w, const options &o)

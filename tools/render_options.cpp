@@ -204,6 +204,7 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
         "without a scene: the field; the first is the default");
     add_value(app, o, "--size", "WxH", parse_size, "without a scene: the picture's size; 1280x720 is the default");
     add_value(app, o, "--camera", "X,Y,Z", parse_camera, "without a scene: the direction from the data to the eye");
+    app.add_flag("--whole", o.whole, "without a scene: solids whose outside shows little are not cut open");
     app.add_flag("--version", o.version, "print the version");
     app.add_flag("--help", o.help, "print this");
     app.add_flag("-h", o.help)->group(""); // not listed
@@ -243,7 +244,7 @@ options parse_options(int argc, char **argv)
     if (!app.remaining().empty()) refuse_unknown(app, app.remaining().front());
     if (o.help || o.version) return o;
     if (!o.info) take_scene(names, o);
-    for (const char *option : {"--field", "--size", "--camera"})
+    for (const char *option : {"--field", "--size", "--camera", "--whole"})
         if (!o.scene.empty() && app.get_option(option)->count() > 0)
             throw std::runtime_error(std::string(option) + ": given with the scene file " + o.scene +
                                      ", which says that itself, expected one of the two");

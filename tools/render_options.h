@@ -20,10 +20,11 @@ struct options {
     int64_t first_step = 0;
     int64_t last_step = std::numeric_limits<int64_t>::max();
     partition how = partition::block;
-    std::string scene; // "": the default scene, of the four below
+    std::string scene; // "": the default scene, of the five below
     int width = 1280, height = 720;
-    std::string field;                     // "": the first
-    std::string direction = "1, 0.8, 1.2"; // towards the eye
+    std::string field;     // "": the first
+    std::string direction; // towards the eye; "": by the data
+    bool whole = false;    // not cut open
     std::vector<std::string> files;
 };
 

@@ -1,0 +1,185 @@
+/* The pictures that insitu-render makes without a scene: what they show of a file, looked at by their pixels.
+ *
+ *     test_vtk_default <insitu-render> <mpiexec> */
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <OpenImageIO/imageio.h>
+
+#include <vtkDoubleArray.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLUnstructuredGridWriter.h>
+
+#include "test_vtk_run.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+namespace
+{
+
+constexpr int width = 240, height = 160, bar = 180; // the colour bar stands right of this
+
+std::string tool, mpiexec, folder;
+
+using colour = std::array<int, 3>;
+
+const colour viridis_high = {253, 231, 37}, viridis_middle = {33, 145, 140};
+
+struct picture {
+    std::vector<uint8_t> rgb;
+
+    colour at(int x, int y) const
+    {
+        const size_t i = 3 * (static_cast<size_t>(y) * width + static_cast<size_t>(x));
+        return {rgb[i], rgb[i + 1], rgb[i + 2]};
+    }
+};
+
+picture read_picture(const std::string &name)
+{
+    const auto in = OIIO::ImageInput::open(folder + "/" + name);
+    assert_true(in != nullptr);
+    assert_true(in->spec().width == width && in->spec().height == height && in->spec().nchannels == 3);
+    picture p;
+    p.rgb.resize(static_cast<size_t>(3) * width * height);
+    assert_true(in->read_image(0, 0, 0, 3, OIIO::TypeDesc::UINT8, p.rgb.data()));
+    return p;
+}
+
+picture draw(const std::string &arguments, const std::string &name, int ranks = 1)
+{
+    const std::string start = ranks > 1 ? shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
+    const run_result r = run_in(folder, start + shell_word(tool) + " --size 240x160 " + arguments);
+    if (r.status != 0) print_error("%s\n%s%s", arguments.c_str(), r.out.c_str(), r.err.c_str());
+    assert_int_equal(r.status, 0);
+    return read_picture(name);
+}
+
+/* Eight bits of a colour may be off by one for the map's table, by one for rounding. */
+bool is_near(const colour &a, const colour &b)
+{
+    bool is = true;
+    for (size_t i = 0; i < 3; i++) is = is && std::abs(a[i] - b[i]) <= 2;
+    return is;
+}
+
+int count_near(const picture &p, const colour &c)
+{
+    int count = 0;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < bar; x++) count += is_near(p.at(x, y), c);
+    return count;
+}
+
+using field = double (*)(const std::array<double, 3> &at);
+
+/* Cells of a lattice over [-1, 1] along the axes that are not `without`; hexahedra if that is none of them. */
+void write_lattice(const std::string &name, int without, field f)
+{
+    constexpr int cells = 12, side = cells + 1;
+    const std::array<int, 3> sides = {without == 0 ? 1 : side, without == 1 ? 1 : side, without == 2 ? 1 : side};
+    vtkNew<vtkUnstructuredGrid> grid;
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkDoubleArray> values;
+    values->SetName("f");
+    for (int k = 0; k < sides[2]; k++)
+        for (int j = 0; j < sides[1]; j++)
+            for (int i = 0; i < sides[0]; i++) {
+                const std::array<double, 3> at = {without == 0 ? 0 : 2.0 * i / cells - 1,
+                                                  without == 1 ? 0 : 2.0 * j / cells - 1,
+                                                  without == 2 ? 0 : 2.0 * k / cells - 1};
+                points->InsertNextPoint(at.data());
+                values->InsertNextValue(f(at));
+            }
+    const vtkIdType x = 1, y = sides[0], z = static_cast<vtkIdType>(sides[0]) * sides[1];
+    const vtkIdType a = without == 0 ? y : x, b = without == 0 || without == 1 ? z : y;
+    for (int k = 0; k < (without < 0 ? cells : 1); k++)
+        for (int j = 0; j < cells; j++)
+            for (int i = 0; i < cells; i++) {
+                const vtkIdType o = i * a + j * b + k * z;
+                const vtkIdType ids[8] = {o, o + a, o + a + b, o + b, o + z, o + a + z, o + a + b + z, o + b + z};
+                if (without < 0)
+                    grid->InsertNextCell(VTK_HEXAHEDRON, 8, ids);
+                else
+                    grid->InsertNextCell(VTK_QUAD, 4, ids);
+            }
+    grid->SetPoints(points);
+    grid->GetPointData()->AddArray(values);
+    vtkNew<vtkXMLUnstructuredGridWriter> writer;
+    writer->SetFileName((folder + "/" + name).c_str());
+    writer->SetInputData(grid);
+    assert_int_equal(writer->Write(), 1);
+}
+
+/* The field is 0 on the whole outside, and up to 1 in the middle, whose colour only a cut shows. */
+void a_solid_with_a_dark_outside_is_cut_open(void **)
+{
+    write_lattice("hot.vtu", -1, [](auto &at) {
+        return std::fmin(1, std::fmax(0, 2 - 2 * (at[0] * at[0] + at[1] * at[1] + at[2] * at[2])));
+    });
+    assert_true(count_near(draw("hot.vtu", "hot_0000.png", 3), viridis_high) > 10);
+    assert_int_equal(count_near(draw("--whole hot.vtu", "hot_0000.png"), viridis_high), 0);
+}
+
+/* The edge of the cube that is nearest to the eye goes down from the middle of the picture; a cut takes it away. */
+void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
+{
+    write_lattice("shown.vtu", -1, [](auto &at) { return at[0] + 2 * at[2]; });
+    const picture p = draw("shown.vtu", "shown_0000.png");
+    const colour background = p.at(0, height - 1);
+    for (int y = 80; y < 140; y++) assert_false(is_near(p.at(112, y), background));
+}
+
+/* Seen from the front a field that rises along the first axis has one colour a column, rising to the right;
+ * lit or in perspective it has not. */
+void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
+{
+    write_lattice("x.vtu", 0, [](auto &at) { return at[1]; });
+    write_lattice("y.vtu", 1, [](auto &at) { return at[0]; });
+    for (const std::string name : {"x", "y"}) {
+        const picture p = draw(name + ".vtu", name + "_0000.png");
+        std::vector<int> middles;
+        for (int x = 0; x < bar; x++)
+            if (is_near(p.at(x, height / 2), viridis_middle)) middles.push_back(x);
+        assert_true(!middles.empty());
+        const int at = middles[middles.size() / 2];
+        for (int y = height / 2 - 30; y <= height / 2 + 30; y++)
+            for (const int x : {at - 20, at, at + 20}) assert_true(p.at(x, y) == p.at(x, height / 2));
+        assert_true(p.at(at + 20, height / 2)[0] > p.at(at, height / 2)[0]); /* the high end has more red */
+    }
+}
+
+int begin(void **)
+{
+    folder = fresh_folder("vtk_default");
+    return 0;
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    if (argc != 3) return 2;
+    tool = argv[1];
+    mpiexec = argv[2];
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(a_solid_with_a_dark_outside_is_cut_open),
+        cmocka_unit_test(a_solid_whose_outside_shows_the_field_is_drawn_whole),
+        cmocka_unit_test(flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map),
+    };
+    return cmocka_run_group_tests(tests, begin, nullptr);
+}
