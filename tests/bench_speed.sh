@@ -46,7 +46,7 @@ LC_ALL=C awk -F, '
             if (!(wanted[i] in rows)) { print "no row: " wanted[i]; failed = 1 }
         exit failed
     }' "$csv"
-"$2/pages/performance.py" --partial "$csv" >"$page"
+"$2/pages/performance.py" measurements --partial "$csv" >"$page"
 for text in '| Tree with one field, B/cell | 16 B/cell | ≤ 1, aim 0.5 | 0' '### Table 5.2' '### Table 4.2' '| hexes 4 | volume everywhere | ' '| tets 4, isosurfaces new mesh |'; do
     grep -qF "$text" "$page" || { echo "the page has no \"$text\"" && exit 1; }
 done
