@@ -62,6 +62,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
         const pixel_area area = area_of(camera, tile % columns, tile / columns);
         if (!end->take) fragment_writer_advance(&end->writers[number], TILE_FRAGMENTS);
         const int64_t first = own->count;
+        thread->out_of_memory = thread->out_of_memory || !render_candidates_gather(frame, thread, area.x, area.y);
         kernels->trace_tile(frame, thread, area.x, area.y);
         if (folds) thread->out_of_memory = thread->out_of_memory || !render_fold(&fold, &area, own, first);
         if (!end->take || thread->out_of_memory) continue;
@@ -137,6 +138,8 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
     for (int i = 0; i < threads; i++) {
         polyhedra_free(states[i].polyhedra);
         base_free(states[i].memory);
+        base_free(states[i].bin.room);
+        base_free(states[i].volume_bin.room);
         has_memory = has_memory && !states[i].out_of_memory;
         if (has_memory && job->waiting) has_memory = append_waiting(&job->waiting->list, &states[i].waiting);
         base_free(states[i].waiting.items);

@@ -230,11 +230,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
-    kernel_tile_candidate *items;
-    const int count = kernel_candidates_in_tile(f, t->tile.x0, t->tile.y0, &items);
-    if (!count) return;
+    const kernel_bin *bin = &t->thread->bin;
+    if (!bin->count) return;
     kernel_by_depth by_depth;
-    kernel_sort_by_depth(&by_depth, items, count);
+    kernel_sort_by_depth(&by_depth, bin->items, bin->count);
     if (f->opaque_count) kernel_tile_trace_candidates(t, &by_depth, false);
     if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, &by_depth, true);
 }
@@ -445,19 +444,17 @@ static bool is_covered(const kernel_frame *f, int x0, int y0)
 }
 
 /* May the tile have samples or segments of volumes? */
-static bool has_volume(const kernel_frame *f, int x0, int y0)
+static bool has_volume(const kernel_frame *f, const kernel_thread *thread, int x0, int y0)
 {
-    kernel_tile_candidate *items;
     if (!f->volume_count || !is_covered(f, x0, y0)) return false;
-    return !f->volume_candidates || kernel_bin(f, f->volume_candidates, f->volume_starts, x0, y0, &items);
+    return !f->volume_candidates || thread->volume_bin.count;
 }
 
 /* May it have hits? */
-static bool has_surface(const kernel_frame *f, int x0, int y0)
+static bool has_surface(const kernel_frame *f, const kernel_thread *thread, int x0, int y0)
 {
-    kernel_tile_candidate *items;
     if (!f->surface_count) return false;
-    return f->candidates ? kernel_candidates_in_tile(f, x0, y0, &items) : is_covered(f, x0, y0);
+    return f->candidates ? thread->bin.count : is_covered(f, x0, y0);
 }
 
 static bool begins_run(const kernel_frame *f, int x0, int y0)
@@ -475,8 +472,8 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     }
     if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
-    const bool fogs = has_volume(f, x0, y0);
-    if (!fogs && !has_surface(f, x0, y0)) return;
+    const bool fogs = has_volume(f, thread, x0, y0);
+    if (!fogs && !has_surface(f, thread, x0, y0)) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);

@@ -1,5 +1,6 @@
-/* Subtrees are dealt to threads, each of which lists the cells it finds and counts them by tile; then room is
- * made for each tile, and every thread bins its own cells. The bound on cells is a bound on memory and on time lost:
+/* Subtrees are dealt to threads, each of which lists the cells it finds, counts them by tile, and bins its own. Threads
+ * do not wait for each other in between: who traces a tile gathers its cells from all of them. The bound on cells is a
+ * bound on memory and on time lost:
  * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
  * hidden: there a million may be listed in any case. */
 #include "render_candidates.h"
@@ -74,6 +75,17 @@ static void free_list(kernel_candidate_list *list)
 
 /* ---- tiles ---------------------------------------------------------------------------------------------------- */
 
+/* The cells that one thread has found, tile by tile, from starts[tile] to starts[tile + 1]. */
+typedef struct bin_list {
+    kernel_tile_candidate *items;
+    uint32_t *starts;
+} bin_list;
+
+struct kernel_bins {
+    int list_count; /* one a thread of the search */
+    bin_list lists[];
+};
+
 static int64_t tiles_across(const kernel_frame *f)
 {
     return (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
@@ -82,6 +94,15 @@ static int64_t tiles_across(const kernel_frame *f)
 static int64_t tile_count(const kernel_frame *f)
 {
     return tiles_across(f) * ((f->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE);
+}
+
+static void bins_free(struct kernel_bins *bins)
+{
+    for (int i = 0; bins && i < bins->list_count; i++) {
+        base_free(bins->lists[i].items);
+        base_free(bins->lists[i].starts);
+    }
+    base_free(bins);
 }
 
 /* Bins the cells; at[tile] is the place of the tile's next one. */
@@ -96,20 +117,69 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
         }
 }
 
-/* Replaces counts (threads × tiles) by the places where each thread's cells of each tile begin. Returns their sum. */
-static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32_t *starts)
+/* Bins what a thread has found; starts[1 + tile] counts each tile's cells. False where they are more than `most`, or
+ * memory runs out. */
+static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int64_t tiles, int64_t most)
 {
+    uint32_t *starts = bin->starts;
     uint64_t sum = 0;
     for (int64_t tile = 0; tile < tiles; tile++) {
-        starts[tile] = (uint32_t)sum;
-        for (int t = 0; t < threads; t++) {
-            const uint32_t count = counts[t * tiles + tile];
-            counts[t * tiles + tile] = (uint32_t)sum;
-            sum += count;
-        }
+        const uint32_t count = starts[1 + tile];
+        starts[1 + tile] = (uint32_t)sum; /* moves on to where the next tile begins */
+        sum += count;
     }
-    starts[tiles] = (uint32_t)sum;
-    return sum;
+    if (sum > (uint64_t)most) return false;
+    bin->items = base_alloc(sum * sizeof *bin->items);
+    if (!bin->items) return false;
+    for (const kernel_candidate_chunk *c = list->chunk; c; c = c->before)
+        bin_tiles(c, list->tile_columns, starts + 1, bin->items);
+    return true;
+}
+
+static bool ensure_room(kernel_bin *bin, int64_t count)
+{
+    if (count <= bin->capacity) return true;
+    base_free(bin->room);
+    bin->room = base_alloc((size_t)(2 * count) * sizeof *bin->room);
+    bin->capacity = bin->room ? 2 * count : 0;
+    return bin->room != NULL;
+}
+
+static int count_in_tile(const bin_list *list, int64_t tile)
+{
+    return (int)(list->starts[tile + 1] - list->starts[tile]);
+}
+
+/* Cells that one thread has found stay where they are; those of several are copied to the bin's own room. */
+static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
+{
+    const bin_list *last = NULL;
+    int64_t count = 0;
+    bin->count = 0;
+    if (!bins) return true;
+    for (const bin_list *list = bins->lists, *end = list + bins->list_count; list < end; list++)
+        if (count_in_tile(list, tile)) {
+            last = list;
+            count += count_in_tile(list, tile);
+        }
+    if (!last) return true;
+    const bool is_shared = count_in_tile(last, tile) < count;
+    if (is_shared && !ensure_room(bin, count)) return false;
+    bin->items = is_shared ? bin->room : last->items + last->starts[tile];
+    bin->count = (int)count;
+    kernel_tile_candidate *to = bin->items;
+    for (const bin_list *list = bins->lists; is_shared && list <= last; list++) {
+        const int own = count_in_tile(list, tile);
+        memcpy(to, list->items + list->starts[tile], (size_t)own * sizeof *to);
+        to += own;
+    }
+    return true;
+}
+
+bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0)
+{
+    const int64_t tile = y0 / KERNEL_TILE * tiles_across(frame) + x0 / KERNEL_TILE;
+    return gather(frame->candidates, tile, &thread->bin) && gather(frame->volume_candidates, tile, &thread->volume_bin);
 }
 
 /* ---- where cells are ---------------------------------------------------------------------------------------- */
@@ -262,16 +332,15 @@ typedef struct search {
     kernel_frame *frame;
     render_subtrees subtrees;
     kernel_candidate_list *lists; /* one a thread */
-    uint32_t *counts, *starts;
-    kernel_tile_candidate *candidates;
     int64_t bound;
+    struct kernel_bins *bins;
 } search;
 
+/* Each thread bins its own cells as soon as no subtree is left, and waits for no other. */
 static void run(search *s, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
-    const int64_t tiles = tile_count(s->frame), across = tiles_across(s->frame), most = 2 * s->bound;
-    bool is_full = false;
+    const int64_t tiles = tile_count(s->frame), most = 2 * s->bound;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
@@ -283,62 +352,74 @@ static void run(search *s, kernel_thread *thread_of, int threads)
             if (!list->is_full) kernels->find_candidates(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
         }
         if (list->chunk) list->chunk->count = list->count;
-#pragma omp barrier
-#pragma omp single
-        {
-            for (int t = 0; t < threads; t++) is_full = is_full || s->lists[t].is_full;
-            const uint64_t count = is_full ? 0 : place_tiles(s->counts, threads, tiles, s->starts);
-            is_full = is_full || count > (uint64_t)most;
-            if (!is_full) s->candidates = base_alloc(count * sizeof *s->candidates);
-        }
-        for (const kernel_candidate_chunk *c = s->candidates ? list->chunk : NULL; c; c = c->before)
-            bin_tiles(c, across, s->counts + me * tiles, s->candidates);
+        list->is_full = list->is_full || !bin_list_fill(&s->bins->lists[me], list, tiles, most);
         region_leave();
     }
 }
 
-/* Returns the candidates that the search found, or NULL. */
-static kernel_tile_candidate *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads,
-                                   uint32_t **starts)
+/* Begins each thread's list and bins. False: no memory. */
+static bool begin_lists(search *s, int threads)
 {
-    const int64_t tiles = tile_count(frame), pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
+    const int64_t tiles = tile_count(s->frame);
+    s->lists = base_calloc((size_t)threads, sizeof *s->lists);
+    s->bins = base_calloc(1, sizeof *s->bins + (size_t)threads * sizeof *s->bins->lists);
+    if (!s->lists || !s->bins) return false;
+    s->bins->list_count = threads;
+    for (int t = 0; t < threads; t++) {
+        uint32_t *starts = base_calloc((size_t)(tiles + 1), sizeof *starts);
+        s->bins->lists[t].starts = starts;
+        if (!starts) return false;
+        s->lists[t] = (kernel_candidate_list){
+            .bound = &s->bound, .counts = starts + 1, .tile_columns = (int)tiles_across(s->frame)};
+    }
+    return true;
+}
+
+/* Are all cells of all threads in bins, and not too many? */
+static bool is_whole(const search *s, int threads, int64_t most)
+{
+    const int64_t tiles = tile_count(s->frame);
+    int64_t count = 0;
+    for (int t = 0; t < threads; t++) {
+        if (s->lists[t].is_full) return false;
+        count += s->bins->lists[t].starts[tiles];
+    }
+    return count <= most;
+}
+
+/* Returns the candidates that the search found, or NULL. */
+static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads)
+{
+    const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
-    search s = {.frame = frame, .bound = cells + ITEMS * (int64_t)threads};
-    s.lists = base_calloc((size_t)threads, sizeof *s.lists);
-    s.counts = base_calloc((size_t)(threads * tiles), sizeof *s.counts);
-    s.starts = base_alloc((size_t)(tiles + 1) * sizeof *s.starts);
-    if (s.lists && s.counts && s.starts && cut_trees(frame, is_volume, &s.subtrees)) {
-        for (int t = 0; t < threads; t++)
-            s.lists[t] = (kernel_candidate_list){
-                .bound = &s.bound, .counts = s.counts + t * tiles, .tile_columns = (int)tiles_across(frame)};
-        run(&s, thread_of, threads);
+    const int64_t bound = cells + ITEMS * (int64_t)threads;
+    search s = {.frame = frame, .bound = bound};
+    const bool is_begun = begin_lists(&s, threads) && cut_trees(frame, is_volume, &s.subtrees);
+    if (is_begun) run(&s, thread_of, threads);
+    if (!is_begun || !is_whole(&s, threads, 2 * bound)) {
+        bins_free(s.bins);
+        s.bins = NULL;
     }
     for (int t = 0; s.lists && t < threads; t++) free_list(&s.lists[t]);
     base_free(s.lists);
-    base_free(s.counts);
     base_free(s.subtrees.items);
-    if (!s.candidates) base_free(s.starts);
-    *starts = s.candidates ? s.starts : NULL;
-    return s.candidates;
+    return s.bins;
 }
 
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    frame->candidates = find(frame, false, thread_of, threads, &frame->candidate_starts);
+    frame->candidates = find(frame, false, thread_of, threads);
 }
 
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
     if (is_of_small_cells(frame)) return;
-    frame->volume_candidates = find(frame, true, thread_of, threads, &frame->volume_starts);
+    frame->volume_candidates = find(frame, true, thread_of, threads);
 }
 
 void render_candidates_free(kernel_frame *frame)
 {
-    base_free(frame->candidates);
-    base_free(frame->candidate_starts);
-    base_free(frame->volume_candidates);
-    base_free(frame->volume_starts);
+    bins_free(frame->candidates);
+    bins_free(frame->volume_candidates);
     frame->candidates = frame->volume_candidates = NULL;
-    frame->candidate_starts = frame->volume_starts = NULL;
 }

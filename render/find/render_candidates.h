@@ -12,6 +12,9 @@ bool render_surfaces_are_small(const kernel_frame *frame);
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* As above, for the only volume's cells: fills frame->volume_candidates. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
+/* Gathers the cells of the tile whose upper left pixel is (x0, y0) in thread->bin and volume_bin, for the kernels.
+ * False: no memory. */
+bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
 /* Sets frame->cover, from the bounds of all trees. */
 void render_trees_cover(kernel_frame *frame);
 void render_candidates_free(kernel_frame *frame);

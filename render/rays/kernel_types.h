@@ -193,6 +193,14 @@ typedef struct kernel_tile_candidate {
     uint16_t blocks, box;
 } kernel_tile_candidate;
 
+/* The candidates of a tile, in any order; the kernels may change them. */
+typedef struct kernel_bin {
+    kernel_tile_candidate *items;
+    int count;
+    kernel_tile_candidate *room; /* for those of several threads */
+    int64_t capacity;
+} kernel_bin;
+
 /* The tile's blocks that are in these columns and rows of blocks, a bit each. */
 static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
 {
@@ -236,11 +244,8 @@ typedef struct kernel_frame {
     kernel_surface *surfaces; /* opaque ones first */
     int opaque_count;
     kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
-    kernel_tile_candidate
-        *candidates; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
-    uint32_t *candidate_starts;
-    kernel_tile_candidate *volume_candidates; /* the same of the volume's cells */
-    uint32_t *volume_starts;
+    struct kernel_bins *candidates;        /* render_candidates.c; NULL: tiles go down the trees */
+    struct kernel_bins *volume_candidates; /* the same of the volume's cells */
     int cover[2][2]; /* the first and the last column, and row, in which trees may be seen; set where needs_planes */
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
@@ -276,7 +281,8 @@ typedef struct kernel_thread {
     struct kernel_tile_volume *tile_volume;
     struct kernel_tile_segments *tile_segments;
     struct kernel_finder *finder;
-    uint32_t serial; /* of the tile, from 1: cells of other tiles in the cache are stale */
+    kernel_bin bin, volume_bin; /* of the tile, where the frame has candidates of surfaces, of the volume */
+    uint32_t serial;            /* of the tile, from 1: cells of other tiles in the cache are stale */
     fragment_list *out;
     /* Make room for more items in out; false where memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);

@@ -393,7 +393,8 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_
     cells->take_tets = take_tets;
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;
-    cells->count = kernel_bin(f, f->volume_candidates, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
+    cells->items = t->thread->volume_bin.items;
+    cells->count = t->thread->volume_bin.count;
     cells->open_count = cells->next = cells->sorted = 0;
     cells->end_count = 1;
     cells->ends[0] = cells->count;
