@@ -54,10 +54,10 @@ SIMD_INLINE vf kernel_colour_place(const kernel_transfer *t, vf x)
     return t->scale.kind == RENDER_LINEAR ? x : kernel_scaled_place(&t->scale, x);
 }
 
-/* x in the transfer's domain; NaN gives the colour at 0. */
-SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
+/* The colour at a place in the table; NaN gives the first. */
+SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
 {
-    const vf place = vf_clamp(kernel_colour_place(t, x), vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
+    const vf place = vf_clamp(along, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
     const vf whole = vf_min(vf_floor(place), vf_set((float)(t->colour_count - 2)));
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;
@@ -71,15 +71,26 @@ SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
     out[2] = first[2] + part * (last[3] - first[2]);
 }
 
-SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
+/* x in the transfer's domain; NaN gives the colour at 0. */
+SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
-    const vf place = kernel_colour_place(t, x);
+    kernel_table_at(t, kernel_colour_place(t, x), out);
+}
+
+/* The opacity at a place in the colour table. */
+SIMD_INLINE vf kernel_opacity_at(const kernel_transfer *t, vf place)
+{
     vf a = vf_set(t->base_opacity);
     for (int i = 0; i < t->ramp_count; i++) {
         const vf along = vf_clamp((place - t->ramp_start[i]) * t->ramp_inverse[i], vf_set(0), vf_set(1));
         a += along * t->ramp_rise[i];
     }
     return vf_clamp(a, vf_set(0), vf_set(1));
+}
+
+SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
+{
+    return kernel_opacity_at(t, kernel_colour_place(t, x));
 }
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
