@@ -8,12 +8,29 @@ set(INSITU_TEST_ENVIRONMENT
 # Ranks that all MPI tests run on, instead of their own.
 set(INSITU_TEST_RANKS "" CACHE STRING "Ranks to run each MPI test on, instead of those that it names")
 
-# insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [ARGS arg ...]): one ctest case a count, named NAME_np<RANKS>.
+# Sets OUT to the command that runs a program on so many ranks. One rank runs without mpiexec, which takes longer to start
+# than most programs to run.
+function(insitu_rank_command out ranks target)
+  set(command $<TARGET_FILE:${target}> ${ARGN})
+  if(NOT ranks EQUAL 1)
+    list(PREPEND command ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks})
+  endif()
+  set(${out} ${command} PARENT_SCOPE)
+endfunction()
+
+# insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [WHOLE RANKS ...] [ARGS arg ...]): one ctest case a count, named
+# NAME_np<RANKS>. WHOLE: with INSITU_TEST_WHOLE=1 (test_effort.h), NAME_np<RANKS>_whole, among the long ones.
 function(insitu_add_mpi_test name target)
-  cmake_parse_arguments(PARSE_ARGV 2 arg "" "TIMEOUT" "ARGS")
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "TIMEOUT" "ARGS;WHOLE")
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
+  foreach(ranks IN LISTS arg_WHOLE)
+    insitu_rank_command(command ${ranks} ${target} ${arg_ARGS})
+    insitu_add_long_test(${name}_np${ranks}_whole ${command})
+    set_tests_properties(${name}_np${ranks}_whole PROPERTIES
+      ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};INSITU_TEST_WHOLE=1")
+  endforeach()
   set(counts ${arg_UNPARSED_ARGUMENTS})
   if(INSITU_TEST_RANKS)
     set(counts ${INSITU_TEST_RANKS})
@@ -31,8 +48,8 @@ function(insitu_add_mpi_test name target)
     if(ranks EQUAL 1)
       set(cores 1)
     endif()
-    add_test(NAME ${name}_np${ranks}
-      COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${arg_ARGS})
+    insitu_rank_command(command ${ranks} ${target} ${arg_ARGS})
+    add_test(NAME ${name}_np${ranks} COMMAND ${command})
     set_tests_properties(${name}_np${ranks} PROPERTIES
       ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${cores})
   endforeach()

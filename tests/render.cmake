@@ -40,7 +40,7 @@ set_tests_properties(slice PROPERTIES TIMEOUT 120)
 
 insitu_render_program(test_light)
 target_sources(test_light PRIVATE test_mesh_honeycomb.c)
-add_test(NAME light COMMAND test_light)
+insitu_add_split_test(light $<TARGET_FILE:test_light>)
 set_tests_properties(light PROPERTIES TIMEOUT 180)
 
 insitu_render_program(test_render_invariance)
@@ -52,17 +52,13 @@ insitu_add_set_tests(render_batches 120 split)
 
 
 insitu_render_program(test_render_isa)
-add_test(NAME render_isa COMMAND test_render_isa)
+insitu_add_split_test(render_isa $<TARGET_FILE:test_render_isa>)
 set_tests_properties(render_isa PROPERTIES TIMEOUT 120)
 
 insitu_render_program(test_partition_mpi)
 insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)
 insitu_render_program(test_overlap_mpi)
-insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 7) # 4 ranks: in the long test alone
-foreach(ranks 1 2 3 4 7)
-  insitu_add_long_test(overlap_whole_np${ranks} ${CMAKE_COMMAND} -E env ${INSITU_TEST_ENVIRONMENT} INSITU_TEST_WHOLE=1
-    ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:test_overlap_mpi>)
-endforeach()
+insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 7 WHOLE 1 2 3 4 7)
 insitu_render_program(test_hanging_mpi)
 insitu_add_mpi_test(hanging test_hanging_mpi 1 2 3 7)
 

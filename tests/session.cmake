@@ -56,10 +56,7 @@ insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAK
 insitu_session_program(test_session_many)
 insitu_add_mpi_test(session_many test_session_many 1 2 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_turns)
-insitu_add_mpi_test(session_turns test_session_turns 1 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
-insitu_add_long_test(session_turns_np8_whole ${CMAKE_COMMAND} -E env INSITU_TEST_WHOLE=1
-  ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 8 $<TARGET_FILE:test_session_turns> ${CMAKE_CURRENT_BINARY_DIR})
-set_tests_properties(session_turns_np8_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+insitu_add_mpi_test(session_turns test_session_turns 1 3 WHOLE 8 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_smooth)
 insitu_add_mpi_test(session_smooth test_session_smooth 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -102,6 +99,7 @@ foreach(name zero_counts strides wrong_input)
   target_sources(test_session_${name} PRIVATE test_mesh_forms.c test_owned_faces.c)
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
+insitu_add_mpi_test(session_wrong_input test_session_wrong_input WHOLE 1 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_statistics)
 insitu_add_mpi_test(session_statistics test_session_statistics 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -134,12 +132,7 @@ insitu_session_program(test_session_space)
 insitu_add_mpi_test(session_space test_session_space 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_invariance)
-insitu_add_mpi_test(invariance test_invariance 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
-foreach(ranks 1 2 3 5 7 16 64)
-  insitu_add_long_test(invariance_np${ranks}_whole ${CMAKE_COMMAND} -E env INSITU_TEST_WHOLE=1
-    ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:test_invariance> ${CMAKE_CURRENT_BINARY_DIR})
-  set_tests_properties(invariance_np${ranks}_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
-endforeach()
+insitu_add_mpi_test(invariance test_invariance 2 7 WHOLE 1 2 3 5 7 16 64 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_partition)
 target_sources(test_session_partition PRIVATE test_mesh_honeycomb.c)
