@@ -1,5 +1,6 @@
 /* insitu-render on files of every format: the pictures are those of the same cells in a .vtu, bit for bit, on one rank
- * and on two; a file that is cut short ends the program with an error or changes nothing.
+ * and on two; a file that is cut short ends the program with an error or changes nothing. Pictures are plain numbers
+ * (plain_image.c).
  *
  *     test_vtk_formats <insitu-render> <mpiexec> [percent...]
  *
@@ -53,7 +54,7 @@ std::string scene(const std::string &field, const std::string &value)
            value +
            "]\n"
            "    outputs:\n"
-           "      - path: a_{cycle:02}.png\n";
+           "      - path: a_{cycle:02}.exr\n";
 }
 
 int write_all(void **)
@@ -82,7 +83,7 @@ void expect(const run_result &r, int status, const std::string &text)
 std::string picture(size_t step)
 {
     const std::string number = std::to_string(step);
-    return read_file(folder + "/a_" + (step < 10 ? "0" : "") + number + ".png");
+    return read_file(folder + "/a_" + (step < 10 ? "0" : "") + number + ".exr");
 }
 
 /* Files are steps of one run: the first is the .vtu, the others must look the same. */
@@ -92,8 +93,8 @@ void expect_same_pictures(int ranks, const std::vector<std::string> &files)
     for (const std::string &file : files) names += " " + file;
     const std::string count = std::to_string(files.size());
     expect(run_tool(ranks, "scene.yaml" + names), 0, count + " steps, " + count + " pictures");
-    const std::string first = picture(0);
-    assert_true(first.size() > 300); // an empty picture has some 200 bytes
+    const std::string first = picture(0), pixels = first.substr(0, size_t{64} * 48 * 4 * sizeof(float));
+    assert_true(pixels.substr(4 * sizeof(float)) != pixels.substr(0, pixels.size() - 4 * sizeof(float))); // not empty
     for (size_t i = 1; i < files.size(); i++) {
         if (picture(i) == first) continue;
         print_error("%s on %d ranks: another picture than %s\n", files[i].c_str(), ranks, files[0].c_str());

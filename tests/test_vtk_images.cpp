@@ -5,18 +5,16 @@
  *
  * Usually the files are dealt to ranks at random, one of them by blocks too; in the whole test all are.
  *
- *     test_vtk_images <insitu-render> <mpiexec>, with the data's folder in INSITU_TEST_DATA; 77 where that is not set
+ *     test_vtk_images <insitu-render that writes plain numbers (plain_image.c)> <mpiexec>, with the data's folder in
+ *     INSITU_TEST_DATA; 77 if that is not set
  */
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <string>
 #include <vector>
-
-#include <OpenImageIO/imageio.h>
 
 #include "test_effort.h"
 #include "test_vtk_run.h"
@@ -58,31 +56,21 @@ const struct volume_picture {
                        {"both", "{max_error: 1e-2}", "f_cell"}};
 
 struct picture {
-    std::vector<float> rgba, depth; // depth: empty where the file has no channel Z
+    std::vector<float> rgba, depth; // depth: empty where the picture has none
 };
 
 picture read_picture(const std::string &path)
 {
-    const auto in = OIIO::ImageInput::open(path);
-    if (!in) print_error("%s cannot be opened\n", path.c_str());
-    assert_true(in != nullptr);
-    const OIIO::ImageSpec spec = in->spec();
-    assert_int_equal(spec.width, width);
-    assert_int_equal(spec.height, height);
-    const auto channels = static_cast<size_t>(spec.nchannels);
-    const size_t pixels = static_cast<size_t>(width) * height;
-    std::vector<float> all(pixels * channels);
-    assert_true(in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, all.data()));
+    const std::string all = read_file(path);
+    const size_t pixels = static_cast<size_t>(width) * height, colours = pixels * 4 * sizeof(float);
+    const bool has_depth = all.size() == colours + pixels * sizeof(float);
     picture p;
-    for (size_t i = 0; i < pixels; i++)
-        for (size_t c = 0; c < channels; c++) {
-            const std::string &channel = spec.channelnames[c];
-            if (channel == "Z")
-                p.depth.push_back(all[i * channels + c]);
-            else if (channel == "R" || channel == "G" || channel == "B" || channel == "A")
-                p.rgba.push_back(all[i * channels + c]);
-        }
-    assert_int_equal(p.rgba.size(), pixels * 4);
+    if (!has_depth && all.size() != colours) print_error("%s has %zu bytes\n", path.c_str(), all.size());
+    assert_true(has_depth || all.size() == colours);
+    p.rgba.resize(pixels * 4);
+    p.depth.resize(has_depth ? pixels : 0);
+    std::memcpy(p.rgba.data(), all.data(), colours);
+    if (has_depth) std::memcpy(p.depth.data(), all.data() + colours, p.depth.size() * sizeof(float));
     return p;
 }
 
