@@ -1,7 +1,8 @@
 /* Tests max_error where the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or
  * come back through it within the cell. Sampling would miss the little light beyond the step, or get its length wrong.
  * Cells are single ones, warped at random, and ones whose rays graze the step by a given amount; functions have steps
- * or ramps almost as steep. */
+ * or ramps almost as steep. Usually every other pixel of a picture counts, and rays graze ramps in one type of cell,
+ * another one for the next width. */
 #include "reference_cell.h"
 #include "test_effort.h"
 #include "test_step_fixture.h"
@@ -78,7 +79,7 @@ static void judge_hex(step_function function, fixture_camera camera, double widt
     step_make_hex(&mesh);
     step_begin(&f, &mesh, camera, STEP_SIDE);
     step_set_function(&f, &function, 0.6, width, unit);
-    step_judge(&f, 1, 1e-9, worst);
+    step_judge(&f, test_effort(2, 1), 1e-7, worst);
     snprintf(what, sizeof what, "a ramp of %g, unit distance %g, %s", width, unit, fixture_camera_name(camera));
     step_assert_kept(worst, what);
     fixture_free(&f);
@@ -122,7 +123,7 @@ static void a_cubic_that_dips_below_a_step(void **state)
     memcpy(mesh.values, values, sizeof values);
     step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
     step_set_function(&f, &function, 0.187, 0, 0.005); /* not in the bin of bounds that 0.2 is in */
-    step_judge(&f, 1, 1e-9, worst);
+    step_judge(&f, 1, 1e-7, worst);
     step_assert_kept(worst, "a dip");
     fixture_free(&f);
     test_mesh_free(&mesh);
@@ -179,7 +180,7 @@ static void a_ray_on_which_it_barely_does(void **state)
             step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
             look_past_step(&f, &mesh, passes[n]);
             step_set_function(&f, &function, 0.6, 0, units[k]);
-            step_judge(&f, 1, 1e-9, worst);
+            step_judge(&f, 1, 1e-7, worst);
             snprintf(what, sizeof what, "unit distance %g, by %g", units[k], passes[n]);
             step_assert_kept(worst, what);
             fixture_free(&f);
@@ -210,7 +211,7 @@ static void random_cells_and_steps(void **state)
                 fixture_set_function(&f, &function, 100 * seed + 9, true, seed % 3 ? 0.5 : 0.9,
                                      pow(10, test_uniform_in(0, 100 * seed + 10, -2.2, 0)));
                 assert_true(function.values[1] == function.values[2]);
-                step_judge(&f, 1, 1e-9, worst);
+                step_judge(&f, test_effort(2, 1), 1e-7, worst);
                 fixture_free(&f);
                 test_mesh_free(&mesh);
             }
@@ -237,50 +238,51 @@ static bool graze(render_fixture *f, const double values[SAMPLES], double sign, 
     for (int k = 0; k < PASSES; k++)
         for (int dense = 0; dense < 2; dense++) {
             step_set_function(f, &function, at - sign * passes[k], width, dense ? 0.005 : 0.1);
-            step_judge(f, 1, 1e-9, worst[k]);
+            step_judge(f, 1, 1e-7, worst[k]);
         }
     return true;
 }
 
-/* Tests each type of cell. */
-static void graze_by_rays(int rays, double width)
+enum { GRAZED = 3 }; /* hexes, wedges and pyramids; along a ray in a tet nothing bends */
+
+static void graze_by_rays(int kind, int rays, double width)
 {
-    static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
+    static const int types[GRAZED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     static double values[SAMPLES];
-    for (int kind = 0; kind < 3; kind++) {
-        double worst[PASSES][3] = {{0}};
-        int count = 0;
-        for (uint64_t seed = 0; count < rays && seed < 200; seed++) {
-            test_mesh mesh;
-            render_fixture f;
-            step_make_cell(step_shapes[kind], seed, &mesh);
-            step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 1);
-            if (values_on_ray(&f, &mesh, types[kind], values))
-                for (int sign = -1; sign <= 1; sign += 2) count += graze(&f, values, sign, width, worst);
-            fixture_free(&f);
-            test_mesh_free(&mesh);
-        }
-        for (int k = 0; k < PASSES; k++) {
-            char what[80];
-            snprintf(what, sizeof what, "%d rays in %s past a ramp of %g by %g", count,
-                     test_cell_shape_name(step_shapes[kind]), width, passes[k]);
-            step_assert_kept(worst[k], what);
-        }
-        assert_true(count >= rays);
+    double worst[PASSES][3] = {{0}};
+    int count = 0;
+    for (uint64_t seed = 0; count < rays && seed < 200; seed++) {
+        test_mesh mesh;
+        render_fixture f;
+        step_make_cell(step_shapes[kind], seed, &mesh);
+        step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 1);
+        if (values_on_ray(&f, &mesh, types[kind], values))
+            for (int sign = -1; sign <= 1; sign += 2) count += graze(&f, values, sign, width, worst);
+        fixture_free(&f);
+        test_mesh_free(&mesh);
     }
+    for (int k = 0; k < PASSES; k++) {
+        char what[80];
+        snprintf(what, sizeof what, "%d rays in %s past a ramp of %g by %g", count,
+                 test_cell_shape_name(step_shapes[kind]), width, passes[k]);
+        step_assert_kept(worst[k], what);
+    }
+    assert_true(count >= rays);
 }
 
 static void rays_that_graze_a_step(void **state)
 {
     (void)state;
-    graze_by_rays(test_effort(4, 10), 0);
+    for (int kind = 0; kind < GRAZED; kind++) graze_by_rays(kind, test_effort(2, 10), 0);
 }
 
 static void rays_that_graze_a_steep_ramp(void **state)
 {
     static const double widths[] = {1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 0.02, 0.1};
     (void)state;
-    for (int i = 0; i < (int)(sizeof widths / sizeof *widths); i++) graze_by_rays(test_effort(1, 2), widths[i]);
+    for (int i = 0; i < (int)(sizeof widths / sizeof *widths); i++)
+        for (int kind = 0; kind < GRAZED; kind++)
+            if (test_is_whole() || kind == i % GRAZED) graze_by_rays(kind, test_effort(1, 2), widths[i]);
 }
 
 /* ---- all but a step ---- */
@@ -291,8 +293,9 @@ static void steep_ramps_are_kept_as_steps_are(void **state)
     (void)state;
     for (int k = 0; k < (int)(sizeof widths / sizeof *widths); k++)
         for (int dense = 0; dense < 2; dense++)
-            judge_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
-                      dense ? 0.005 : 0.1);
+            if (test_is_whole() || dense == k % 2)
+                judge_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
+                          dense ? 0.005 : 0.1);
 }
 
 /* ---- the same rays everywhere ---- */
