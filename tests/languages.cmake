@@ -1,11 +1,13 @@
-# Other languages than C: each example draws the pictures of six_calls.c, to the byte, on 2 ranks.
-set(truth $<TARGET_FILE:six_calls>)
+# Other languages than C: each example draws the pictures of six_calls.c, which the README's test draws, to the byte, on
+# 2 ranks.
+set(truth ${CMAKE_CURRENT_BINARY_DIR}/readme)
 function(insitu_add_same_pictures_test name)
   add_test(NAME ${name}
     COMMAND ${CMAKE_COMMAND} "-DPROGRAM=${ARGN}" "-DTRUTH=${truth}"
       -DSCENE=${PROJECT_SOURCE_DIR}/examples/six_calls.yaml -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}
       "-DMPIRUN=${MPIEXEC_EXECUTABLE};${MPIEXEC_NUMPROC_FLAG}" -P ${CMAKE_CURRENT_SOURCE_DIR}/languages_run.cmake)
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2)
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2
+    FIXTURES_REQUIRED readme)
 endfunction()
 
 # Not other languages, but other descriptions of the mesh: faces by owner and neighbour; nodes of higher order.
