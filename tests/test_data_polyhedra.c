@@ -3,6 +3,7 @@
  * their own tets. Returns 77 where INSITU_TEST_DATA is not set. */
 #include "reference_integral.h"
 #include "test_data_mesh.h"
+#include "test_effort.h"
 #include "test_mesh_dual.h"
 #include "test_own_tets.h"
 #include "test_render_fixture.h"
@@ -14,15 +15,15 @@
 #include <stdlib.h>
 #include <cmocka.h>
 
-enum { WIDTH = 23, HEIGHT = 19 };
-
 static test_mesh mesh;
+static int width,
+    height; /* of the picture that is compared with brute force over all cells: usually a third of the rays */
 
 static void cells_fixture(render_fixture *f)
 {
     fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.1, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
+    fixture_look(f, CAMERA_OUTSIDE, width, height);
 }
 
 static void surfaces_and_samples_are_the_reference(void **state)
@@ -38,7 +39,7 @@ static void surfaces_and_samples_are_the_reference(void **state)
         const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, pass ? "clear" : "opaque");
         fprintf(stderr, "%d rays, %d hits, %d excluded: depth %.2g cells, colour %.2g\n", (int)o.rays, (int)o.hits,
                 (int)o.excluded, o.worst_depth, o.worst_colour);
-        assert_true(o.hits > WIDTH * HEIGHT / 5);
+        assert_true(o.hits > width * height / 5);
         fixture_free(&f);
     }
 }
@@ -55,9 +56,9 @@ static void segments_are_the_integral(void **state)
     f.job.integration = RENDER_SEGMENTS;
     fixture_draw(&f, &drawn);
     reference_integral *scene = reference_integral_create(&f.job, 1e-9);
-    for (int p = 0; p < WIDTH * HEIGHT; p += 3) {
+    for (int p = 0; p < width * height; p += 3) {
         double rgba[4];
-        reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, NULL, 0, rgba);
+        reference_integral_trace(scene, p % width, p / width, fixture_background, NULL, 0, rgba);
         for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * p + c] - rgba[c]));
     }
     reference_integral_free(scene);
@@ -97,6 +98,8 @@ int main(void)
     }
     snprintf(path, sizeof path, "%s/poly_voronoi.vtu", folder);
     if (!test_data_mesh(path, "f", &mesh)) return 1;
+    width = test_effort(13, 23);
+    height = test_effort(11, 19);
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
     test_mesh_free(&mesh);
     return failed;

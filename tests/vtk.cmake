@@ -87,9 +87,10 @@ target_link_libraries(test_data_mesh PRIVATE insitu_vtk_objects insitu_flags VTK
 foreach(noun volumes polyhedra)
   add_executable(test_data_${noun} test_data_${noun}.c)
   target_link_libraries(test_data_${noun} PRIVATE test_data_mesh test_render_support insitu_flags)
-  add_test(NAME data_${noun} COMMAND test_data_${noun})
-  set_tests_properties(data_${noun} PROPERTIES
-    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
+  insitu_add_split_test(data_${noun} $<TARGET_FILE:test_data_${noun}>)
+  set_tests_properties(data_${noun} PROPERTIES TIMEOUT 300)
+  set_tests_properties(data_${noun} data_${noun}_whole PROPERTIES
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" SKIP_RETURN_CODE 77)
 endforeach()
 target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
