@@ -1,29 +1,31 @@
-# Sessions: on any ranks, right and wrong input. Pictures are caught by the fixture; test_api writes them.
+# Sessions: on any ranks, right and wrong input. Pictures are caught by the fixture; test_api writes them. Daily all run on 1
+# and 3 ranks, and session, session_partition and invariance on 2 and 7 too, as compositing's own tests do; the others do so
+# in the long tests.
 function(insitu_session_program target)
   add_executable(${target} ${target}.c test_session_fixture.c)
   target_link_libraries(${target} PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
 endfunction()
 
 insitu_session_program(test_session_input)
-insitu_add_mpi_test(session_input test_session_input 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_input test_session_input 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_faces)
-insitu_add_mpi_test(session_faces test_session_faces 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_faces test_session_faces 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_recentre)
-insitu_add_mpi_test(session_recentre test_session_recentre 1 2 3 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_recentre test_session_recentre 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_slices)
-insitu_add_mpi_test(session_slices test_session_slices 1 2 3 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_slices test_session_slices 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_surfaces)
-insitu_add_mpi_test(session_surfaces test_session_surfaces 1 2 3 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_surfaces test_session_surfaces 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_channels)
-insitu_add_mpi_test(session_channels test_session_channels 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_channels test_session_channels 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_deep)
-insitu_add_mpi_test(session_deep test_session_deep 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_deep test_session_deep 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 add_executable(test_deep_file test_deep_file.cpp)
 add_dependencies(test_deep_file insitu_image)
@@ -59,23 +61,23 @@ insitu_session_program(test_session_turns)
 insitu_add_mpi_test(session_turns test_session_turns 1 3 WHOLE 8 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_smooth)
-insitu_add_mpi_test(session_smooth test_session_smooth 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_smooth test_session_smooth 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_light)
-insitu_add_mpi_test(session_light test_session_light 1 2 3 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_light test_session_light 1 3 WHOLE 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_outline)
 insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_concave)
-insitu_add_mpi_test(session_concave test_session_concave 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_concave test_session_concave 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_hanging)
-insitu_add_mpi_test(session_hanging test_session_hanging 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_hanging test_session_hanging 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_shells)
-insitu_add_mpi_test(session_shells test_session_shells 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_shells test_session_shells 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_clips)
-insitu_add_mpi_test(session_clips test_session_clips 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_clips test_session_clips 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_index_base)
 insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -102,7 +104,7 @@ endforeach()
 insitu_add_mpi_test(session_wrong_input test_session_wrong_input WHOLE 1 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_statistics)
-insitu_add_mpi_test(session_statistics test_session_statistics 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_statistics test_session_statistics 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_cinema)
 insitu_add_mpi_test(session_cinema test_session_cinema 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -120,13 +122,13 @@ else()
 endif()
 
 insitu_session_program(test_session_thresholds)
-insitu_add_mpi_test(session_thresholds test_session_thresholds 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_thresholds test_session_thresholds 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_edges)
 insitu_add_mpi_test(session_edges test_session_edges 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_antialias)
-insitu_add_mpi_test(session_antialias test_session_antialias 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_antialias test_session_antialias 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_space)
 insitu_add_mpi_test(session_space test_session_space 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -163,7 +165,7 @@ insitu_session_program(test_session_narrow)
 insitu_add_mpi_test(session_narrow test_session_narrow 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_colour)
-insitu_add_mpi_test(session_colour test_session_colour 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_colour test_session_colour 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_messages)
 insitu_add_mpi_test(session_messages test_session_messages 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -221,7 +223,7 @@ endforeach()
 add_executable(test_api test_api.c)
 target_link_libraries(test_api PRIVATE insitu_flags insitu PkgConfig::CMOCKA)
 add_dependencies(test_api insitu_image)
-insitu_add_mpi_test(api test_api 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(api test_api 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 # Each of its runs is a process of its own, without mpiexec.
 add_executable(test_writer_end test_writer_end.c)
