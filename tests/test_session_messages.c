@@ -14,6 +14,7 @@ enum { SIDE = 4 };
     "    outputs: [{path: \"a_{cycle}.exr\"}]\n"
 #define SURFACE "{isosurface: {field: f, values: [0.1]}}"
 #define VOLUME "{volume: {field: f}}"
+#define ERROR "    sampling: {max_error: 0.01}\n"
 #define SAMPLES "    sampling: {step_cells: 0.5}\n"
 #define CAMERA(text) "    camera: {" text "}\n"
 
@@ -326,6 +327,15 @@ static const struct warning_case {
      TEST_HEXES,
      NULL,
      {NULL}},
+    {"two volumes, by default",
+     IMAGE("[24, 16]", "", VOLUME ", " VOLUME, ""),
+     TEST_HEXES,
+     NULL,
+     {"image \"a\": its 2 volumes are sampled half a cell apart, to no known error",
+      "{max_error: 0.01} bounds the error", "{step_cells: 0.5} asks for samples"}},
+    {"two volumes to an error", IMAGE("[24, 16]", "", VOLUME ", " VOLUME, ERROR), TEST_HEXES, NULL, {NULL}},
+    {"two volumes by samples", IMAGE("[24, 16]", "", VOLUME ", " VOLUME, SAMPLES), TEST_HEXES, NULL, {NULL}},
+    {"one volume, by default", IMAGE("[24, 16]", "", VOLUME, ""), TEST_HEXES, NULL, {NULL}},
     {"the smallest angle", IMAGE("[24, 16]", CAMERA("angle: 1e-6"), SURFACE ", " VOLUME, ""), TEST_HEXES, NULL, {NULL}},
     {"the smallest angle, and an error that is asked for",
      IMAGE("[24, 16]", CAMERA("angle: 1e-6"), SURFACE ", " VOLUME, "    sampling: {max_error: 0.01}\n"),
