@@ -512,12 +512,15 @@ static void picture_that_cannot_be_written_is_told_to_all(void **context)
 static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
 {
     (void)context;
+    static const char edited[] = "the scene file was edited: its images are drawn from this step on";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     everywhere(hand_over(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     write_scene("images:\n" IMAGE("first", "1", SURFACE, "") IMAGE("second", "1", VOLUME, ""));
-    step_draws(session, 1, 2);
-    everywhere(!strcmp(insitu_last_report(session)->warnings, ""));
+    for (int again = 0; again < 2; again++) {
+        step_draws(session, 1, 2);
+        everywhere(!strcmp(insitu_last_report(session)->warnings, again ? "" : edited));
+    }
     write_scene("images:\n  - nmae: a\n");
     for (int cycle = 2; cycle < 4; cycle++) {
         step_draws(session, cycle, 2);
@@ -526,7 +529,28 @@ static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
     }
     write_scene(plain_scene);
     step_draws(session, 4, 1);
-    everywhere(!strcmp(insitu_last_report(session)->warnings, ""));
+    everywhere(!strcmp(insitu_last_report(session)->warnings, edited));
+    insitu_destroy(&session);
+}
+
+/* They are drawn for those who keep pictures in memory, and else a warning says that they are not. */
+static void images_without_outputs_are_for_memory(void **context)
+{
+    (void)context;
+    static const char scene[] = "images:\n  - {name: a, size: [24, 16], layers: [" SURFACE "]}\n";
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    int count = 0;
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    for (int cycle = 0; cycle < 4; cycle++) {
+        if (cycle == 2) everywhere(insitu_keep_pictures(session, 1) == INSITU_OK);
+        forget_pictures();
+        everywhere(insitu_step(session, cycle, 0) == INSITU_OK && caught_count == 0);
+        everywhere(insitu_last_report(session)->images == (cycle > 1));
+        const insitu_picture *kept = insitu_last_pictures(session, &count);
+        everywhere(count == (cycle > 1 && own_rank == 0) && (!kept || kept->width == 24));
+        const bool is_told = strstr(insitu_last_report(session)->warnings, "\"a\": it has no outputs") != NULL;
+        everywhere(is_told == (cycle == 0));
+    }
     insitu_destroy(&session);
 }
 
@@ -581,7 +605,8 @@ static void scene_that_is_no_file_is_told(void **context)
     told_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
     everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
     const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
-    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE, "/: cannot be read: it is a directory, expected a regular file");
+    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
+                    "/: cannot be read: it is a directory, expected a regular file");
     insitu_destroy(&session);
 }
 
@@ -718,6 +743,7 @@ static int run(void)
         cmocka_unit_test(images_are_drawn_when_their_time_has_passed),
         cmocka_unit_test(picture_that_cannot_be_written_is_told_to_all),
         cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
+        cmocka_unit_test(images_without_outputs_are_for_memory),
         cmocka_unit_test(bad_scene_opens_no_session),
         cmocka_unit_test(scene_that_is_no_file_is_told),
         cmocka_unit_test(memory_is_given_back),

@@ -148,6 +148,10 @@ static void surfaces_without_the_colour_field_are_grey(void **context)
                 "image \"a\": mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is grey",
                 IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
                       "      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
+    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t, nan: [1, 0, 0]}}\n"),
+                "mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is of the colour nan",
+                IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
+                      "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
     assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: sea}\n"),
                 "mesh \"sea/0\" does not have the field \"t\"",
                 IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));

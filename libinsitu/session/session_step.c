@@ -42,6 +42,7 @@ static void reload_scene(insitu_session *s)
     session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
     session_forget_warnings(&s->report);
+    session_text_add(&s->report.warnings, "the scene file was edited: its images are drawn from this step on");
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
 }
 
@@ -124,7 +125,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
-                                changes->is_filled};
+                                changes->is_filled,   s->kept.is_on};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {
         team,       s->scene_file.path, changes->cycle, &s->meshes,    &s->trees.parent,

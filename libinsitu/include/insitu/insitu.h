@@ -374,7 +374,8 @@ INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, dou
 INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
 
 /* Turn on (keep is not 0) or off that rank 0 keeps each step's pictures in memory, beside the files that the scene asks
- * for: 20 bytes a pixel of every image drawn in a step. Off at first. Collective; rank 0's keep counts. */
+ * for: 20 bytes a pixel of every image drawn in a step. Images without outputs are drawn then alone. Off at first.
+ * Collective; rank 0's keep counts. */
 INSITU_API insitu_status insitu_keep_pictures(insitu_session *session, int keep);
 
 /* The pictures that the last step drew, *count of them, in the order of the scene. The pictures of one image come by

@@ -143,6 +143,11 @@ static insitu_status check_layer_field(const session_plan_basis *basis, const sc
     return status;
 }
 
+static const char *colour_without(const scene_colour_map *map)
+{
+    return map->has_nan ? "of the colour nan" : "grey";
+}
+
 /* Warns of meshes that have the surface but not the field that colours it. */
 static void warn_of_grey(const session_catalogue *catalogue, const scene_image *image, const scene_isosurface *layer,
                          session_report *report)
@@ -153,8 +158,9 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
                              !session_catalogue_find(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
-                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": its isosurface of \"%s\" is grey",
-                     image->name, mesh->name, layer->colour_by.name, layer->field.name);
+                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": its isosurface of \"%s\" is %s",
+                     image->name, mesh->name, layer->colour_by.name, layer->field.name,
+                     colour_without(&layer->colour_map));
     }
 }
 
@@ -298,8 +304,8 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
                              !session_catalogue_find(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
-                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": its outer surface is grey", image->name,
-                     mesh->name, layer->colour_by.name);
+                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": its outer surface is %s", image->name,
+                     mesh->name, layer->colour_by.name, colour_without(&layer->colour_map));
     }
 }
 
@@ -358,6 +364,18 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
+/* An image without outputs is for those who keep its pictures in memory. */
+static bool is_for_nobody(const session_plan_basis *basis, const scene_image *image, session_report *report)
+{
+    const bool is_for_none = image->output_count == 0 && !basis->are_kept;
+    session_warn(
+        report, &(session_warning){WARNING_OUTPUTS, image->name, NULL, 0}, is_for_none,
+        "image \"%s\": it has no outputs, and pictures are not kept in memory (insitu_keep_pictures): it is not "
+        "drawn",
+        image->name);
+    return is_for_none;
+}
+
 /* Views of an orbit share their layers, and so the warnings about these. */
 static void take_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
@@ -366,7 +384,7 @@ static void take_images(const session_plan_basis *basis, session_report *report,
         const scene_image *image = &basis->scene->images[i];
         if (!(basis->let_images >> image->variant.source & 1) || !is_due(image, basis->moment)) continue;
         if (image->variant.view == 0) is_well = can_be_drawn(basis, image, report, &plan->refusal);
-        if (!is_well) continue;
+        if (!is_well || is_for_nobody(basis, image, report)) continue;
         plan->images[plan->image_count++] = image;
         if (image->variant.view > 0) continue;
         plan->slice_count += image->slice_count;

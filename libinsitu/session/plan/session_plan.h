@@ -42,6 +42,7 @@ typedef struct session_plan_basis {
     const session_catalogue *catalogue;
     const session_extent *extent;
     bool is_filled; /* some field is filled on demand, on any rank */
+    bool are_kept;  /* pictures, in memory */
 } session_plan_basis;
 
 /* Counts the images that are due, without regard to conditions. Local. */

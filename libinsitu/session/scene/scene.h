@@ -344,7 +344,7 @@ typedef struct scene_image {
     int antialias; /* places in a pixel that frames go through in turn: 1 (default), 2, 4, 8 or 16. Where there are no
                     * volumes only pixels at edges take more than one frame */
     double max_seconds; /* that samples may take by estimate; 3600 by default */
-    int output_count;   /* >= 1 */
+    int output_count;   /* 0: for memory alone */
     scene_output *outputs;
     int every;         /* drawn at cycles that are multiples of it; 1 by default */
     double every_time; /* > 0: instead, when the time passes a multiple of it */

@@ -321,9 +321,11 @@ static const cyaml_schema_value_t statistics = {
           "one, in the system's folders or in those that OPENIMAGEIO_FONTS names in rank 0's environment; without "    \
           "one the report warns. Words are UTF-8; a character that the font lacks is a box, and the report names it.", \
       .by_default = "none", .child = &decorations_mapping)                                                             \
-    X(CYAML_FIELD_SEQUENCE("outputs", CYAML_FLAG_POINTER, scene_file_image, outputs, &output, 1, 16),                  \
-      .help = "Files that the image is written to. No two files of a scene may have the same name.",                   \
-      .child = &output_mapping)
+    X(CYAML_FIELD_SEQUENCE("outputs", POINTER, scene_file_image, outputs, &output, 1, 16),                             \
+      .help = "Files that the image is written to. No two files of a scene may have the same name. An image without "  \
+              "outputs is drawn where the code keeps pictures in memory (`insitu_keep_pictures`), and else not, of "   \
+              "which a warning tells.",                                                                                \
+      .by_default = "none", .child = &output_mapping)
 DEFINE_MAPPING(image, "images", IMAGE_KEYS);
 
 static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_image, image_fields)};

@@ -190,8 +190,8 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help = "Colours of the values in turn, sRGB; the last serves all values that are left. Not with `colour_by`.",  \
       .by_default = "colours that differ, from a fixed cycle", .low = 0, .high = 1)                                    \
     X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_isosurface, colour_by, colour_by_fields),              \
-      .help = "Colour the surfaces by a field. They are grey, with a warning, on meshes of the layer that do not "     \
-              "have it, and where it is not a number.",                                                                \
+      .help = "Colour the surfaces by a field. They are grey, or of the colour `nan`, with a warning, on meshes of "   \
+              "the layer that do not have it, and where it is not a number.",                                          \
       .by_default = "by `colours`", .child = &colour_by_mapping)                                                       \
     X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_isosurface, opacity),                                      \
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
@@ -242,7 +242,7 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
               "plane. A plane that lies in faces of cells is drawn once, by the cells that its normal points away "    \
               "from; so that one on the border of the data is seen too, it is taken into them where it lies within a " \
               "millionth of half the diagonal of their bounds from it.",                                               \
-      .by_default = "one at right angles to z, through the middle of the data", .child = &plane_mapping)                                                                                         \
+      .by_default = "one at right angles to z, through the middle of the data", .child = &plane_mapping)               \
     COLOUR_MAP_KEYS(X, scene_file_slice)                                                                               \
     X(NUMBERS("nan", scene_file_slice, colours.nan, 3), .help = "Colour where the field is not a number, sRGB.",       \
       .by_default = "grey, `[0.6, 0.6, 0.6]`", .low = 0, .high = 1)                                                    \
@@ -278,8 +278,8 @@ DEFINE_MAPPING(threshold, "threshold", THRESHOLD_KEYS);
     X(NUMBERS("colour", scene_file_surface, colour, 3), .help = "Colour, sRGB. Not with `colour_by`.",                 \
       .by_default = "`[0.8, 0.8, 0.8]`", .low = 0, .high = 1)                                                          \
     X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_surface, colour_by, colour_by_fields),                 \
-      .help = "Colour the surface by a field. It is grey, with a warning, on meshes of the layer that do not have "    \
-              "it, and where it is not a number.",                                                                     \
+      .help = "Colour the surface by a field. It is grey, or of the colour `nan`, with a warning, on meshes of the "   \
+              "layer that do not have it, and where it is not a number.",                                              \
       .by_default = "by `colour`", .child = &colour_by_mapping)                                                        \
     X(CYAML_FIELD_MAPPING_PTR("edges", OPTIONAL, scene_file_surface, edges, edges_fields),                             \
       .help = "Lines along the edges of the cells' faces; `{}` takes all its defaults. They fade where faces are "     \
