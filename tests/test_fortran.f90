@@ -463,6 +463,16 @@ contains
         call refused(session, 'vertex_order is 7')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_TET)
         call refused(session, 'another first extent than cells')
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=77)
+        call refused(session, 'unknown cell_type 77')
+        call session%set_mesh('m'//char(0)//'n', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+        call refused(session, 'a name holds a character 0')
+        call session%set_field('m', char(0)//'p', insitu_borrow(pressure), status)
+        call refused(session, 'a name holds a character 0')
+        call session%set_field('m'//char(0), 'p', insitu_borrow(pressure), status)
+        call refused(session, 'a name holds a character 0')
+        call session%remove_mesh('m'//char(0), status)
+        call refused(session, 'a name holds a character 0')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX, &
             ghosts=insitu_borrow(ghosts(2:)))
         call refused(session, 'ghosts are not as many')
@@ -509,5 +519,11 @@ contains
         call session%remove_mesh('m', status)
         call expect(status == INSITU_OK, session%error())
         call session%destroy(status)
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+        call refused(session, 'the session is not open')
+        call session%step(1, 0.0_real64, status)
+        call refused(session, 'the session is not open')
+        call session%destroy(status)
+        call expect(status == INSITU_OK .and. session%error() == '', 'a closed session may be closed again')
     end subroutine errors_are_told
 end program test_fortran

@@ -114,6 +114,14 @@ def what_cannot_be_borrowed_is_refused():
             raises(kind, words, s.set_mesh, "m", **{**mesh, **changed})
         s.set_mesh("m", **mesh)
         raises(TypeError, "MaskedArray", s.set_field, "m", "f", numpy.ma.masked_array(f))
+        for name in ("f\0g", "\0"):
+            raises(ValueError, "holds a character 0", s.set_field, "m", name, f)
+            raises(ValueError, "holds a character 0", s.set_field, name, "f", f)
+            raises(ValueError, "holds a character 0", s.set_mesh, name, **mesh)
+            raises(ValueError, "holds a character 0", s.remove_mesh, name)
+        for cycle in (2**64 + 5, 2**63, -2**63 - 1):
+            raises(ValueError, f"cycle: is {cycle}, expected a whole number of 64 bits", s.step, cycle, 0.0)
+        raises(TypeError, "", s.step, 0.5, 0.0)
         raises(insitu.Error, "", s.set_field, "m", "f", f[:-1])
         raises(insitu.Error, "rank", s.step, 0, 0.0)
         s.set_field("m", "f", f)
@@ -317,6 +325,8 @@ def callables_are_asked_in_steps_that_need_them():
         error = raises(insitu.Error, "its fill returned", s.step, 6, 0.0)
         own = isinstance(error.__cause__, ZeroDivisionError)
         everywhere(own == (comm.rank == comm.size - 1) and error.on_all_ranks, "the cause is told where it is")
+        told = f"rank {comm.size - 1}: ZeroDivisionError: division by zero"
+        everywhere(own or str(error.__cause__) == told, f"and elsewhere: {error.__cause__}")
         for i, (name, call) in enumerate([
                 ("set_mesh", lambda: s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)),
                 ("set_mesh", lambda: s.remove_mesh("m")), ("set_field", lambda: s.set_field("m", "f", f.copy())),

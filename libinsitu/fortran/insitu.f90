@@ -532,6 +532,17 @@ contains
         if (face_lists%lists%columns /= face_lists%sizes%columns) out = 'the lists of faces are not as many as their sizes'
     end function find_fault
 
+    ! Describes a name that C would take as a shorter one; '' if there is none.
+    function find_zero(name, mesh) result(out)
+        character(*), intent(in) :: name
+        character(*), intent(in), optional :: mesh
+        character(:), allocatable :: out
+        out = ''
+        if (index(name, c_null_char) > 0) out = 'a name holds a character 0'
+        if (.not. present(mesh)) return
+        if (index(mesh, c_null_char) > 0) out = 'a name holds a character 0'
+    end function find_zero
+
     ! Tells whether an argument is faulty: then its fault is the session's message. Else the last message stays.
     logical function is_refused(self, fault)
         class(insitu_session), intent(inout) :: self
@@ -546,7 +557,9 @@ contains
         integer(c_int), intent(in) :: of_c
         integer, intent(out) :: status
         status = of_c
-        if (status /= INSITU_OK) self%own_error = ''
+        if (status == INSITU_OK) return
+        self%own_error = ''
+        if (.not. c_associated(self%handle)) self%own_error = 'the session is not open'
     end subroutine take_status
 
     subroutine take_lists(mesh, face_lists, nothing)
@@ -595,6 +608,7 @@ contains
         if (.not. (present(offsets) .or. present(cell_types))) mesh%connectivity_row = row_of(connectivity)
         gap = max(0_c_int64_t, mesh%connectivity_row - connectivity%rows)
         fault = find_fault(points, connectivity, mesh%connectivity_row, given(1:5), face_lists)
+        if (len(fault) == 0) fault = find_zero(name)
         status = INSITU_ERROR_ARGUMENT
         if (is_refused(self, fault)) return
         mesh%vertex_count = points(1)%columns
@@ -713,6 +727,7 @@ contains
         if (present(vertex_ids)) given(4) = vertex_ids
         fault = find_fault(points, owner, 0_c_int64_t, given)
         if (len(fault) == 0) fault = find_face_length(points(1)%columns, mesh%cell_count, given(3:4))
+        if (len(fault) == 0) fault = find_zero(name)
         status = INSITU_ERROR_ARGUMENT
         if (is_refused(self, fault)) return
         mesh%vertex_count = points(1)%columns
@@ -751,7 +766,7 @@ contains
         logical :: is_given(5)
         is_given = given%columns > 0
         out = ''
-        if (.not. any(is_given(1:2)) .and. rows > 1 .and. rows /= corners) then
+        if (.not. any(is_given(1:2)) .and. corners > 0 .and. rows > 1 .and. rows /= corners) then
             out = 'connectivity has another first extent than cells of its type have vertices'
         else if (is_given(2) .and. given(2)%columns /= cells + 1) then
             out = 'offsets are not one more than the cells'
@@ -762,6 +777,7 @@ contains
         end if
     end function find_length
 
+    ! Vertices of a cell; 0: cells of the type have no fixed number, or there is no such type.
     pure integer function corners_of(cell_type)
         integer(c_int), intent(in) :: cell_type
         select case (cell_type)
@@ -771,7 +787,7 @@ contains
         case (INSITU_PYRAMID); corners_of = 5
         case (INSITU_TRIANGLE); corners_of = 3
         case (INSITU_QUAD); corners_of = 4
-        case default; corners_of = 1
+        case default; corners_of = 0
         end select
     end function corners_of
 
@@ -814,6 +830,8 @@ contains
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         integer, intent(out) :: status
+        status = INSITU_ERROR_ARGUMENT
+        if (is_refused(self, find_zero(name))) return
         call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_null_ptr), status)
     end subroutine remove_mesh
 
@@ -847,6 +865,8 @@ contains
         field%component_stride = values%row_stride
         field%values = as_c(values, nothing)
         field%values%stride = values%stride
+        status = INSITU_ERROR_ARGUMENT
+        if (is_refused(self, find_zero(name, mesh))) return
         fault = ''
         if (present(index)) then
             field%index = as_c(index, nothing)
@@ -970,6 +990,8 @@ contains
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(fill_record), pointer :: record
         type(c_field) :: field
+        status = INSITU_ERROR_ARGUMENT
+        if (is_refused(self, find_zero(name, mesh))) return
         c_name = as_c_text(name)
         record => record_of(self, mesh, name)
         call c_field_defaults(field)
@@ -1017,7 +1039,7 @@ contains
         real(real64), intent(in) :: time
         integer, intent(out) :: status
         self%own_error = ''
-        status = c_step(self%handle, int(cycle, c_int64_t), real(time, c_double))
+        call take_status(self, c_step(self%handle, int(cycle, c_int64_t), real(time, c_double)), status)
     end subroutine step
 
     ! The report of the last step. All zero before the first.

@@ -12,7 +12,9 @@ closed. Errors are exceptions. insitu.h says more of each argument; docs/python.
 
 import collections
 import ctypes
+import operator
 import os
+import re
 
 import numpy
 from mpi4py import MPI
@@ -198,6 +200,14 @@ def _check(status, session, on_all_ranks):
         raise Error(name, message or name, on_all_ranks)
 
 
+def _encoded(what, text):
+    """A text of C's, which ends at its first character 0."""
+    encoded = os.fsencode(text)
+    if b"\0" in encoded:
+        raise ValueError(f"{what}: {text!r} holds a character 0, expected none")
+    return encoded
+
+
 def _view(what, given, dimensions):
     """The caller's array, or a view of its memory. Lists and the like would be copied: they are refused."""
     is_array = isinstance(given, numpy.ndarray) or hasattr(given, "__array_interface__")
@@ -353,10 +363,11 @@ class Session:
         self._retired = []  # borrowed before it was set again: until a step has returned
         self._made = []  # by callables: until the step has returned
         self._raised = []  # by callables, in this step
+        self._comm = comm
         self._running = []  # the callable that runs: what the step borrows stays then, and calls are refused
         create = _library.insitu_create if scene_text is None else _library.insitu_create_from_text
         text = scene_text if scene_text is not None else scene
-        text = os.fsencode(text) if text is not None else None
+        text = _encoded("scene", text) if text is not None else None
         handle = _MPI_Comm.from_address(MPI._addressof(comm))
         _check(create(handle, text, ctypes.byref(self._session)), None, True)
 
@@ -406,7 +417,7 @@ class Session:
 
     def remove_mesh(self, name):
         """Take this rank's part of a mesh away, and its fields. Local."""
-        _check(_library.insitu_set_mesh(self._open(), name.encode(), None), self._session, False)
+        _check(_library.insitu_set_mesh(self._open(), _encoded("name", name), None), self._session, False)
         self._retired.append(self._held.pop(name, None))
 
     def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
@@ -420,7 +431,7 @@ class Session:
         all ranks in the same order. Local."""
         field, held, borrowed = _Field(), [], _Array()
         _library.insitu_field_defaults(ctypes.byref(field))
-        field.name, field.centring, field.changed = name.encode(), centring, changed
+        field.name, field.centring, field.changed = _encoded("name", name), centring, changed
         if index is not None:
             borrowed, _, corner_row, array = self._index(mesh, index, centring, corner_row)
             held.append(array)
@@ -440,6 +451,8 @@ class Session:
 
     def step(self, cycle, time):
         """Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable."""
+        if not -2**63 <= operator.index(cycle) < 2**63:
+            raise ValueError(f"cycle: is {cycle}, expected a whole number of 64 bits")
         status = _library.insitu_step(self._open(), cycle, time)
         self._refuse_if_running()
         self._retired.clear()
@@ -449,7 +462,8 @@ class Session:
         try:
             _check(status, self._session, True)
         except Error as error:
-            raise error from raised
+            elsewhere = self._raised_elsewhere(str(error), raised)
+            raise error from raised or elsewhere
 
     @property
     def report(self):
@@ -492,6 +506,14 @@ class Session:
         if error is None or getattr(error, "on_all_ranks", False):
             self.close()
 
+    def _raised_elsewhere(self, message, raised):
+        """What a callable raised on the rank that the message names, which all ranks have."""
+        named = re.match(r"rank (\d+): .*: its fill (returned 8 |called insitu_)", message, re.DOTALL)
+        if not named:
+            return None
+        words = self._comm.bcast(f"{type(raised).__name__}: {raised}" if raised else None, int(named[1]))
+        return RuntimeError(f"rank {named[1]}: {words}") if words else None
+
     def _open(self):
         if not self._session:
             raise ValueError("the session is closed")
@@ -504,10 +526,11 @@ class Session:
 
     def _hand_over(self, call, mesh, description, key, arrays):
         """Those borrowed before are held until a step has returned, or with these if the call is refused."""
+        mesh_name = _encoded("mesh", mesh)
         fields = self._held.setdefault(mesh, {})
         before = fields.get(key, [])
         fields[key] = before + arrays
-        _check(call(self._open(), mesh.encode(), ctypes.byref(description)), self._session, False)
+        _check(call(self._open(), mesh_name, ctypes.byref(description)), self._session, False)
         self._retired.append(before)
         fields[key] = arrays
 
