@@ -122,7 +122,8 @@ static void tables_have_a_line_a_picture(void **state)
     input_free(&in);
 }
 
-/* An image without an orbit or a sweep has nothing in their columns; names that hold commas are in quotes. */
+/* An image without an orbit or a sweep has nothing in their columns; names that hold commas are in quotes, and
+ * one that a spreadsheet would take for a formula is no longer one. */
 static void tables_of_several_images_have_all_columns(void **state)
 {
     (void)state;
@@ -132,13 +133,15 @@ static void tables_of_several_images_have_all_columns(void **state)
     if (own_rank == 0) unlink("two.cdb/data.csv");
     run_steps("images:\n" IMAGE("'x, \"y\"'", "    sweep: {fields: [f, g]}\n", SLICE, "{cinema: two.cdb}")
                   IMAGE("z", "    camera: {orbit: {views: 1, start: 0.1}}\n", SURFACE,
-                        "{cinema: two.cdb, path: \"{cycle}/{name}.png\"}"),
+                        "{cinema: two.cdb, path: \"{cycle}/{name}.png\"}")
+                      IMAGE("'=cmd'", "", SURFACE, "{cinema: two.cdb}"),
               &in, 3, 4);
     read_file("two.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "cycle,time,image,phi,theta,field,FILE\n"
                                              "3,1.5,\"x, \"\"y\"\"\",,,f,\"x, \"\"y\"\"_000003_f.png\"\n"
                                              "3,1.5,\"x, \"\"y\"\"\",,,g,\"x, \"\"y\"\"_000003_g.png\"\n"
-                                             "3,1.5,z,0.1,30,,3/z.png\n") == 0);
+                                             "3,1.5,z,0.1,30,,3/z.png\n"
+                                             "3,1.5,'=cmd,,,,./=cmd_000003.png\n") == 0);
     read_file("two.cdb/data.js", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "\n\"3,1.5,\\x22x, \\x22\\x22y\\x22\\x22\\x22,,,f,\\x22x, ") != NULL);
     input_free(&in);

@@ -67,11 +67,13 @@ static void add_number(table_line *line, double number)
     add_bytes(line, text, (size_t)length);
 }
 
-/* Adds a text, in quotes where it has a character that separates fields (RFC 4180). */
-static void add_text(table_line *line, const char *text, char end)
+/* Adds a text, in quotes where it has a character that separates fields (RFC 4180), and after a shield where a
+ * spreadsheet would take it for a formula. */
+static void add_text(table_line *line, const char *shield, const char *text, char end)
 {
-    const bool is_quoted = strpbrk(text, ",\"") != NULL;
+    const bool is_quoted = strpbrk(text, ",\"") != NULL, is_formula = *text && strchr("=+-@", *text);
     if (is_quoted) add_bytes(line, "\"", 1);
+    if (is_formula) add_bytes(line, shield, strlen(shield));
     for (; *text; text++) add_bytes(line, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
     if (is_quoted) add_bytes(line, "\"", 1);
     add_bytes(line, &end, 1);
@@ -103,7 +105,7 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
     const int length = snprintf(cycle, sizeof cycle, "%lld,", moment->cycle);
     add_bytes(line, cycle, (size_t)length);
     add_number(line, moment->time);
-    if (database->has_images) add_text(line, image->name, ',');
+    if (database->has_images) add_text(line, "'", image->name, ',');
     for (int i = 0; i < 2 && database->has_orbits; i++) {
         if (image->camera.orbit.view_count)
             add_number(line, i ? image->camera.theta : image->camera.phi);
@@ -112,8 +114,8 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
     }
     if (database->has_isovalues && image->has_isovalue) add_number(line, image->isovalue);
     if (database->has_isovalues && !image->has_isovalue) add_nothing(line);
-    if (database->has_fields) add_text(line, image->swept_field ? image->swept_field : "", ',');
-    add_text(line, file, '\n');
+    if (database->has_fields) add_text(line, "'", image->swept_field ? image->swept_field : "", ',');
+    add_text(line, "./", file, '\n');
 }
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
