@@ -93,7 +93,7 @@ static int run(void)
         cmocka_unit_test(ranks_of_several_instruction_sets_draw_what_the_lowest_draws),
     };
     static const char *const sets[] = {"plain", "none", "sse4.2"}; /* none: the best is used, and told on all ranks */
-    setenv("INSITU_ISA", sets[own_rank % 3], 1); /* before the library first looks */
+    setenv("INSITU_ISA", sets[own_rank % 3], 1);                   /* before the library first looks */
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

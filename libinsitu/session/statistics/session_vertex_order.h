@@ -8,7 +8,7 @@
 
 /* Warn of meshes most of whose cells, over all ranks, have no volume, are left-handed, or cross themselves.
  * Collective. */
-insitu_status session_check_vertex_order(const session_meshes *meshes, session_catalogue *catalogue,
-                                         MPI_Comm comm, session_report *report, base_error *error);
+insitu_status session_check_vertex_order(const session_meshes *meshes, session_catalogue *catalogue, MPI_Comm comm,
+                                         session_report *report, base_error *error);
 
 #endif
