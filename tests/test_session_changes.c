@@ -174,6 +174,35 @@ static void values_elsewhere_are_drawn(void **context)
     free(values);
 }
 
+static void turn_values(void)
+{
+    for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] = 0.5 - input.part.values[v];
+}
+
+/* Values that change in place, and are said not to have or are not set again, are drawn as they are, with a warning. */
+static void values_that_change_without_a_word_are_told(void **context)
+{
+    (void)context;
+    static const char words[] = "mesh \"m\": field \"f\" has other values than in the last picture";
+    for (int is_set = 0; is_set < 2; is_set++) {
+        insitu_session *session = open_and_draw(), *fresh = open_session(MPI_COMM_WORLD, scene);
+        turn_values();
+        insitu_field unchanged = input.field;
+        unchanged.changed = INSITU_CHANGED_NOTHING;
+        everywhere(!is_set || insitu_set_field(session, "m", &unchanged) == INSITU_OK);
+        next_picture_is(session, &input, fresh);
+        everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
+        step_is_good(session, 2);
+        everywhere(!*insitu_last_report(session)->warnings);
+        turn_values();
+        everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
+        next_picture_is(session, &input, fresh);
+        everywhere(!*insitu_last_report(session)->warnings);
+        insitu_destroy(&session);
+        insitu_destroy(&fresh);
+    }
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -181,6 +210,7 @@ static int run(void)
         cmocka_unit_test(vertices_elsewhere_are_drawn_there),
         cmocka_unit_test(cells_elsewhere_are_drawn_with_their_fields),
         cmocka_unit_test(values_elsewhere_are_drawn),
+        cmocka_unit_test(values_that_change_without_a_word_are_told),
     };
     create_input();
     scene = write_scene(scene_text);

@@ -58,6 +58,7 @@ typedef enum session_warning_kind {
     WARNING_GREY,        /* a surface does not have the field that colours it */
     WARNING_OVERLAP,     /* cells overlap in some pixels */
     WARNING_WORDS,       /* words of a picture are not drawn as they are written */
+    WARNING_UNSAID,      /* values have changed though they were said not to have */
     WARNING_OUTPUTS,     /* an image goes nowhere */
     WARNING_WRITER,      /* rank 0 has no thread to write pictures */
     WARNING_THREADS,     /* fewer threads than the scene or OpenMP asks for */

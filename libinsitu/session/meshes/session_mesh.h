@@ -68,6 +68,7 @@ typedef struct session_scalar {
     bool is_suspect;       /* the values were set anew: they may have changed */
     bool has_checksum;
     uint64_t checksum;
+    uint64_t sample;     /* a checksum of a few of the values */
     int64_t version;     /* of the values: one more after each change that checksums have seen */
     bool has_own_ranges; /* the tree nodes' own, else pairs */
     float *pairs;        /* NULL until computed */

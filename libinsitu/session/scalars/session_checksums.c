@@ -81,10 +81,47 @@ static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scal
     return field.own ? sum_field(sum, mesh, field.own, threads) : sum;
 }
 
+static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_field *field)
+{
+    enum { SAMPLES = 64 };
+    const int64_t count = field->is_cell_centred ? mesh->given.cell_count : session_vertex_count(mesh);
+    const int64_t step = count / SAMPLES + 1;
+    for (int64_t i = 0; i < count && field->values.data; i += step) {
+        const double value = grid_field_value(field, i);
+        uint64_t bits;
+        memcpy(&bits, &value, sizeof bits);
+        sum = mix(sum, bits);
+    }
+    return sum;
+}
+
+static uint64_t sample_of(const session_mesh *mesh, const session_scalar *scalar)
+{
+    const grid_field field = session_scalar_field(mesh, scalar);
+    const uint64_t sum = sample_field(1, mesh, &field);
+    return field.own ? sample_field(sum, mesh, field.own) : sum;
+}
+
+/* Trees have the ranges of the old values while rays read the new ones. */
+static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, session_report *report)
+{
+    if (session_is_distance(scalar)) return;
+    const char *field = session_scalar_name(mesh, scalar);
+    const session_warning warning = {WARNING_UNSAID, field, mesh->name, scalar->component};
+    const bool has_changed = !scalar->is_suspect && scalar->has_checksum && scalar->sample != sample_of(mesh, scalar);
+    session_warn_own(
+        report, &warning, has_changed,
+        "mesh \"%s\": field \"%s\" has other values than in the last picture, but was not set again, or with "
+        "INSITU_CHANGED_NOTHING: set it with INSITU_CHANGED_VALUES, as such changes may be missed",
+        mesh->name, field);
+    scalar->is_suspect = scalar->is_suspect || has_changed;
+}
+
 static void compare(const session_mesh *mesh, session_scalar *scalar, int threads, session_report *report)
 {
     const uint64_t checksum = checksum_of(mesh, scalar, threads);
     scalar->is_suspect = false;
+    scalar->sample = sample_of(mesh, scalar);
     if (scalar->has_checksum && scalar->checksum == checksum) {
         session_text_add(&report->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
                          mesh->name, session_scalar_name(mesh, scalar));
@@ -103,6 +140,7 @@ void session_compare_checksums(const session_meshes *meshes, int threads, sessio
         session_mesh *mesh = meshes->items[i];
         for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
             session_scalar *scalar = &mesh->scalars[k];
+            if (scalar->is_used) warn_of_change(mesh, scalar, report);
             if (scalar->is_used && scalar->is_suspect) compare(mesh, scalar, threads, report);
         }
     }
