@@ -16,7 +16,9 @@ install(TARGETS insitu insitu_static insitu_headers EXPORT insituTargets
 install(EXPORT insituTargets NAMESPACE insitu:: DESTINATION ${insitu_package_dir} COMPONENT dev)
 
 # Loaded at run time, from beside libinsitu; nobody links it.
-install(TARGETS insitu_image LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT image)
+if(TARGET insitu_image)
+  install(TARGETS insitu_image LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT image)
+endif()
 
 # Fortran's is compiled with the user's own code: modules are read by the compiler that wrote them alone.
 install(FILES ${PROJECT_SOURCE_DIR}/libinsitu/fortran/insitu.f90 DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/insitu

@@ -11,6 +11,13 @@ add_test(NAME outside_project_builds_and_runs
 set_tests_properties(outside_project_builds_and_runs PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};ASAN_OPTIONS=detect_leaks=0" TIMEOUT 180)
 
+# Without OpenImageIO the library is configured, in the long tests built, and draws into memory.
+add_test(NAME library_without_image COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/without_image.sh ${PROJECT_SOURCE_DIR}
+  ${CMAKE_CURRENT_BINARY_DIR}/without_image)
+insitu_add_long_test(library_without_image_draws ${CMAKE_CURRENT_SOURCE_DIR}/without_image.sh ${PROJECT_SOURCE_DIR}
+  ${CMAKE_CURRENT_BINARY_DIR}/without_image_built build)
+set_tests_properties(library_without_image_draws PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+
 # The library exports the functions that the headers declare, and nothing else.
 set(insitu_headers_of ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu)
 add_test(NAME exported_symbols COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu> libinsitu.so.0
