@@ -147,6 +147,8 @@ static void what_waits_is_bounded(void **state)
         const insitu_report *report = insitu_last_report(session);
         everywhere(report->pictures_waiting <= 4 && report->bytes_pictures <= (128 + 64) * (int64_t)MIB);
         everywhere(cycle != 3 || report->pictures_waiting == (own_rank ? 0 : 4));
+        everywhere(cycle != 5 || strstr(report->warnings, " s for earlier pictures to be written") != NULL);
+        everywhere(cycle > 4 || !*report->warnings);
     }
     everywhere(insitu_destroy(&session) == INSITU_OK);
     everywhere(own_rank ? caught_count == 0 : caught_count == 8);

@@ -61,12 +61,26 @@ static bool has_edges_alone(const scene_image *image)
     return image->antialias > 1 && image->volume_count == 0;
 }
 
+/* A disk that is slower than the run holds it up. */
+static void warn_of_wait(session_report *report, double seconds)
+{
+    static const double noticed = 0.1;
+    static const session_warning warning = {WARNING_WRITER, NULL, NULL, 1};
+    session_warn_own(
+        report, &warning, seconds > noticed,
+        "the last step waited %.2g s for earlier pictures to be written: the disk, or the compression of so many "
+        "pixels, is slower than the run; draw less often, or write elsewhere",
+        seconds);
+}
+
 static void reserve_frame(const session_drawing *d, size_t bytes, canvas *c)
 {
     const double start = MPI_Wtime();
     c->memory = session_writer_reserve(d->writer, bytes);
     c->frame.rgba = c->memory.pixels;
-    d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start); /* waiting for room */
+    const double seconds = MPI_Wtime() - start; /* waiting for room */
+    d->report->numbers.write_ms += 1e3 * seconds;
+    warn_of_wait(d->report, seconds);
 }
 
 static insitu_status canvas_create(const session_drawing *d, const scene_image *image, canvas *out, base_error *error)
