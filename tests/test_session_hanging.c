@@ -1,6 +1,7 @@
-/* Cell values on hexes that are refined here and there, covered ones given as ghosts: an isosurface goes on over
- * hanging nodes. The distance from the middle has a sphere for an isosurface, by closed form; a ray through a slit
- * would show its back, or nothing. The same picture to the bit on any ranks. */
+/* Cell values on cubes that are refined here and there, covered ones given as ghosts: an isosurface goes on over
+ * hanging nodes, whether all cells are one mesh or each level is a mesh of its own. The distance from the middle has a
+ * sphere for an isosurface, by closed form; a ray through a slit would show its back, or nothing. The same picture to
+ * the bit on any ranks, in either form. And what makes meshes one, and what does not. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,11 +23,14 @@ typedef enum amr_shape { PLAIN, TURNED, BENT, SHAPES } amr_shape;
 typedef struct amr {
     int cuts; /* a cell into so many along each axis */
     amr_shape shape;
-    int rank, ranks; /* whose cells are given */
+    insitu_cell_type type; /* hexes, or what a cube is cut into */
+    bool is_by_level;      /* each level is a mesh */
+    int rank, ranks;       /* whose cells are given */
 } amr;
 
 /* Arrays of one mesh on one rank. */
 typedef struct part {
+    insitu_cell_type type;
     int64_t vertex_count, cell_count;
     int64_t *vertices; /* of the finest lattice; -1: none yet */
     double *coordinates, *values;
@@ -34,10 +38,10 @@ typedef struct part {
     unsigned char *ghosts;
 } part;
 
-static void part_create(part *p)
+static void part_create(part *p, insitu_cell_type type)
 {
     const size_t most = 200000;
-    *p = (part){.vertices = malloc((size_t)LINE * LINE * LINE * sizeof(int64_t))};
+    *p = (part){.type = type, .vertices = malloc((size_t)LINE * LINE * LINE * sizeof(int64_t))};
     p->coordinates = malloc(3 * most * sizeof(double));
     p->values = malloc(most * sizeof(double));
     p->connectivity = malloc(8 * most * sizeof(int64_t));
@@ -69,30 +73,53 @@ static void place_of(const amr *a, const double at[3], double out[3])
     }
 }
 
-static void add_cell(const amr *a, part *p, const int at[3], int width, bool is_ghost)
+/* Cells that cubes are cut into, by corners of which each bit is a coordinate. The diagonals of a cube's squares are
+ * those of the smaller cubes' squares on them. */
+typedef struct cutting {
+    int cells, corners;
+    int places[6][8];
+} cutting;
+
+static const cutting *cutting_of(insitu_cell_type type)
 {
-    double middle[3] = {0, 0, 0};
-    for (int corner = 0; corner < 8; corner++) {
-        static const int steps[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
-                                        {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-        int64_t index = 0;
-        double flat[3], place[3];
-        for (int axis = 2; axis >= 0; axis--) {
-            const int along = at[axis] + steps[corner][axis] * width;
-            index = index * LINE + along;
-            flat[axis] = 2.0 * along / (SIDE * a->cuts * a->cuts) - 1;
-        }
-        place_of(a, flat, place);
-        for (int axis = 0; axis < 3; axis++) middle[axis] += place[axis] / 8;
-        if (p->vertices[index] < 0) {
-            memcpy(p->coordinates + 3 * p->vertex_count, place, sizeof place);
-            p->vertices[index] = p->vertex_count++;
-        }
-        p->connectivity[8 * p->cell_count + corner] = p->vertices[index];
+    static const cutting tets = {
+        6, 4, {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}}};
+    static const cutting wedges = {2, 6, {{0, 1, 3, 4, 5, 7}, {0, 3, 2, 4, 7, 6}}};
+    static const cutting hexes = {1, 8, {{0, 1, 3, 2, 4, 5, 7, 6}}};
+    return type == INSITU_TET ? &tets : type == INSITU_WEDGE ? &wedges : &hexes;
+}
+
+/* Gets the number of the vertex at a place of the finest lattice. */
+static int64_t vertex_at(const amr *a, part *p, const int at[3])
+{
+    const int64_t index = at[0] + LINE * (at[1] + LINE * (int64_t)at[2]);
+    if (p->vertices[index] < 0) {
+        double flat[3];
+        for (int axis = 0; axis < 3; axis++) flat[axis] = 2.0 * at[axis] / (SIDE * a->cuts * a->cuts) - 1;
+        place_of(a, flat, p->coordinates + 3 * p->vertex_count);
+        p->vertices[index] = p->vertex_count++;
     }
-    p->values[p->cell_count] =
-        is_ghost ? -7 : sqrt(middle[0] * middle[0] + middle[1] * middle[1] + middle[2] * middle[2]);
-    p->ghosts[p->cell_count++] = is_ghost;
+    return p->vertices[index];
+}
+
+static void add_cube(const amr *a, part *p, const int at[3], int width, bool is_ghost)
+{
+    const cutting *cut = cutting_of(a->type);
+    for (int cell = 0; cell < cut->cells; cell++, p->cell_count++) {
+        double middle[3] = {0, 0, 0};
+        for (int i = 0; i < cut->corners; i++) {
+            const int corner = cut->places[cell][i];
+            const int64_t vertex =
+                vertex_at(a, p,
+                          (const int[]){at[0] + (corner & 1) * width, at[1] + (corner >> 1 & 1) * width,
+                                        at[2] + (corner >> 2) * width});
+            for (int axis = 0; axis < 3; axis++) middle[axis] += p->coordinates[3 * vertex + axis] / cut->corners;
+            p->connectivity[cut->corners * p->cell_count + i] = vertex;
+        }
+        p->values[p->cell_count] =
+            is_ghost ? -7 : sqrt(middle[0] * middle[0] + middle[1] * middle[1] + middle[2] * middle[2]);
+        p->ghosts[p->cell_count] = is_ghost;
+    }
 }
 
 /* Half of the cubes, in blocks, and of their parts those beside. */
@@ -104,38 +131,40 @@ static bool is_refined(const amr *a, int level, const int at[3], int width)
     return level == 1 && a->cuts == 2 && middle[0] + 0.4 * middle[1] > 0.6;
 }
 
-static void add_tree(const amr *a, part *p, int level, const int at[3], int width)
+static void add_tree(const amr *a, part *parts, int level, const int at[3], int width)
 {
     const bool is_cut = is_refined(a, level, at, width);
     const uint64_t name = (uint64_t)(at[0] + LINE * (at[1] + LINE * at[2])) * LEVELS + (uint64_t)level;
     const int owner = (int)(test_uniform(name, 8) * a->ranks);
-    if (owner == a->rank) add_cell(a, p, at, width, is_cut);
+    if (owner == a->rank) add_cube(a, &parts[a->is_by_level ? level : 0], at, width, is_cut);
     for (int i = 0; is_cut && i < a->cuts * a->cuts * a->cuts; i++) {
         const int w = width / a->cuts;
         const int within[3] = {at[0] + i % a->cuts * w, at[1] + i / a->cuts % a->cuts * w,
                                at[2] + i / (a->cuts * a->cuts) * w};
-        add_tree(a, p, level + 1, within, w);
+        add_tree(a, parts, level + 1, within, w);
     }
 }
 
-static void make_part(const amr *a, part *p)
+static void make_parts(const amr *a, part *parts)
 {
     const int width = a->cuts * a->cuts;
-    part_create(p);
+    for (int level = 0; level < LEVELS; level++) part_create(&parts[level], a->type);
     for (int i = 0; i < SIDE * SIDE * SIDE; i++)
-        add_tree(a, p, 0, (const int[]){i % SIDE * width, i / SIDE % SIDE * width, i / (SIDE * SIDE) * width}, width);
+        add_tree(a, parts, 0, (const int[]){i % SIDE * width, i / SIDE % SIDE * width, i / (SIDE * SIDE) * width},
+                 width);
 }
 
-static void set_part(insitu_session *session, const part *p)
+static void set_part(insitu_session *session, const char *name, const part *p)
 {
+    const int corners = cutting_of(p->type)->corners;
     insitu_mesh mesh;
     insitu_field field;
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = p->vertex_count;
     insitu_mesh_interleaved(&mesh, p->coordinates, INSITU_FLOAT64);
     mesh.cell_count = p->cell_count;
-    mesh.cell_type = INSITU_HEX;
-    mesh.connectivity_count = 8 * p->cell_count;
+    mesh.cell_type = p->type;
+    mesh.connectivity_count = corners * p->cell_count;
     mesh.connectivity = (insitu_array){p->connectivity, INSITU_INT64, 0};
     mesh.ghosts = (insitu_array){p->ghosts, INSITU_UINT8, 0};
     insitu_field_defaults(&field);
@@ -143,23 +172,29 @@ static void set_part(insitu_session *session, const part *p)
     field.centring = INSITU_CELL;
     field.count = p->cell_count;
     field.values = (insitu_array){p->values, INSITU_FLOAT64, 0};
-    assert_int_equal(insitu_set_mesh(session, "m", &mesh), INSITU_OK);
-    assert_int_equal(insitu_set_field(session, "m", &field), INSITU_OK);
+    assert_int_equal(insitu_set_mesh(session, name, &mesh), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, name, &field), INSITU_OK);
+}
+
+static caught_picture take_step(insitu_session *session)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    return take_caught();
 }
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const amr *a)
 {
-    part own;
+    static const char *const names[LEVELS] = {"m/0", "m/1", "m/2"};
+    part parts[LEVELS];
     insitu_session *session = open_session(comm, scene);
-    make_part(a, &own);
-    forget_pictures();
-    set_part(session, &own);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
-    const caught_picture picture = take_caught();
+    make_parts(a, parts);
+    for (int level = 0; level < (a->is_by_level ? LEVELS : 1); level++) set_part(session, names[level], &parts[level]);
+    const caught_picture picture = take_step(session);
     insitu_destroy(&session);
-    part_free(&own);
+    for (int level = 0; level < LEVELS; level++) part_free(&parts[level]);
     return picture;
 }
 
@@ -183,37 +218,183 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
-static void check(int cuts)
+static void check(int cuts, amr_shape shape, insitu_cell_type type)
 {
     const char *scene = write_scene(scene_text);
-    for (amr_shape shape = PLAIN; shape < SHAPES; shape++) {
-        const amr whole = {cuts, shape, 0, 1}, own = {cuts, shape, own_rank, rank_count};
-        caught_picture ours = draw(MPI_COMM_WORLD, scene, &own), alone = {0};
+    amr whole = {cuts, shape, type, false, 0, 1};
+    caught_picture alone = {0};
+    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole);
+    for (int by_level = 0; by_level < 2; by_level++) {
+        const amr own = {cuts, shape, type, by_level, own_rank, rank_count};
+        caught_picture ours = draw(MPI_COMM_WORLD, scene, &own);
         bool is_well = true;
         if (own_rank == 0) {
-            alone = draw(MPI_COMM_SELF, scene, &whole);
             const int slits = count_slits(&alone), parted = count_slits(&ours);
             is_well = slits == 0 && parted == 0 && are_same(&ours, &alone);
             if (!is_well)
-                fprintf(stderr, "%d to 1, shape %d: %d pixels torn, %d on ranks; %s\n", cuts, (int)shape, slits, parted,
+                fprintf(stderr, "%d to 1, shape %d, type %d%s: %d pixels torn, %d on ranks; %s\n", cuts, (int)shape,
+                        (int)type, by_level ? ", a mesh a level" : "", slits, parted,
                         are_same(&ours, &alone) ? "the same" : "another picture");
         }
         everywhere(is_well);
         free_caught(&ours);
-        free_caught(&alone);
     }
+    free_caught(&alone);
 }
 
 static void cell_values_go_on_over_hanging_nodes(void **state)
 {
     (void)state;
-    check(2);
-    check(4);
+    for (amr_shape shape = PLAIN; shape < SHAPES; shape++)
+        for (int cuts = 2; cuts <= 4; cuts += 2) check(cuts, shape, INSITU_HEX);
+}
+
+/* Triangles are flat, so that bent ones have their hanging vertices elsewhere. */
+static void cell_values_go_on_over_triangles(void **state)
+{
+    (void)state;
+    check(2, PLAIN, INSITU_TET);
+    check(4, TURNED, INSITU_TET);
+    check(2, TURNED, INSITU_WEDGE);
+    check(4, PLAIN, INSITU_WEDGE);
+}
+
+/* ---- what makes meshes one ------------------------------------------------------------------------------------- */
+
+/* A box of so many hexes along each axis, of which a rank has every so many-th. All values are value, but those of the
+ * least layer along z, if rest is another. */
+typedef struct box {
+    double lower[3], upper[3];
+    int counts[3];
+    double value, rest;
+} box;
+
+static void make_box(const box *b, int rank, int ranks, part *p)
+{
+    const int lines[3] = {b->counts[0] + 1, b->counts[1] + 1, b->counts[2] + 1};
+    part_create(p, INSITU_HEX);
+    for (int i = 0; i < lines[0] * lines[1] * lines[2]; i++, p->vertex_count++) {
+        const int at[3] = {i % lines[0], i / lines[0] % lines[1], i / lines[0] / lines[1]};
+        for (int axis = 0; axis < 3; axis++)
+            p->coordinates[3 * i + axis] =
+                b->lower[axis] + (b->upper[axis] - b->lower[axis]) * at[axis] / b->counts[axis];
+    }
+    for (int i = 0; i < b->counts[0] * b->counts[1] * b->counts[2]; i++) {
+        const int at[3] = {i % b->counts[0], i / b->counts[0] % b->counts[1], i / b->counts[0] / b->counts[1]};
+        if (i % ranks != rank) continue;
+        for (int corner = 0; corner < 8; corner++) {
+            const int bits = cutting_of(INSITU_HEX)->places[0][corner];
+            p->connectivity[8 * p->cell_count + corner] =
+                at[0] + (bits & 1) + lines[0] * (at[1] + (bits >> 1 & 1) + (int64_t)lines[1] * (at[2] + (bits >> 2)));
+        }
+        p->values[p->cell_count] = at[2] ? b->rest : b->value;
+        p->ghosts[p->cell_count++] = 0;
+    }
+}
+
+static int count_covered(const caught_picture *picture)
+{
+    int count = 0;
+    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) count += picture->rgba[4 * pixel + 3] > 0;
+    return count;
+}
+
+static caught_picture draw_boxes(const char *layers, const box *boxes, int count)
+{
+    static const char *const names[] = {"a", "b"};
+    char text[900];
+    snprintf(text, sizeof text, "%.*s%s    outputs: [{path: a.exr}]\n",
+             (int)(strstr(scene_text, "      - iso") - scene_text), scene_text, layers);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+    part parts[2];
+    for (int i = 0; i < count; i++) {
+        make_box(&boxes[i], own_rank, rank_count, &parts[i]);
+        set_part(session, names[i], &parts[i]);
+    }
+    const caught_picture picture = take_step(session);
+    insitu_destroy(&session);
+    for (int i = 0; i < count; i++) part_free(&parts[i]);
+    return picture;
+}
+
+/* Two materials, each of one value: where one layer shows both, the field rises from one to the other between them;
+ * where each has a layer of its own there is no value between. */
+static void a_layer_makes_meshes_one(void **state)
+{
+    static const box boxes[] = {{{-1, -1, -1}, {1, 1, 0}, {2, 2, 2}, 0, 0}, {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 1, 1}};
+    (void)state;
+    caught_picture one = draw_boxes("      - isosurface: {field: f, values: [0.25]}\n", boxes, 2);
+    caught_picture apart = draw_boxes("      - isosurface: {field: f, mesh: a, values: [0.25]}\n"
+                                      "      - isosurface: {field: f, mesh: b, values: [0.25]}\n",
+                                      boxes, 2);
+    caught_picture both = draw_boxes("      - isosurface: {field: f, mesh: [a, b], values: [0.25]}\n"
+                                     "      - isosurface: {field: f, mesh: b, values: [0.25]}\n",
+                                     boxes, 2);
+    everywhere(own_rank != 0 || count_covered(&one) == PIXELS);
+    everywhere(count_covered(&apart) == 0);
+    everywhere(own_rank != 0 || are_same(&one, &both));
+    free_caught(&one);
+    free_caught(&apart);
+    free_caught(&both);
+}
+
+/* A fine mesh that overlaps a coarse one along a wall: its vertices on the wall lie on the coarse cells' faces there,
+ * which look the same way, and do not hang on them. No two vertices are in one place. */
+static void vertices_on_a_common_wall_do_not_hang(void **state)
+{
+    static const box boxes[] = {{{-0.7, -0.7, 0}, {0.7, 0.7, 0.6}, {5, 5, 3}, 1, 0},
+                                {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 0, 0}};
+    (void)state;
+    caught_picture alone = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 1);
+    caught_picture both = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 2);
+    everywhere(own_rank != 0 || count_covered(&alone) > PIXELS / 3);
+    everywhere(own_rank != 0 || are_same(&alone, &both));
+    free_caught(&alone);
+    free_caught(&both);
+}
+
+/* Values of one mesh, and its cells on the last rank, come and go: the other's are those of a session that never knew
+ * another state. */
+static void means_follow_the_other_mesh(void **state)
+{
+    static const char layers[] = "      - isosurface: {field: f, values: [0.25]}\n";
+    static const box low = {{-1, -1, -1}, {1, 1, 0}, {2, 2, 2}, 0, 0}, high = {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 1, 1},
+                     higher = {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 2, 2};
+    const bool is_last = own_rank == rank_count - 1;
+    (void)state;
+    caught_picture first = draw_boxes(layers, (const box[]){low, high}, 2),
+                   second = draw_boxes(layers, (const box[]){low, higher}, 2), third = draw_boxes(layers, &low, 1);
+    char text[900];
+    snprintf(text, sizeof text, "%.*s%s    outputs: [{path: a.exr}]\n",
+             (int)(strstr(scene_text, "      - iso") - scene_text), scene_text, layers);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+    part a, b;
+    make_box(&low, own_rank, rank_count, &a);
+    make_box(&high, 0, 1, &b);
+    set_part(session, "a", &a);
+    if (is_last) set_part(session, "b", &b);
+    caught_picture at_first = take_step(session);
+    everywhere(own_rank != 0 || are_same(&first, &at_first));
+    for (int64_t i = 0; i < b.cell_count; i++) b.values[i] = 2;
+    if (is_last) set_part(session, "b", &b);
+    caught_picture then = take_step(session);
+    everywhere(own_rank != 0 || are_same(&second, &then));
+    if (is_last) assert_int_equal(insitu_set_mesh(session, "b", NULL), INSITU_OK);
+    caught_picture at_last = take_step(session);
+    everywhere(own_rank != 0 || are_same(&third, &at_last));
+    insitu_destroy(&session);
+    caught_picture *pictures[] = {&first, &second, &third, &at_first, &then, &at_last};
+    for (int i = 0; i < 6; i++) free_caught(pictures[i]);
+    part_free(&a);
+    part_free(&b);
 }
 
 static int run(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(cell_values_go_on_over_hanging_nodes)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cell_values_go_on_over_hanging_nodes), cmocka_unit_test(cell_values_go_on_over_triangles),
+        cmocka_unit_test(a_layer_makes_meshes_one), cmocka_unit_test(vertices_on_a_common_wall_do_not_hang),
+        cmocka_unit_test(means_follow_the_other_mesh)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

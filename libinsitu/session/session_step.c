@@ -17,6 +17,7 @@
 #include "session_events.h"
 #include "session_filled.h"
 #include "session_guard.h"
+#include "session_joints.h"
 #include "session_lines.h"
 #include "session_recentre.h"
 #include "session_smooth.h"
@@ -41,6 +42,7 @@ static void reload_scene(insitu_session *s)
     session_cinema_free(&s->cinema);
     session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
+    s->catalogue.are_joined = s->catalogue.are_parts_known = false;
     session_forget_warnings(&s->report);
     session_text_add(&s->report.warnings, "the scene file was edited: its images are drawn from this step on");
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
@@ -134,6 +136,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, refused, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
+    if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
     if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan)))

@@ -80,24 +80,45 @@ uint64_t session_names_hash(const session_meshes *meshes)
 
 /* ---- texts to a catalogue ------------------------------------------------------------------------------------ */
 
-void session_hanging_free(session_hanging *hanging)
+void session_hanging_free(session_hanging *hanging, int count, bool with_borders)
 {
+    session_border *borders = hanging->borders;
     base_free(hanging->vertices);
     base_free(hanging->sent_counts);
     base_free(hanging->sent_groups);
-    *hanging = (session_hanging){0};
+    for (int i = 0; i < count && borders && with_borders; i++) {
+        base_free(borders[i].faces);
+        base_free(borders[i].vertices);
+    }
+    if (with_borders) base_free(borders);
+    *hanging = (session_hanging){.borders = with_borders ? NULL : borders};
 }
 
-static void drop_homes(session_catalogue_mesh *mesh)
+void session_drop_joints(session_catalogue *catalogue)
 {
-    session_homes_free(&mesh->homes);
-    if (mesh->hanging) session_hanging_free(mesh->hanging);
-    base_free(mesh->hanging);
-    mesh->hanging = NULL;
+    for (int i = 0; i < catalogue->joint_count; i++) {
+        session_joint *joint = catalogue->joints[i];
+        session_hanging_free(&joint->hanging, joint->count, true);
+        session_homes_free(&joint->own_homes);
+        base_free(joint->meshes);
+        base_free(joint);
+    }
+    base_free(catalogue->joints);
+    catalogue->joints = NULL;
+    catalogue->joint_count = 0;
+    catalogue->are_joined = false;
+}
+
+session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t name)
+{
+    for (int i = 0; i < catalogue->joint_count; i++)
+        if (catalogue->joints[i]->name == name) return catalogue->joints[i];
+    return NULL;
 }
 
 void session_catalogue_free(session_catalogue *catalogue)
 {
+    session_drop_joints(catalogue);
     for (int i = 0; i < catalogue->mesh_count; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         for (int f = 0; f < mesh->field_count; f++) {
@@ -107,7 +128,7 @@ void session_catalogue_free(session_catalogue *catalogue)
         base_free(mesh->fields);
         base_free(mesh->fault);
         base_free(mesh->name);
-        drop_homes(mesh);
+        session_homes_free(&mesh->homes);
     }
     base_free(catalogue->meshes);
     base_free(catalogue->fault);
@@ -381,22 +402,80 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
+/* 0 where this rank has no part. */
+static uint64_t stamp_of(int rank, int64_t stamp)
+{
+    uint64_t hash = SESSION_HASH_BEGIN;
+    session_hash_bytes(&hash, &rank, sizeof rank);
+    session_hash_bytes(&hash, &stamp, sizeof stamp);
+    return stamp ? hash : 0;
+}
+
+/* Adds up the ranks' hashes of when each mesh was last new. */
+static insitu_status update_parts(session_catalogue *catalogue, const session_meshes *meshes, const session_team *team,
+                                  base_error *error)
+{
+    const int count = catalogue->mesh_count;
+    uint64_t *sums = base_calloc((size_t)count * 2 + 1, sizeof *sums);
+    if (!sums) session_no_memory(error, count * 16LL, "hashes of meshes");
+    for (int i = 0; i < count && sums; i++) {
+        const session_mesh *mesh = session_find_mesh(meshes, catalogue->meshes[i].name);
+        if (!mesh || !mesh->is_given) continue;
+        sums[2 * i] = stamp_of(team->rank, mesh->cells_stamp);
+        sums[2 * i + 1] = stamp_of(team->rank, mesh->places_stamp);
+    }
+    insitu_status status = session_agree(team->comm, error);
+    if (!status)
+        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, 2 * count, MPI_UINT64_T, MPI_SUM, team->comm),
+                             "MPI_Allreduce");
+    for (int i = 0; i < count && !status; i++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[i];
+        if (mesh->places != (sums[2 * i + 1] | 1)) session_homes_free(&mesh->homes);
+        mesh->cells = sums[2 * i] | 1;
+        mesh->places = sums[2 * i + 1] | 1;
+    }
+    catalogue->are_parts_known = !status;
+    base_free(sums);
+    return status;
+}
+
+static insitu_status update_joint(session_joint *joint, const session_meshes *meshes, double half_diagonal,
+                                  const session_team *team, base_error *error)
+{
+    uint64_t places = SESSION_HASH_BEGIN;
+    for (int i = 0; i < joint->count; i++)
+        session_hash_bytes(&places, &joint->meshes[i]->places, sizeof joint->meshes[i]->places);
+    const bool is_known = (places | 1) == joint->places && joint->homes && joint->homes->is_known;
+    joint->places = places | 1;
+    joint->homes = joint->count == 1 ? &joint->meshes[0]->homes : &joint->own_homes;
+    if (is_known || joint->count == 1) return INSITU_OK;
+    const session_mesh **parts = base_calloc((size_t)joint->count, sizeof *parts);
+    if (!parts) session_no_memory(error, joint->count * (int64_t)sizeof *parts, "homes of meshes");
+    for (int i = 0; i < joint->count && parts; i++) parts[i] = session_find_mesh(meshes, joint->meshes[i]->name);
+    const insitu_status status =
+        session_homes_find(&joint->own_homes, parts, parts ? joint->count : 0, false, half_diagonal, team, error);
+    if (status) joint->places = 0;
+    base_free(parts);
+    return status;
+}
+
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error)
 {
-    for (int i = 0; i < catalogue->mesh_count; i++) {
+    insitu_status status = INSITU_OK;
+    if (!catalogue->are_parts_known) status = update_parts(catalogue, meshes, team, error);
+    for (int i = 0; i < catalogue->mesh_count && !status; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
-        if (mesh->homes.is_known) continue;
-        if (!mesh->hanging) mesh->hanging = base_calloc(1, sizeof *mesh->hanging);
-        if (!mesh->hanging) session_no_memory(error, (int64_t)sizeof *mesh->hanging, "hanging vertices");
-        const insitu_status status = session_homes_find(&mesh->homes, session_find_mesh(meshes, mesh->name),
-                                                        mesh->has_ids, half_diagonal, team, error);
-        if (status) return status;
+        const session_mesh *part = session_find_mesh(meshes, mesh->name);
+        if (!mesh->homes.is_known)
+            status = session_homes_find(&mesh->homes, &part, 1, mesh->has_ids, half_diagonal, team, error);
     }
-    return INSITU_OK;
+    for (int i = 0; i < catalogue->joint_count && !status; i++)
+        status = update_joint(catalogue->joints[i], meshes, half_diagonal, team, error);
+    return status;
 }
 
 void session_forget_homes(session_catalogue *catalogue)
 {
-    for (int i = 0; i < catalogue->mesh_count; i++) drop_homes(&catalogue->meshes[i]);
+    catalogue->are_parts_known = false;
 }

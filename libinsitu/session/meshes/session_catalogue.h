@@ -18,7 +18,7 @@ typedef struct session_catalogue_field {
     base_error *fault; /* what is wrong with it on some rank, the lowest; NULL: nothing */
 } session_catalogue_field;
 
-/* A vertex that hangs on a quad: its value is the sum of those of the quad's corners, times weights. */
+/* A vertex that hangs on a face: its value is the sum of those of the face's corners, times weights. */
 typedef struct session_hanging_vertex {
     int64_t group;      /* of the vertices that are this one (session_hanging.h) */
     int64_t corners[4]; /* groups, or places among the values that come from other ranks */
@@ -26,16 +26,23 @@ typedef struct session_hanging_vertex {
     bool is_received;
 } session_hanging_vertex;
 
-/* This rank's hanging vertices of a mesh, and what it sends to others for theirs. */
+/* What vertices may hang on, and which may, of this rank's part of a mesh; kept while vertices move. */
+typedef struct session_border {
+    uint64_t cells; /* session_catalogue_mesh.cells that it is of; 0: not known */
+    int64_t face_count, vertex_count;
+    session_face *faces; /* that one cell alone has, over all ranks */
+    int64_t *vertices;   /* of faces that this rank has once */
+} session_border;
+
+/* This rank's hanging vertices of the meshes of a joint, and what it sends to others for theirs. */
 typedef struct session_hanging {
-    bool is_known;
-    int64_t count, total; /* on this rank, on all */
+    uint64_t places;         /* session_joint.places that it is of; 0: not known */
+    session_border *borders; /* of each mesh; NULL: none are known */
+    int64_t count, total;    /* on this rank, on all */
     session_hanging_vertex *vertices;
     int64_t *sent_counts, *sent_groups; /* to each rank; whose values, rank by rank */
     int64_t sent_total;
 } session_hanging;
-
-void session_hanging_free(session_hanging *hanging);
 
 typedef struct session_catalogue_mesh {
     char *name;
@@ -45,16 +52,33 @@ typedef struct session_catalogue_mesh {
     base_error *fault;     /* likewise: then the step does without the mesh, but knows the names of its fields */
     int field_count;
     session_catalogue_field *fields;
-    session_homes homes;      /* this rank's view of the parts; known where it has been asked for since cells changed */
-    session_hanging *hanging; /* the same; NULL until homes are known */
+    uint64_t apart;         /* of meshes with ids, session_joint.name of this mesh alone; else 0 */
+    uint64_t cells, places; /* hashes of when cells and coordinates were last new on each rank; 0: not known */
+    session_homes homes;    /* this rank's view of the parts; known where it has been asked for at these places */
 } session_catalogue_mesh;
 
+/* Meshes whose vertices, where they are the same, have one mean of cell values: those that have a layer's field, and no
+ * vertex ids. A mesh with ids is a joint of its own. */
+typedef struct session_joint {
+    uint64_t name; /* scene_field.joined, or session_catalogue_mesh.apart */
+    int count;
+    session_catalogue_mesh **meshes; /* by name */
+    bool by_id;                      /* of one mesh: its vertices are the same by global ids */
+    uint64_t places;                 /* of all its meshes */
+    session_homes own_homes;         /* of several meshes */
+    const session_homes *homes;
+    session_hanging hanging;
+} session_joint;
+
 typedef struct session_catalogue {
-    bool is_known;     /* by a step before this one */
-    bool has_faults;   /* anywhere in it */
-    base_error *fault; /* of which it is not known what is wrong with it: no image can be drawn */
-    int mesh_count;
+    bool is_known;        /* by a step before this one */
+    bool has_faults;      /* anywhere in it */
+    bool are_joined;      /* joints are those of the present scene */
+    bool are_parts_known; /* the meshes' cells and places are the present ones */
+    base_error *fault;    /* of which it is not known what is wrong with it: no image can be drawn */
+    int mesh_count, joint_count;
     session_catalogue_mesh *meshes;
+    session_joint **joints;
 } session_catalogue;
 
 /* is_shared: all ranks have the same names, by session_names_hash(), and nothing is wrong with any mesh or field.
@@ -63,11 +87,24 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
-/* Finds the homes of all meshes where they are not known. half_diagonal: of the scene. Collective, agreed. */
+/* Finds the homes of all meshes and joints where they are not known. half_diagonal: of the scene. Collective, agreed.
+ */
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error);
-/* Call this on all ranks where cells have changed on any. Local. */
+/* Call this on all ranks where cells have changed on any: then update finds of which meshes. Local. */
 void session_forget_homes(session_catalogue *catalogue);
+
+/* The name of the joint that the mesh is in where the layer's meshes are joined. */
+static inline uint64_t session_joint_name(const session_catalogue_mesh *mesh, uint64_t joined)
+{
+    return mesh->apart ? mesh->apart : joined;
+}
+
+/* The joint of this name; NULL: there is none. */
+session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t name);
+void session_drop_joints(session_catalogue *catalogue);
+/* Frees what is known of vertices, and if with_borders that of faces too. count: of meshes. */
+void session_hanging_free(session_hanging *hanging, int count, bool with_borders);
 
 /* A hash of this rank's names: equal on two ranks when their tables say the same. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);

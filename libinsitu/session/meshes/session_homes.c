@@ -44,17 +44,15 @@ static int64_t quantile(const session_mesh *mesh, const session_team *team)
     return samples[(int64_t)((team->rank + 0.5) / team->ranks * (double)count)];
 }
 
-static rank_part part_of(const session_mesh *mesh, bool by_id, double margin, const session_team *team)
+static void add_part(rank_part *part, const session_mesh *mesh, bool by_id, double margin, const session_team *team)
 {
-    rank_part out = {{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, 0, 0};
-    if (!mesh || !mesh->is_given || !mesh->drawn_count) return out;
+    if (!mesh || !mesh->is_given || !mesh->drawn_count) return;
     for (int axis = 0; axis < 3; axis++) {
-        out.box.lower[axis] = mesh->lower[axis] - margin;
-        out.box.upper[axis] = mesh->upper[axis] + margin;
+        part->box.lower[axis] = fmin(part->box.lower[axis], mesh->lower[axis] - margin);
+        part->box.upper[axis] = fmax(part->box.upper[axis], mesh->upper[axis] + margin);
     }
-    out.has_ids = by_id && mesh->given.vertex_count > 0;
-    if (out.has_ids) out.first = quantile(mesh, team);
-    return out;
+    part->has_ids = by_id && mesh->given.vertex_count > 0;
+    if (part->has_ids) part->first = quantile(mesh, team);
 }
 
 static bool do_boxes_meet(const session_box *a, const session_box *b)
@@ -115,11 +113,12 @@ static bool divide_ids(session_homes *homes, const rank_part *parts, int ranks)
     return has_room;
 }
 
-insitu_status session_homes_find(session_homes *homes, const session_mesh *mesh, bool by_id, double half_diagonal,
-                                 const session_team *team, base_error *error)
+insitu_status session_homes_find(session_homes *homes, const session_mesh *const *meshes, int count, bool by_id,
+                                 double half_diagonal, const session_team *team, base_error *error)
 {
     session_homes found = {.is_known = true, .by_id = by_id, .rank = team->rank};
-    const rank_part own = part_of(mesh, by_id, by_id ? 1e-6 * half_diagonal : 0, team);
+    rank_part own = {{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, 0, 0};
+    for (int i = 0; i < count; i++) add_part(&own, meshes[i], by_id, 2e-5 * half_diagonal, team);
     rank_part *parts = base_alloc((size_t)team->ranks * sizeof *parts);
     if (!parts) session_no_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
     insitu_status status = session_agree(team->comm, error);

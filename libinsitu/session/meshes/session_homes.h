@@ -22,12 +22,13 @@ typedef struct session_box {
     double lower[3], upper[3];
 } session_box;
 
-/* A rank's knowledge of a mesh's parts on all ranks. */
+/* A rank's knowledge of the parts, on all ranks, of a mesh or of several. */
 typedef struct session_homes {
     bool is_known, by_id;
     int rank;
     /* The ranks whose drawn cells' box meets this rank's, itself among them, in ascending order. If a rank is near
-     * another, that one is near it. A rank without cells has none. With ids, boxes are widened a little. */
+     * another, that one is near it. A rank without cells has none. Boxes are widened by 2e-5 of the scene's half
+     * diagonal, so that a vertex and what it lies on but for rounding are near each other. */
     int near_count;
     int *near;
     session_box *boxes;
@@ -39,8 +40,9 @@ typedef struct session_homes {
 
 void session_homes_free(session_homes *homes);
 
-/* mesh: this rank's part, NULL: it has none. half_diagonal: of the scene. Collective, agreed. */
-insitu_status session_homes_find(session_homes *homes, const struct session_mesh *mesh, bool by_id,
+/* meshes: this rank's parts, NULL: of one it has none; of several meshes they are taken as one. by_id: of one mesh
+ * alone. half_diagonal: of the scene. Collective, agreed. */
+insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 
 /* Tells whether the point lies in another rank's box. */

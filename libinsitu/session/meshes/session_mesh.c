@@ -54,15 +54,25 @@ void session_drop_gradients(session_scalar *scalar)
     scalar->gradient_count = 0;
 }
 
+static void free_scalar(session_scalar *scalar)
+{
+    base_free(scalar->vertex_values);
+    base_free(scalar->distances);
+    session_drop_gradients(scalar);
+    base_free(scalar->pairs);
+    base_free(scalar->intervals);
+}
+
+void session_drop_scalar(session_mesh *mesh, int number)
+{
+    free_scalar(&mesh->scalars[number]);
+    mesh->scalar_count--;
+    for (int i = number; i < mesh->scalar_count; i++) mesh->scalars[i] = mesh->scalars[i + 1];
+}
+
 void session_drop_scalars(session_mesh *mesh)
 {
-    for (int i = 0; i < mesh->scalar_count; i++) {
-        base_free(mesh->scalars[i].vertex_values);
-        base_free(mesh->scalars[i].distances);
-        session_drop_gradients(&mesh->scalars[i]);
-        base_free(mesh->scalars[i].pairs);
-        base_free(mesh->scalars[i].intervals);
-    }
+    for (int i = 0; i < mesh->scalar_count; i++) free_scalar(&mesh->scalars[i]);
     base_free(mesh->scalars);
     mesh->scalars = NULL;
     mesh->scalar_count = 0;

@@ -51,6 +51,8 @@ typedef struct session_scalar {
     int field;     /* in the mesh's fields; -1: distances */
     int component; /* as grid_field.component */
     bool is_recentred;
+    uint64_t joined;    /* of recentred ones: scene_field.joined */
+    uint64_t of_places; /* the session_joint.places that they were made of */
     bool is_used;       /* by an image of this step */
     bool wants_ranges;  /* by an image of this step: colours need none */
     bool needs_all;     /* an image of this step may need any cell */
@@ -153,6 +155,7 @@ typedef struct session_mesh {
     int field_count;
     session_field *fields;
 
+    int64_t cells_stamp, places_stamp; /* of session_meshes.stamp, when cells and coordinates were last new */
     bool is_check_stale;
     bool is_topology_stale;    /* the tree is of other cells */
     bool is_geometry_stale;    /* the tree is of other coordinates */
@@ -161,6 +164,7 @@ typedef struct session_mesh {
     double size_sum; /* of drawn cells: cube roots of volumes */
     uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
 
+    uint64_t apart; /* session_catalogue_mesh.apart */
     bool is_needed; /* by an image of this step */
     bool has_tree;
     mmbvh tree;
@@ -189,6 +193,7 @@ typedef struct session_meshes {
     session_mesh **items;               /* by name */
     bool are_cells_changed;             /* or coordinates, since the last agreed extent */
     bool are_names_changed;             /* since the last agreed catalogue */
+    int64_t stamp;                      /* one more for each change of cells or coordinates */
     base_error pending;                 /* the error of a set call that had no mesh to keep it; for one step */
     char *pending_mesh, *pending_field; /* that it is about; NULL: of any */
     int aside_count;                    /* meshes that this step does without, beyond count in items */
@@ -241,6 +246,8 @@ void session_remove_mesh(session_meshes *meshes, const char *name);
 
 /* Free what depends on the fields' values, on the cells, or all that is known of the mesh. */
 void session_drop_scalars(session_mesh *mesh);
+/* Frees one of them; those after it move up. */
+void session_drop_scalar(session_mesh *mesh, int number);
 void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);

@@ -344,6 +344,8 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
     }
     if (!mesh->given.vertex_ids.data != !given->vertex_ids.data) meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
+        mesh->places_stamp = ++meshes->stamp;
+        if (changed & INSITU_CHANGED_TOPOLOGY) mesh->cells_stamp = meshes->stamp;
         mesh->is_check_stale = true;
         mesh->torn.is_made = false;
         session_drop_outers(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);

@@ -5,49 +5,56 @@
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_cell_faces.h"
+#include "session_coarse_face.h"
 #include "session_outer_faces.h"
 #include "vector3.h"
 
-/* The share of a quad's width by which a vertex may be off it: roundings of codes that compute hanging vertices in
- * other ways. Vertices that hang are an eighth of it apart, or more. */
+/* The share of a face's width by which a vertex may be off it: roundings of codes that compute hanging vertices in
+ * other ways. Vertices that hang are an eighth of it apart, or more. Ranks' boxes are widened by as much
+ * (session_homes.h). */
 static const double place_slack = 1e-5;
 
-/* A quad must have that much more area than those whose corner a vertex is, for the vertex to hang on it: quads that
+/* A face must have that much more area than those whose corner a vertex is, for the vertex to hang on it: faces that
  * are divided once, along one side, have twice the area of their parts. */
 static const double least_ratio = 1.25;
 
-/* Coordinates on the quad are rounded to whole parts of it, from which they may be off by a hundredth of a part: 2:1,
- * 3:1 and 4:1 are exact then, however coordinates round. */
-enum { PARTS = 96 };
+/* Two faces look opposite ways where their normals' product is below this: exactly opposite ones, -1, but for bends of
+ * faces that are divided; a wall at right angles, 0, but for rounding. */
+static const double opposite = -0.1;
 
-enum { QUAD_WORDS = 12, MOST_ROUNDS = 64 };
+enum { MOST_ROUNDS = 64 };
 
-typedef struct quad {
-    double places[4][3]; /* around, from the least on, towards the lesser of its neighbours */
-    int64_t groups[4];   /* of this rank's own; else -1 */
-    int source;          /* the rank that sent it, */
-    int64_t number;      /* and its place in that rank's message */
-    double area, width;
-} quad;
+typedef struct searched_face {
+    session_coarse_face face;
+    int64_t groups[4]; /* of this rank's own; else -1 */
+    int source;        /* the rank that sent it, */
+    int64_t number;    /* and its place in that rank's message */
+} searched_face;
 
-/* A vertex, and the quads that were found at it. */
+/* A vertex, and the faces that were found at it. */
 typedef struct candidate {
     double place[3];
     int64_t group;
-    double corner_area; /* of the largest quad with this corner */
-    int64_t quad;       /* the largest that it lies on; -1: none */
-    double at[2];
+    int64_t hits, corners; /* the last of the faces that it lies on, and of those that have it as a corner; -1: none */
+    int64_t face;          /* the one that it hangs on; -1: none */
+    double weights[4];
 } candidate;
+
+/* A face at a candidate, and the one listed before. */
+typedef struct contact {
+    int64_t face, last;
+    double weights[4]; /* where the candidate is no corner */
+} contact;
 
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *is_border; /* a byte a vertex: of faces that this rank has once */
-    int64_t quad_count, own_count, candidate_count;
-    quad *quads; /* this rank's, then received ones */
+    int64_t face_count, own_count, candidate_count;
+    searched_face *faces; /* this rank's, then received ones */
     candidate *candidates;
     double rounding; /* of coordinates */
+    int64_t contact_count, contact_room;
+    contact *contacts;
     /* Bins of candidates. */
     double lower[3], size;
     int64_t bins[3];
@@ -56,141 +63,146 @@ typedef struct hanging_search {
 
 static void search_free(hanging_search *s)
 {
-    base_free(s->is_border);
-    base_free(s->quads);
+    base_free(s->faces);
     base_free(s->candidates);
+    base_free(s->contacts);
     base_free(s->starts);
     base_free(s->items);
 }
 
-/* ---- quads ---------------------------------------------------------------------------------------------------- */
+/* ---- borders -------------------------------------------------------------------------------------------------- */
 
-static int compare_places(const double a[3], const double b[3])
+static bool keep_border(const session_mesh *mesh, session_outer *outer, const unsigned char *is_border,
+                        session_border *out)
 {
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
-    return 0;
+    int64_t count = 0;
+    for (int64_t v = 0; v < mesh->cells.vertex_count; v++) count += is_border[v];
+    int64_t *vertices = base_alloc((size_t)(count + 1) * sizeof *vertices);
+    if (!vertices) return false;
+    base_free(out->faces);
+    base_free(out->vertices);
+    *out = (session_border){.face_count = outer->face_count, .faces = outer->faces, .vertices = vertices};
+    outer->faces = NULL;
+    for (int64_t v = 0; v < mesh->cells.vertex_count; v++)
+        if (is_border[v]) vertices[out->vertex_count++] = v;
+    return true;
 }
 
-static void measure_quad(quad *q)
+/* mesh: NULL where this rank has no part. */
+static insitu_status update_border(const session_mesh *mesh, const session_catalogue_mesh *of, session_border *border,
+                                   const session_team *team, base_error *error)
 {
-    double a[3], b[3], normal[3];
-    for (int axis = 0; axis < 3; axis++) {
-        a[axis] = q->places[2][axis] - q->places[0][axis];
-        b[axis] = q->places[3][axis] - q->places[1][axis];
-    }
-    for (int axis = 0; axis < 3; axis++) {
-        const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-        normal[axis] = a[next] * b[last] - a[last] * b[next];
-    }
-    q->area = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) / 2;
-    q->width = sqrt(fmax(a[0] * a[0] + a[1] * a[1] + a[2] * a[2], b[0] * b[0] + b[1] * b[1] + b[2] * b[2]));
+    session_outer outer = {0};
+    unsigned char *is_border = NULL;
+    if (border->cells == of->cells) return INSITU_OK;
+    const int64_t count = mesh ? mesh->cells.vertex_count : 0;
+    if (mesh) is_border = base_calloc((size_t)count + 1, 1);
+    if (mesh && !is_border) session_no_memory(error, count, "hanging vertices");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) status = session_find_outer_faces(mesh, &outer, &of->homes, team, is_border, error);
+    if (!status && mesh && !keep_border(mesh, &outer, is_border, border))
+        session_no_memory(error, count * 8, "hanging vertices");
+    if (!status) status = session_agree(team->comm, error);
+    if (!status && !mesh) border->face_count = border->vertex_count = 0;
+    if (!status) border->cells = of->cells;
+    session_drop_outer(&outer, true);
+    base_free(is_border);
+    return status;
 }
 
-/* False where the face is no quad of a cell. */
-static bool read_quad(const session_hanging_basis *basis, const session_face *face, quad *out)
+static insitu_status update_borders(const session_hanging_basis *basis, const session_team *team, base_error *error)
 {
-    const session_cell_faces faces = session_faces_of_cell(&basis->mesh->cells, face->cell);
-    const session_face_loop loop = session_face_of(&faces, face->face);
-    double places[4][3];
-    int64_t groups[4];
-    int least = 0;
-    if (loop.size != 4 || faces.size) return false;
-    for (int i = 0; i < 4; i++) {
-        const int64_t vertex = session_face_vertex(&loop, i);
-        grid_vertex(&basis->mesh->cells, vertex, places[i]);
-        groups[i] = basis->of_vertex[vertex];
-        for (int k = 0; k < i; k++)
-            if (compare_places(places[k], places[i]) == 0) return false;
-        if (compare_places(places[i], places[least]) < 0) least = i;
-    }
-    const int step = compare_places(places[(least + 3) % 4], places[(least + 1) % 4]) < 0 ? 3 : 1;
-    for (int i = 0; i < 4; i++) {
-        memcpy(out->places[i], places[(least + step * i) % 4], sizeof places[i]);
-        out->groups[i] = groups[(least + step * i) % 4];
-    }
-    measure_quad(out);
-    return out->area > 0;
+    session_hanging *hanging = &basis->joint->hanging;
+    const int count = basis->joint->count;
+    if (!hanging->borders) hanging->borders = base_calloc((size_t)count, sizeof *hanging->borders);
+    if (!hanging->borders) session_no_memory(error, count * (int64_t)sizeof *hanging->borders, "hanging vertices");
+    insitu_status status = session_agree(team->comm, error);
+    for (int i = 0; i < count && !status; i++)
+        status = update_border(basis->meshes[i], basis->joint->meshes[i], &hanging->borders[i], team, error);
+    return status;
 }
 
-static bool read_quads(hanging_search *s, const session_outer *outer)
+/* ---- faces ---------------------------------------------------------------------------------------------------- */
+
+static bool read_faces(hanging_search *s)
 {
-    s->quads = base_alloc((size_t)(outer->face_count + 1) * sizeof *s->quads);
-    if (!s->quads) return false;
-    for (int64_t i = 0; i < outer->face_count; i++)
-        if (read_quad(s->basis, &outer->faces[i], &s->quads[s->own_count])) {
-            s->quads[s->own_count].source = s->team->rank;
+    const session_hanging_basis *basis = s->basis;
+    const session_border *borders = basis->joint->hanging.borders;
+    int64_t most = 0, vertices[4];
+    for (int m = 0; m < basis->joint->count; m++) most += borders[m].face_count;
+    s->faces = base_alloc((size_t)(most + 1) * sizeof *s->faces);
+    if (!s->faces) return false;
+    for (int m = 0; m < basis->joint->count; m++)
+        for (int64_t i = 0; i < borders[m].face_count; i++) {
+            searched_face *f = &s->faces[s->own_count];
+            if (!session_read_coarse_face(&basis->meshes[m]->cells, &borders[m].faces[i], &f->face, vertices)) continue;
+            for (int k = 0; k < 4; k++) f->groups[k] = basis->of_vertex[basis->firsts[m] + vertices[k]];
+            f->source = s->team->rank;
             s->own_count++;
         }
-    s->quad_count = s->own_count;
+    s->face_count = s->own_count;
     return true;
 }
 
-static bool does_meet(const quad *q, const session_box *box, double margin)
+static bool does_meet(const session_coarse_face *f, const session_box *box, double margin)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        double low = q->places[0][axis], high = low;
-        for (int i = 1; i < 4; i++) {
-            low = fmin(low, q->places[i][axis]);
-            high = fmax(high, q->places[i][axis]);
-        }
-        if (!(low - margin <= box->upper[axis] && box->lower[axis] - margin <= high)) return false;
-    }
+    for (int axis = 0; axis < 3; axis++)
+        if (!(f->lower[axis] - margin <= box->upper[axis] && box->lower[axis] - margin <= f->upper[axis])) return false;
     return true;
 }
 
-static double slack_of(const hanging_search *s, const quad *q)
+static double slack_of(const hanging_search *s, const session_coarse_face *f)
 {
-    return place_slack * q->width + s->rounding;
+    return place_slack * f->width + s->rounding;
 }
 
-/* Lists the quads for each rank whose box they meet; counts words where there is no room. */
-static void send_quads(const hanging_search *s, session_mail *mail, int64_t *sent)
+/* Lists the faces for each rank whose box they meet; counts words where there is no room. */
+static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
-    const session_homes *homes = s->basis->homes;
+    const session_homes *homes = s->basis->joint->homes;
     mail->total = 0;
     for (int n = 0; n < homes->near_count; n++) {
         const int64_t first = mail->total;
         for (int64_t i = 0; i < s->own_count && homes->near[n] != s->team->rank; i++) {
-            if (!does_meet(&s->quads[i], &homes->boxes[n], slack_of(s, &s->quads[i]))) continue;
+            const session_coarse_face *f = &s->faces[i].face;
+            if (!does_meet(f, &homes->boxes[n], slack_of(s, f))) continue;
             if (mail->words) {
-                memcpy(mail->words + mail->total, s->quads[i].places, sizeof s->quads[i].places);
-                sent[mail->total / QUAD_WORDS] = i;
+                session_pack_coarse_face(f, mail->words + mail->total);
+                sent[mail->total / SESSION_FACE_WORDS] = i;
             }
-            mail->total += QUAD_WORDS;
+            mail->total += SESSION_FACE_WORDS;
         }
         mail->counts[homes->near[n]] = mail->total - first;
     }
 }
 
-/* sent: which quad each of the mail is. */
-static bool pack_quads(const hanging_search *s, session_mail *mail, int64_t **sent)
+/* sent: which face each of the mail is. */
+static bool pack_faces(const hanging_search *s, session_mail *mail, int64_t **sent)
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    send_quads(s, mail, NULL);
+    send_faces(s, mail, NULL);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
-    *sent = base_alloc((size_t)(mail->total / QUAD_WORDS + 1) * sizeof **sent);
+    *sent = base_alloc((size_t)(mail->total / SESSION_FACE_WORDS + 1) * sizeof **sent);
     if (!mail->words || !*sent) return false;
-    send_quads(s, mail, *sent);
+    send_faces(s, mail, *sent);
     return true;
 }
 
-static bool take_quads(hanging_search *s, const session_mail *in)
+static bool take_faces(hanging_search *s, const session_mail *in)
 {
-    const int64_t count = in->total / QUAD_WORDS;
-    quad *quads = base_realloc(s->quads, (size_t)(s->own_count + count + 1) * sizeof *quads);
-    if (!quads) return false;
-    s->quads = quads;
+    const int64_t count = in->total / SESSION_FACE_WORDS;
+    searched_face *faces = base_realloc(s->faces, (size_t)(s->own_count + count + 1) * sizeof *faces);
+    if (!faces) return false;
+    s->faces = faces;
     int64_t at = 0;
     for (int rank = 0; rank < s->team->ranks; rank++)
-        for (int64_t number = 0; number < in->counts[rank] / QUAD_WORDS; number++, at++) {
-            quad *q = &quads[s->quad_count++];
-            memcpy(q->places, in->words + QUAD_WORDS * at, sizeof q->places);
-            for (int i = 0; i < 4; i++) q->groups[i] = -1;
-            q->source = rank;
-            q->number = number;
-            measure_quad(q);
+        for (int64_t number = 0; number < in->counts[rank] / SESSION_FACE_WORDS; number++, at++) {
+            searched_face *f = &faces[s->face_count++];
+            session_unpack_coarse_face(in->words + SESSION_FACE_WORDS * at, &f->face);
+            for (int i = 0; i < 4; i++) f->groups[i] = -1;
+            f->source = rank;
+            f->number = number;
         }
     return true;
 }
@@ -199,23 +211,26 @@ static bool take_quads(hanging_search *s, const session_mail *in)
 
 static bool list_candidates(hanging_search *s)
 {
-    const session_mesh *mesh = s->basis->mesh;
-    int64_t *found = base_alloc((size_t)(s->basis->group_count + 1) * sizeof *found);
-    s->candidates = base_alloc((size_t)(s->basis->group_count + 1) * sizeof *s->candidates);
-    if (!found || !s->candidates) {
-        base_free(found);
+    const session_hanging_basis *basis = s->basis;
+    const session_border *borders = basis->joint->hanging.borders;
+    int64_t most = 0;
+    for (int m = 0; m < basis->joint->count; m++) most += borders[m].vertex_count;
+    unsigned char *is_listed = base_calloc((size_t)basis->group_count + 1, 1);
+    s->candidates = base_alloc((size_t)(most + 1) * sizeof *s->candidates);
+    if (!is_listed || !s->candidates) {
+        base_free(is_listed);
         return false;
     }
-    for (int64_t g = 0; g < s->basis->group_count; g++) found[g] = -1;
-    for (int64_t v = 0; mesh && v < mesh->cells.vertex_count; v++) {
-        const int64_t group = s->basis->of_vertex[v];
-        if (!s->is_border[v] || group < 0 || found[group] >= 0) continue;
-        candidate *c = &s->candidates[s->candidate_count];
-        *c = (candidate){.group = group, .quad = -1};
-        grid_vertex(&mesh->cells, v, c->place);
-        found[group] = s->candidate_count++;
-    }
-    base_free(found);
+    for (int m = 0; m < basis->joint->count; m++)
+        for (int64_t i = 0; i < borders[m].vertex_count; i++) {
+            const int64_t v = borders[m].vertices[i], group = basis->of_vertex[basis->firsts[m] + v];
+            if (group < 0 || is_listed[group]) continue;
+            candidate *c = &s->candidates[s->candidate_count++];
+            *c = (candidate){.group = group, .hits = -1, .corners = -1, .face = -1};
+            grid_vertex(&basis->meshes[m]->cells, v, c->place);
+            is_listed[group] = 1;
+        }
+    base_free(is_listed);
     return true;
 }
 
@@ -260,125 +275,116 @@ static bool make_bins(hanging_search *s)
     return true;
 }
 
-/* ---- places on quads ------------------------------------------------------------------------------------------ */
+/* ---- contacts ------------------------------------------------------------------------------------------------- */
 
-static double distance(const double a[3], const double b[3])
+/* Lists the face at the candidate, behind *last. */
+static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *last)
 {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
-static void place_on(const quad *q, const double at[2], double out[3], double slopes[2][3])
-{
-    for (int axis = 0; axis < 3; axis++) {
-        const double a = q->places[0][axis], b = q->places[1][axis], c = q->places[2][axis], d = q->places[3][axis];
-        slopes[0][axis] = (1 - at[1]) * (b - a) + at[1] * (c - d);
-        slopes[1][axis] = (1 - at[0]) * (d - a) + at[0] * (c - b);
-        out[axis] = (1 - at[1]) * (a + at[0] * (b - a)) + at[1] * (d + at[0] * (c - d));
+    if (s->contact_count == s->contact_room) {
+        const int64_t room = s->contact_room * 2 + 256;
+        contact *contacts = base_realloc(s->contacts, (size_t)room * sizeof *contacts);
+        if (!contacts) return false;
+        s->contacts = contacts;
+        s->contact_room = room;
     }
+    contact *c = &s->contacts[s->contact_count];
+    *c = (contact){.face = number, .last = *last};
+    if (weights) memcpy(c->weights, weights, sizeof c->weights);
+    *last = s->contact_count++;
+    return true;
 }
 
-/* A whole part of the quad where it is one but for rounding. */
-static double rounded(double at)
+/* Lists the face with those that the candidate lies on. */
+static bool try_hit(hanging_search *s, int64_t number, candidate *c)
 {
-    const double parts = round(at * PARTS);
-    return fabs(at * PARTS - parts) < 0.01 ? parts / PARTS : at;
+    const session_coarse_face *f = &s->faces[number].face;
+    const double slack = slack_of(s, f);
+    double weights[4];
+    if (session_is_at_corner(f, c->place, slack) || !session_find_on_face(f, c->place, slack, weights)) return true;
+    return add_contact(s, number, weights, &c->hits);
 }
 
-/* Newton's method, from the middle. Returns whether the place is on the quad. */
-static bool find_on_quad(const quad *q, const double place[3], double slack, double at[2])
+/* Lists the face with those that have the candidate as a corner, if that lies on a face. */
+static bool try_corner(hanging_search *s, int64_t number, candidate *c)
 {
-    double on[3], slopes[2][3], off[3];
-    at[0] = at[1] = 0.5;
-    for (int step = 0; step < 12; step++) {
-        place_on(q, at, on, slopes);
-        for (int axis = 0; axis < 3; axis++) off[axis] = place[axis] - on[axis];
-        const double aa = vector3_dot(slopes[0], slopes[0]), ab = vector3_dot(slopes[0], slopes[1]),
-                     bb = vector3_dot(slopes[1], slopes[1]);
-        const double a = vector3_dot(slopes[0], off), b = vector3_dot(slopes[1], off), det = aa * bb - ab * ab;
-        if (!(det > 0)) return false;
-        at[0] += (a * bb - b * ab) / det;
-        at[1] += (b * aa - a * ab) / det;
-        if (!(fabs(at[0]) < 4 && fabs(at[1]) < 4)) return false;
-    }
-    for (int k = 0; k < 2; k++) at[k] = rounded(at[k]);
-    place_on(q, at, on, slopes);
-    return at[0] >= 0 && at[0] <= 1 && at[1] >= 0 && at[1] <= 1 && distance(on, place) <= slack;
+    const session_coarse_face *f = &s->faces[number].face;
+    if (c->hits < 0 || !session_is_at_corner(f, c->place, slack_of(s, f))) return true;
+    return add_contact(s, number, NULL, &c->corners);
 }
 
-static bool is_larger(const quad *a, const quad *b)
-{
-    if (a->area != b->area) return a->area > b->area;
-    for (int i = 0; i < 4; i++) {
-        const int sign = compare_places(a->places[i], b->places[i]);
-        if (sign) return sign < 0;
-    }
-    return false;
-}
+typedef bool try_function(hanging_search *s, int64_t number, candidate *c);
 
-static void try_quad(hanging_search *s, int64_t number, candidate *c)
+static bool try_faces(hanging_search *s, try_function *try_one)
 {
-    const quad *q = &s->quads[number];
-    const double slack = slack_of(s, q);
-    double at[2];
-    for (int i = 0; i < 4; i++)
-        if (distance(q->places[i], c->place) <= slack) {
-            c->corner_area = fmax(c->corner_area, q->area);
-            return;
-        }
-    if (c->quad >= 0 && !is_larger(q, &s->quads[c->quad])) return;
-    if (!find_on_quad(q, c->place, slack, at)) return;
-    c->quad = number;
-    memcpy(c->at, at, sizeof c->at);
-}
-
-static void try_quads(hanging_search *s)
-{
-    for (int64_t number = 0; number < s->quad_count && s->candidate_count; number++) {
-        const quad *q = &s->quads[number];
-        const double slack = slack_of(s, q);
+    bool is_done = true;
+    for (int64_t number = 0; number < s->face_count && s->candidate_count && is_done; number++) {
+        const session_coarse_face *f = &s->faces[number].face;
+        const double slack = slack_of(s, f);
         int64_t low[3], high[3];
         for (int axis = 0; axis < 3; axis++) {
-            double least = q->places[0][axis], most = least;
-            for (int i = 1; i < 4; i++) {
-                least = fmin(least, q->places[i][axis]);
-                most = fmax(most, q->places[i][axis]);
-            }
-            low[axis] = bin_along(s, least - slack, axis);
-            high[axis] = bin_along(s, most + slack, axis);
+            low[axis] = bin_along(s, f->lower[axis] - slack, axis);
+            high[axis] = bin_along(s, f->upper[axis] + slack, axis);
         }
         for (int64_t k = low[2]; k <= high[2]; k++)
             for (int64_t j = low[1]; j <= high[1]; j++) {
                 const int64_t row = s->bins[0] * (j + s->bins[1] * k);
-                for (int64_t i = s->starts[row + low[0]]; i < s->starts[row + high[0] + 1]; i++)
-                    try_quad(s, number, &s->candidates[s->items[i]]);
+                for (int64_t i = s->starts[row + low[0]]; i < s->starts[row + high[0] + 1] && is_done; i++)
+                    is_done = try_one(s, number, &s->candidates[s->items[i]]);
             }
+    }
+    return is_done;
+}
+
+/* The largest area of the faces with the candidate as a corner that look against the face; 0: there are none. */
+static double area_against(const hanging_search *s, const candidate *c, const session_coarse_face *f)
+{
+    double area = 0;
+    for (int64_t i = c->corners; i >= 0; i = s->contacts[i].last) {
+        const session_coarse_face *other = &s->faces[s->contacts[i].face].face;
+        if (vector3_dot(f->normal, other->normal) < opposite) area = fmax(area, other->area);
+    }
+    return area;
+}
+
+static void choose_face(const hanging_search *s, candidate *c)
+{
+    for (int64_t i = c->hits; i >= 0; i = s->contacts[i].last) {
+        const session_coarse_face *f = &s->faces[s->contacts[i].face].face;
+        const double area = area_against(s, c, f);
+        if (!(area > 0 && f->area > least_ratio * area)) continue;
+        if (c->face >= 0 && !session_is_larger_face(f, &s->faces[c->face].face)) continue;
+        c->face = s->contacts[i].face;
+        memcpy(c->weights, s->contacts[i].weights, sizeof c->weights);
     }
 }
 
-static bool hangs(const hanging_search *s, const candidate *c)
+static bool find_contacts(hanging_search *s)
 {
-    return c->quad >= 0 && s->quads[c->quad].area > least_ratio * c->corner_area;
+    bool is_done = try_faces(s, try_hit);
+    if (s->contact_count) is_done = is_done && try_faces(s, try_corner);
+    for (int64_t i = 0; i < s->candidate_count && is_done; i++) choose_face(s, &s->candidates[i]);
+    return is_done;
 }
 
 /* ---- what is kept --------------------------------------------------------------------------------------------- */
 
-/* Marks the received quads that are used, and writes their numbers to their ranks. firsts: the place of each used
- * quad's first value among those that will come. */
-static bool want_quads(const hanging_search *s, session_mail *wanted, int64_t **firsts)
+/* Marks the received faces that are used, and writes their numbers to their ranks. firsts: the place of each used
+ * face's first value among those that will come. */
+static bool want_faces(const hanging_search *s, session_mail *wanted, int64_t **firsts)
 {
-    int64_t *first = base_alloc((size_t)(s->quad_count + 1) * sizeof *first);
+    int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
     wanted->counts = base_calloc((size_t)s->team->ranks, sizeof *wanted->counts);
-    wanted->words = base_alloc((size_t)(s->quad_count + 1) * sizeof *wanted->words);
+    wanted->words = base_alloc((size_t)(s->face_count + 1) * sizeof *wanted->words);
     *firsts = first;
     if (!first || !wanted->counts || !wanted->words) return false;
-    for (int64_t i = 0; i < s->quad_count; i++) first[i] = -1;
+    for (int64_t i = 0; i < s->face_count; i++) first[i] = -1;
     for (int64_t i = 0; i < s->candidate_count; i++)
-        if (hangs(s, &s->candidates[i])) first[s->candidates[i].quad] = 0;
-    for (int64_t i = s->own_count; i < s->quad_count; i++) { /* in the order of ranks */
+        if (s->candidates[i].face >= 0) first[s->candidates[i].face] = 0;
+    for (int64_t i = s->own_count; i < s->face_count; i++) { /* in the order of ranks */
         if (first[i] < 0) continue;
         first[i] = 4 * wanted->total;
-        wanted->words[wanted->total++] = (uint64_t)s->quads[i].number;
-        wanted->counts[s->quads[i].source]++;
+        wanted->words[wanted->total++] = (uint64_t)s->faces[i].number;
+        wanted->counts[s->faces[i].source]++;
     }
     return true;
 }
@@ -386,25 +392,23 @@ static bool want_quads(const hanging_search *s, session_mail *wanted, int64_t **
 static bool keep_vertices(const hanging_search *s, const int64_t *firsts, session_hanging *out)
 {
     int64_t count = 0;
-    for (int64_t i = 0; i < s->candidate_count; i++) count += hangs(s, &s->candidates[i]);
+    for (int64_t i = 0; i < s->candidate_count; i++) count += s->candidates[i].face >= 0;
     out->vertices = base_alloc((size_t)(count + 1) * sizeof *out->vertices);
     if (!out->vertices) return false;
     for (int64_t i = 0; i < s->candidate_count; i++) {
         const candidate *c = &s->candidates[i];
-        if (!hangs(s, c)) continue;
-        const quad *q = &s->quads[c->quad];
+        if (c->face < 0) continue;
         session_hanging_vertex *v = &out->vertices[out->count++];
-        const double u = c->at[0], w = c->at[1], weights[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};
         v->group = c->group;
-        memcpy(v->weights, weights, sizeof weights);
-        v->is_received = c->quad >= s->own_count;
-        for (int k = 0; k < 4; k++) v->corners[k] = v->is_received ? firsts[c->quad] + k : q->groups[k];
+        memcpy(v->weights, c->weights, sizeof v->weights);
+        v->is_received = c->face >= s->own_count;
+        for (int k = 0; k < 4; k++) v->corners[k] = v->is_received ? firsts[c->face] + k : s->faces[c->face].groups[k];
     }
     return true;
 }
 
-/* requests: numbers of quads of this rank's message to each rank, whose values it wants. */
-static bool keep_requests(const hanging_search *s, const session_mail *quads, const int64_t *sent,
+/* requests: numbers of faces of this rank's message to each rank, whose values it wants. */
+static bool keep_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                           const session_mail *requests, session_hanging *out)
 {
     out->sent_counts = base_calloc((size_t)s->team->ranks, sizeof *out->sent_counts);
@@ -414,53 +418,35 @@ static bool keep_requests(const hanging_search *s, const session_mail *quads, co
     int64_t first = 0;
     for (int rank = 0; rank < s->team->ranks; rank++) {
         for (int64_t i = 0; i < requests->counts[rank]; i++) {
-            const quad *q = &s->quads[sent[first + (int64_t)*word++]];
-            memcpy(out->sent_groups + out->sent_total, q->groups, sizeof q->groups);
+            const searched_face *f = &s->faces[sent[first + (int64_t)*word++]];
+            memcpy(out->sent_groups + out->sent_total, f->groups, sizeof f->groups);
             out->sent_total += 4;
         }
         out->sent_counts[rank] = 4 * requests->counts[rank];
-        first += quads->counts[rank] / QUAD_WORDS;
+        first += mail->counts[rank] / SESSION_FACE_WORDS;
     }
     return true;
 }
 
 /* ---- finding -------------------------------------------------------------------------------------------------- */
 
-static insitu_status find_own(hanging_search *s, base_error *error)
-{
-    const session_mesh *mesh = s->basis->mesh;
-    session_outer outer = {0};
-    if (mesh) {
-        s->is_border = base_calloc((size_t)mesh->cells.vertex_count + 1, 1);
-        if (!s->is_border) session_no_memory(error, mesh->cells.vertex_count, "hanging vertices");
-    }
-    insitu_status status = session_agree(s->team->comm, error);
-    if (!status) status = session_find_outer_faces(mesh, &outer, s->basis->homes, s->team, s->is_border, error);
-    if (status) return status;
-    if (!read_quads(s, &outer) || !list_candidates(s) || !make_bins(s))
-        session_no_memory(error, (outer.face_count + s->basis->group_count) * 200, "hanging vertices");
-    session_drop_outer(&outer, true);
-    return INSITU_OK;
-}
-
 /* What fails here alone stays in *error. */
 static insitu_status find_shared(hanging_search *s, session_hanging *out, base_error *error)
 {
-    session_mail quads = {0}, in = {0}, wanted = {0}, requests = {0};
+    session_mail faces = {0}, in = {0}, wanted = {0}, requests = {0};
     int64_t *sent = NULL, *firsts = NULL;
-    if (!error->status && !pack_quads(s, &quads, &sent))
+    if (!error->status && !pack_faces(s, &faces, &sent))
         session_no_memory(error, s->own_count * 96, "hanging vertices");
-    insitu_status status = session_mail_deliver(s->team->comm, SESSION_MAIL_THERE, &quads, &in, error);
+    insitu_status status = session_mail_deliver(s->team->comm, SESSION_MAIL_THERE, &faces, &in, error);
     if (!status && !error->status) {
-        bool is_done = take_quads(s, &in);
-        if (is_done) try_quads(s);
-        is_done = is_done && want_quads(s, &wanted, &firsts) && keep_vertices(s, firsts, out);
-        if (!is_done) session_no_memory(error, s->quad_count * 150, "hanging vertices");
+        const bool is_done =
+            take_faces(s, &in) && find_contacts(s) && want_faces(s, &wanted, &firsts) && keep_vertices(s, firsts, out);
+        if (!is_done) session_no_memory(error, s->face_count * 150, "hanging vertices");
     }
     if (!status) status = session_mail_deliver(s->team->comm, SESSION_MAIL_BACK, &wanted, &requests, error);
-    if (!status && !error->status && !keep_requests(s, &quads, sent, &requests, out))
+    if (!status && !error->status && !keep_requests(s, &faces, sent, &requests, out))
         session_no_memory(error, requests.total * 32, "hanging vertices");
-    session_mail_free(&quads);
+    session_mail_free(&faces);
     session_mail_free(&in);
     session_mail_free(&wanted);
     session_mail_free(&requests);
@@ -478,28 +464,37 @@ static insitu_status count_all(const session_team *team, session_hanging *out, b
     return status;
 }
 
-insitu_status session_update_hanging(session_hanging *hanging, const session_hanging_basis *basis,
-                                     const session_team *team, base_error *error)
+static double rounding_of(const session_mesh *mesh)
 {
-    hanging_search search = {.basis = basis, .team = team};
-    session_hanging found = {.is_known = true};
-    if (hanging->is_known) return INSITU_OK;
-    const session_mesh *mesh = basis->mesh;
+    double rounding = 0;
     for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
         const double largest = fmax(fabs(mesh->lower[axis]), fabs(mesh->upper[axis]));
-        search.rounding = fmax(search.rounding, largest * (mesh->cells.coordinates[axis].is_wide ? 0x1p-50 : 0x1p-21));
+        rounding = fmax(rounding, largest * (mesh->cells.coordinates[axis].is_wide ? 0x1p-50 : 0x1p-21));
     }
-    insitu_status status = find_own(&search, error);
+    return rounding;
+}
+
+insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error)
+{
+    session_joint *joint = basis->joint;
+    hanging_search search = {.basis = basis, .team = team};
+    session_hanging found = {.places = joint->places};
+    if (joint->hanging.places == joint->places) return INSITU_OK;
+    for (int i = 0; i < joint->count; i++) search.rounding = fmax(search.rounding, rounding_of(basis->meshes[i]));
+    insitu_status status = update_borders(basis, team, error);
+    if (!status && (!read_faces(&search) || !list_candidates(&search) || !make_bins(&search)))
+        session_no_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
     if (!status) status = find_shared(&search, &found, error);
     search_free(&search);
     if (!status) status = session_agree(team->comm, error);
     if (!status) status = count_all(team, &found, error);
     if (status) {
-        session_hanging_free(&found);
+        session_hanging_free(&found, 0, false);
         return status;
     }
-    session_hanging_free(hanging);
-    *hanging = found;
+    session_hanging_free(&joint->hanging, joint->count, false);
+    found.borders = joint->hanging.borders;
+    joint->hanging = found;
     return INSITU_OK;
 }
 

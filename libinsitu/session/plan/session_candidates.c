@@ -139,6 +139,7 @@ bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
         if (s->needs_all) return false;
         const int names[4] = {s->field, s->component, s->is_recentred, s->interval_count};
         session_hash_bytes(key, names, sizeof names);
+        session_hash_bytes(key, &s->joined, sizeof s->joined);
         session_hash_bytes(key, s->plane.normal, sizeof s->plane.normal);
         session_hash_bytes(key, s->plane.point, sizeof s->plane.point);
         session_hash_bytes(key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "memory.h"
 #include "render.h"
@@ -206,7 +207,8 @@ static bool add_recentring(session_plan *plan, session_recentring item)
 {
     for (int i = 0; i < plan->recentring_count; i++) {
         const session_recentring *other = &plan->recentrings[i];
-        if (other->mesh == item.mesh && other->field == item.field && other->component == item.component) return true;
+        if (other->joint == item.joint && strcmp(other->field, item.field) == 0 && other->component == item.component)
+            return true;
     }
     session_recentring *items =
         base_realloc(plan->recentrings, (size_t)(plan->recentring_count + 1) * sizeof *plan->recentrings);
@@ -222,8 +224,10 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = find_shown(mesh, field);
         const bool is_wished = shown && session_is_recentred(field, shown->centring);
-        if (!is_wished) continue;
-        const session_recentring item = {mesh, shown->name, session_resolve_component(field, shown->component_count)};
+        session_joint *joint =
+            is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joined)) : NULL;
+        if (!joint) continue;
+        const session_recentring item = {joint, field->name, session_resolve_component(field, shown->component_count)};
         if (!add_recentring(plan, item)) return false;
     }
     return true;

@@ -7,9 +7,9 @@
 #include "session_report.h"
 #include "session_space.h"
 
-/* Cell values that a layer wants at vertices. There is one item for each mesh, field and component. */
+/* Cell values that a layer wants at vertices. There is one item for each set of meshes, field and component. */
 typedef struct session_recentring {
-    const session_catalogue_mesh *mesh;
+    session_joint *joint;
     const char *field;
     int component; /* as grid_field.component */
 } session_recentring;

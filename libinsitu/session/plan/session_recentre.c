@@ -5,7 +5,8 @@
  * Sums depend on their order, so partial sums of ranks would not do: all ranks' single values are brought together,
  * sorted, and summed in that order. Vertices with equal keys are one (global ids where all ranks give them, else the
  * bits of the coordinates, -0 as +0), also on a single rank: otherwise a mesh that doubles its vertices along a crack
- * would look different on one rank and on two.
+ * would look different on one rank and on two. So it is with the meshes on which a layer shows one field, as blocks and
+ * levels of refinement are (session_joints.h): by coordinates, since ids are of one mesh.
  *
  *     local:  vertices -> groups of equal keys -> values of incident cells, group by group -> means
  *     shared: groups inside another rank's box  --(key, values)-->  their home (session_homes.h): merged by key, means
@@ -38,10 +39,22 @@ typedef struct value_groups {
     unsigned char *are_faces; /* count: the values are those of faces, else those of cells or corners */
 } value_groups;
 
+/* This rank's part of one of the meshes. */
+typedef struct mesh_part {
+    session_scalar *scalar; /* NULL: the mesh has no such field here */
+    grid_field field;       /* the values that are recentred */
+} mesh_part;
+
+/* The vertices of all parts, numbered through. */
 typedef struct vertex_groups {
+    bool by_id;
+    int part_count;
+    mesh_part *parts;
+    const session_mesh **meshes; /* of each part; NULL: this rank has none of it */
+    int64_t *firsts;             /* part_count + 1: the number of each part's first vertex */
     session_key_table keys;
     int64_t *of_vertex; /* -1: a vertex of no drawn cell */
-    int64_t *vertex;    /* one of each group */
+    int64_t *vertex;    /* by id: one of each group */
     value_groups values;
 } vertex_groups;
 
@@ -109,22 +122,31 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's part ---------------------------------------------------------------------------------------- */
 
-static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *groups)
+static void group_vertices(const session_mesh *mesh, int64_t first, vertex_groups *groups)
 {
     const grid *g = &mesh->cells;
-    for (int64_t v = 0; v < g->vertex_count; v++) groups->of_vertex[v] = -1;
+    int64_t *of_vertex = groups->of_vertex + first;
+    for (int64_t v = 0; v < g->vertex_count; v++) of_vertex[v] = -1;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
         grid_walk walk = grid_walk_cell(g, cell);
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
-            if (groups->of_vertex[vertex] >= 0) continue;
-            const session_key key = session_vertex_key(mesh, vertex, by_id);
+            if (of_vertex[vertex] >= 0) continue;
+            const session_key key = session_vertex_key(mesh, vertex, groups->by_id);
             const int64_t group = session_keys_add(&groups->keys, &key);
-            groups->of_vertex[vertex] = group;
-            groups->vertex[group] = vertex;
+            of_vertex[vertex] = group;
+            if (groups->by_id) groups->vertex[group] = vertex;
         }
     }
+}
+
+static void place_of(const vertex_groups *groups, int64_t group, double place[3])
+{
+    if (groups->by_id)
+        grid_vertex(&groups->meshes[0]->cells, groups->vertex[group], place);
+    else
+        memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
 }
 
 /* Gets the value that the cell, or its corner at this vertex, gives to the vertex; false where it gives none. */
@@ -136,8 +158,11 @@ static bool gives(const grid_field *field, int64_t cell, int64_t vertex, double 
 
 /* Gives each cell's value to the groups of its vertices, once to each; last has the last cell that gave to a group.
  * Values at corners are given each. The first pass counts, the second stores. */
-static void give_values(const grid *g, const grid_field *field, vertex_groups *groups, int64_t *last, bool is_stored)
+static void give_values(vertex_groups *groups, int part, int64_t *last, bool is_stored)
 {
+    const grid *g = &groups->meshes[part]->cells;
+    const grid_field *field = &groups->parts[part].field;
+    const int64_t *of_vertex = groups->of_vertex + groups->firsts[part];
     value_groups *values = &groups->values;
     double value = 0;
     for (int64_t i = 0; i < groups->keys.count; i++) last[i] = -1;
@@ -146,7 +171,7 @@ static void give_values(const grid *g, const grid_field *field, vertex_groups *g
         grid_walk walk = grid_walk_cell(g, cell);
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
-            const int64_t group = groups->of_vertex[vertex];
+            const int64_t group = of_vertex[vertex];
             if (values->are_faces[group] || (field->is_cell_centred && last[group] == cell)) continue;
             if (!gives(field, cell, vertex, &value)) continue;
             last[group] = cell;
@@ -171,54 +196,95 @@ static void store_face_values(const session_patch_values *faces, value_groups *v
     for (int64_t i = 0; i < faces->count; i++) values->values[values->starts[faces->groups[i]]++] = faces->values[i];
 }
 
-static bool collect_values(const session_mesh *mesh, const grid_field *field, const session_patch_values *faces,
-                           vertex_groups *groups)
+/* faces: of each part. */
+static bool collect_values(const session_patch_values *faces, vertex_groups *groups)
 {
     int64_t *last = base_alloc((size_t)groups->keys.count * sizeof *last);
     if (!last) return false;
-    count_face_values(faces, &groups->values);
-    give_values(&mesh->cells, field, groups, last, false);
+    for (int i = 0; i < groups->part_count; i++) count_face_values(&faces[i], &groups->values);
+    for (int i = 0; i < groups->part_count; i++)
+        if (groups->parts[i].scalar) give_values(groups, i, last, false);
     const bool is_open = groups_open(&groups->values);
-    if (is_open) {
-        store_face_values(faces, &groups->values);
-        give_values(&mesh->cells, field, groups, last, true);
-        groups_close(&groups->values);
-    }
+    for (int i = 0; i < groups->part_count && is_open; i++) store_face_values(&faces[i], &groups->values);
+    for (int i = 0; i < groups->part_count && is_open; i++)
+        if (groups->parts[i].scalar) give_values(groups, i, last, true);
+    if (is_open) groups_close(&groups->values);
     base_free(last);
     return is_open;
 }
 
 static void vertex_groups_free(vertex_groups *groups)
 {
+    base_free(groups->parts);
+    base_free(groups->meshes);
+    base_free(groups->firsts);
     session_keys_free(&groups->keys);
     base_free(groups->of_vertex);
     base_free(groups->vertex);
     groups_free(&groups->values);
 }
 
-/* mesh may be NULL: no groups then. index: of the field. */
-static insitu_status make_groups(const session_mesh *mesh, int index, const grid_field *field, bool by_id, int threads,
-                                 vertex_groups *groups, base_error *error)
+/* Lists this rank's parts of the item's meshes. */
+static bool list_parts(const session_recentring *item, const session_meshes *meshes, vertex_groups *groups)
 {
-    const int64_t count = mesh ? mesh->cells.vertex_count : 0;
-    session_patch_values faces = {0};
-    groups->of_vertex = base_alloc((size_t)count * sizeof *groups->of_vertex);
-    groups->vertex = base_alloc((size_t)count * sizeof *groups->vertex);
-    bool is_made = groups->of_vertex && groups->vertex && session_keys_create(&groups->keys, count);
-    if (is_made && mesh) group_vertices(mesh, by_id, groups);
-    is_made = is_made && groups_create(&groups->values, groups->keys.count);
-    if (is_made && mesh) {
-        const session_vertex_numbers numbers = {&groups->keys, groups->of_vertex, by_id};
-        session_find_patch_values(mesh, index, field->component, &numbers, &faces, error);
-        is_made = error->status || collect_values(mesh, field, &faces, groups);
-        session_patch_values_free(&faces);
-        if (error->status) return error->status;
-    } else {
-        is_made = is_made && groups_open(&groups->values);
+    const int count = item->joint->count;
+    groups->by_id = item->joint->by_id;
+    groups->parts = base_calloc((size_t)count, sizeof *groups->parts);
+    groups->meshes = base_calloc((size_t)count, sizeof *groups->meshes);
+    groups->firsts = base_calloc((size_t)count + 1, sizeof *groups->firsts);
+    if (!groups->parts || !groups->meshes || !groups->firsts) return false;
+    groups->part_count = count;
+    for (int i = 0; i < count; i++) {
+        const session_mesh *mesh = session_find_mesh(meshes, item->joint->meshes[i]->name);
+        if (mesh && !mesh->is_given) mesh = NULL;
+        mesh_part *part = &groups->parts[i];
+        groups->meshes[i] = mesh;
+        groups->firsts[i + 1] = groups->firsts[i] + (mesh ? mesh->cells.vertex_count : 0);
+        part->scalar = mesh ? session_find_recentred(mesh, item->field, item->component, item->joint->name) : NULL;
+        if (part->scalar) part->field = session_given_field(mesh, part->scalar->field, part->scalar->component);
     }
-    if (!is_made) return session_no_memory(error, count * 80, "values recentred to vertices");
+    return true;
+}
+
+static bool number_groups(vertex_groups *groups)
+{
+    const int64_t count = groups->firsts[groups->part_count];
+    groups->of_vertex = base_alloc((size_t)count * sizeof *groups->of_vertex);
+    groups->vertex = groups->by_id ? base_alloc((size_t)count * sizeof *groups->vertex) : NULL;
+    if (!groups->of_vertex || (groups->by_id && !groups->vertex) || !session_keys_create(&groups->keys, count))
+        return false;
+    for (int i = 0; i < groups->part_count; i++)
+        if (groups->meshes[i]) group_vertices(groups->meshes[i], groups->firsts[i], groups);
+    return groups_create(&groups->values, groups->keys.count);
+}
+
+static insitu_status average_groups(vertex_groups *groups, int threads, base_error *error)
+{
+    const int count = groups->part_count;
+    session_patch_values *faces = base_calloc((size_t)count, sizeof *faces);
+    for (int i = 0; i < count && faces && !error->status; i++) {
+        const mesh_part *part = &groups->parts[i];
+        const session_vertex_numbers numbers = {&groups->keys, groups->of_vertex + groups->firsts[i], groups->by_id};
+        if (part->scalar)
+            session_find_patch_values(groups->meshes[i], part->scalar->field, part->scalar->component, &numbers,
+                                      &faces[i], error);
+    }
+    const bool is_done = faces && !error->status && collect_values(faces, groups);
+    for (int i = 0; i < count && faces; i++) session_patch_values_free(&faces[i]);
+    base_free(faces);
+    if (error->status) return error->status;
+    if (!is_done) return session_no_memory(error, groups->keys.count * 80, "values recentred to vertices");
     groups_average(&groups->values, threads);
     return INSITU_OK;
+}
+
+static insitu_status make_groups(const session_recentring *item, const session_meshes *meshes, int threads,
+                                 vertex_groups *groups, base_error *error)
+{
+    if (!list_parts(item, meshes, groups) || !number_groups(groups))
+        return session_no_memory(error, groups->firsts ? groups->firsts[groups->part_count] * 80 : 8,
+                                 "values recentred to vertices");
+    return average_groups(groups, threads, error);
 }
 
 /* ---- what ranks share ---------------------------------------------------------------------------------------- */
@@ -233,11 +299,11 @@ typedef struct shared_groups {
     session_mail mail;
 } shared_groups;
 
-static int home_of(const session_mesh *mesh, const session_homes *homes, const vertex_groups *groups, int64_t group)
+static int home_of(const session_homes *homes, const vertex_groups *groups, int64_t group)
 {
     const session_key *key = &groups->keys.keys[group];
     double point[1][3];
-    grid_vertex(&mesh->cells, groups->vertex[group], point[0]);
+    place_of(groups, group, point[0]);
     return session_home(homes, (const double(*)[3])point, 1, session_key_hash(key), (int64_t)key->words[0]);
 }
 
@@ -255,8 +321,7 @@ static void write_record(const vertex_groups *groups, int64_t group, uint64_t *r
 }
 
 /* Packs the shared groups into records, sorted by home rank. */
-static bool pack_records(const session_mesh *mesh, const session_homes *homes, const vertex_groups *groups, int ranks,
-                         shared_groups *shared)
+static bool pack_records(const session_homes *homes, const vertex_groups *groups, int ranks, shared_groups *shared)
 {
     session_mail *mail = &shared->mail;
     int64_t *places = base_calloc((size_t)ranks * 2, sizeof *places);
@@ -266,7 +331,7 @@ static bool pack_records(const session_mesh *mesh, const session_homes *homes, c
     if (!places || !ordered || !home || !mail->counts) goto fail;
     int64_t *orders = places + ranks;
     for (int64_t i = 0; i < shared->count; i++) {
-        home[i] = home_of(mesh, homes, groups, shared->groups[i]);
+        home[i] = home_of(homes, groups, shared->groups[i]);
         mail->counts[home[i]] += RECORD_HEAD + value_count(&groups->values, shared->groups[i]);
         if (home[i] + 1 < ranks) orders[home[i] + 1]++;
     }
@@ -295,14 +360,13 @@ fail:
     return false;
 }
 
-static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, const session_homes *homes,
-                        shared_groups *out)
+static bool find_shared(const vertex_groups *groups, const session_homes *homes, shared_groups *out)
 {
     out->groups = base_alloc((size_t)groups->keys.count * sizeof *out->groups);
     if (!out->groups) return false;
     for (int64_t group = 0; group < groups->keys.count; group++) {
         double point[3];
-        grid_vertex(&mesh->cells, groups->vertex[group], point);
+        place_of(groups, group, point);
         if (session_homes_share(homes, point)) out->groups[out->count++] = group;
     }
     return true;
@@ -392,13 +456,11 @@ static insitu_status exchange_means(const session_team *team, const shared_group
     return status;
 }
 
-/* mesh: NULL where there is none of it here. */
-static insitu_status merge_shared(const session_team *team, const session_mesh *mesh, const session_homes *homes,
-                                  vertex_groups *groups, base_error *error)
+static insitu_status merge_shared(const session_team *team, const session_homes *homes, vertex_groups *groups,
+                                  base_error *error)
 {
     shared_groups shared = {0};
-    if (!error->status &&
-        (!find_shared(mesh, groups, homes, &shared) || !pack_records(mesh, homes, groups, team->ranks, &shared)))
+    if (!error->status && (!find_shared(groups, homes, &shared) || !pack_records(homes, groups, team->ranks, &shared)))
         session_no_memory(error, groups->keys.count * 40, "values at vertices that ranks share");
     const insitu_status status = exchange_means(team, &shared, groups, error);
     base_free(shared.groups);
@@ -408,73 +470,92 @@ static insitu_status merge_shared(const session_team *team, const session_mesh *
 
 /* ---- one scalar ---------------------------------------------------------------------------------------------- */
 
-static session_scalar *scalar_of(const session_mesh *mesh, const session_recentring *item)
-{
-    const int field = mesh ? session_find_field(mesh, item->field) : -1;
-    for (int i = 0; field >= 0 && i < mesh->scalar_count; i++) {
-        session_scalar *scalar = &mesh->scalars[i];
-        if (scalar->field == field && scalar->component == item->component && scalar->is_recentred) return scalar;
-    }
-    return NULL;
-}
-
 /* A corner whose own value is not finite stays so, and keeps its cell from being drawn, as without means. A cell's own
  * value is checked elsewhere (grid_field.own). */
-static void spread_means(const vertex_groups *groups, const grid_field *own, int64_t count, double *values, int threads)
+static void spread_means(const vertex_groups *groups, int part, int threads)
 {
+    const int64_t *of_vertex = groups->of_vertex + groups->firsts[part];
+    const int64_t count = groups->meshes[part]->cells.vertex_count;
+    const grid_field *own = &groups->parts[part].field;
+    double *values = groups->parts[part].scalar->vertex_values;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < count; v++) {
-            const bool is_lost =
-                groups->of_vertex[v] < 0 || (!own->is_cell_centred && !isfinite(grid_field_value(own, v)));
-            values[v] = is_lost ? NAN : groups->values.means[groups->of_vertex[v]];
+            const bool is_lost = of_vertex[v] < 0 || (!own->is_cell_centred && !isfinite(grid_field_value(own, v)));
+            values[v] = is_lost ? NAN : groups->values.means[of_vertex[v]];
         }
         region_leave();
     }
 }
 
-/* Values at corners are left as they are: codes that have them constrain them. */
-static insitu_status constrain_hanging(const session_recentring *item, const session_mesh *mesh,
-                                       const session_team *team, vertex_groups *groups, base_error *error)
+/* Tells whether any of the meshes has values of cells. Values at corners are left as they are: codes that have them
+ * constrain them. */
+static bool is_of_cells(const session_recentring *item)
 {
-    session_hanging *hanging = item->mesh->hanging;
-    const session_hanging_basis basis = {mesh, &item->mesh->homes, groups->of_vertex, groups->keys.count};
-    const insitu_status status = session_update_hanging(hanging, &basis, team, error);
+    for (int i = 0; i < item->joint->count; i++)
+        if (session_catalogue_find(item->joint->meshes[i], item->field)->centring == INSITU_CELL) return true;
+    return false;
+}
+
+static insitu_status constrain_hanging(const session_recentring *item, const session_team *team, vertex_groups *groups,
+                                       base_error *error)
+{
+    session_hanging *hanging = &item->joint->hanging;
+    const session_hanging_basis basis = {item->joint, groups->meshes, groups->firsts, groups->of_vertex,
+                                         groups->keys.count};
+    const insitu_status status = session_update_hanging(&basis, team, error);
     return status ? status : session_constrain_hanging(hanging, team, groups->values.means, error);
+}
+
+/* Makes room for the values of each part. */
+static void make_room(const vertex_groups *groups, base_error *error)
+{
+    for (int i = 0; i < groups->part_count; i++) {
+        session_scalar *scalar = groups->parts[i].scalar;
+        if (!scalar || scalar->vertex_values) continue;
+        const int64_t count = groups->meshes[i]->cells.vertex_count;
+        scalar->vertex_values = base_alloc((size_t)count * sizeof(double));
+        if (!scalar->vertex_values) session_no_memory(error, count * (int64_t)sizeof(double), "recentred values");
+    }
+}
+
+static void keep_means(const vertex_groups *groups, const session_joint *joint, int threads)
+{
+    for (int i = 0; i < groups->part_count; i++) {
+        session_scalar *scalar = groups->parts[i].scalar;
+        if (!scalar) continue;
+        spread_means(groups, i, threads);
+        scalar->are_values_stale = false;
+        scalar->of_places = joint->places;
+        scalar->is_suspect = true;
+    }
 }
 
 static insitu_status recentre(const session_recentring *item, const session_meshes *meshes, const session_team *team,
                               base_error *error)
 {
-    session_mesh *mesh = session_find_mesh(meshes, item->mesh->name);
-    session_scalar *scalar = scalar_of(mesh, item);
-    if (!scalar) mesh = NULL;
-    const bool by_id = item->mesh->has_ids;
+    const session_homes *homes = item->joint->homes;
     vertex_groups groups = {0};
-    grid_field field = {0};
-    if (scalar) {
-        if (!scalar->vertex_values)
-            scalar->vertex_values = base_alloc((size_t)mesh->cells.vertex_count * sizeof(double));
-        if (!scalar->vertex_values)
-            session_no_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(double), "recentred values");
-        field = session_scalar_field(mesh, &(session_scalar){.field = scalar->field, .component = scalar->component});
-        if (scalar->vertex_values) make_groups(mesh, scalar->field, &field, by_id, team->threads, &groups, error);
-    } else {
-        make_groups(NULL, -1, NULL, by_id, team->threads, &groups, error);
-    }
-    insitu_status status = team->ranks > 1 ? merge_shared(team, mesh, &item->mesh->homes, &groups, error)
-                                           : session_agree(team->comm, error);
-    if (!status && session_catalogue_find(item->mesh, item->field)->centring == INSITU_CELL)
-        status = constrain_hanging(item, mesh, team, &groups, error);
-    if (!status && !error->status && scalar) {
-        spread_means(&groups, &field, mesh->cells.vertex_count, scalar->vertex_values, team->threads);
-        scalar->are_values_stale = false;
-        scalar->is_suspect = true;
-    }
+    if (!make_groups(item, meshes, team->threads, &groups, error)) make_room(&groups, error);
+    insitu_status status =
+        team->ranks > 1 ? merge_shared(team, homes, &groups, error) : session_agree(team->comm, error);
+    if (!status && is_of_cells(item)) status = constrain_hanging(item, team, &groups, error);
+    if (!status && !error->status) keep_means(&groups, item->joint, team->threads);
     vertex_groups_free(&groups);
     return status;
+}
+
+static bool is_stale(const session_recentring *item, const session_meshes *meshes)
+{
+    for (int i = 0; i < item->joint->count; i++) {
+        const session_mesh *mesh = session_find_mesh(meshes, item->joint->meshes[i]->name);
+        const session_scalar *scalar =
+            mesh ? session_find_recentred(mesh, item->field, item->component, item->joint->name) : NULL;
+        if (scalar && (scalar->are_values_stale || scalar->of_places != item->joint->places)) return true;
+    }
+    return false;
 }
 
 /* Finds the recentrings whose values are stale on some rank. Collective. */
@@ -482,11 +563,7 @@ static insitu_status find_stale(const session_plan *plan, const session_meshes *
                                 int *stale, base_error *error)
 {
     const int count = plan->recentring_count;
-    for (int i = 0; i < count; i++) {
-        const session_recentring *item = &plan->recentrings[i];
-        const session_scalar *scalar = scalar_of(session_find_mesh(meshes, item->mesh->name), item);
-        stale[i] = scalar && scalar->are_values_stale;
-    }
+    for (int i = 0; i < count; i++) stale[i] = is_stale(&plan->recentrings[i], meshes);
     return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
 }
 

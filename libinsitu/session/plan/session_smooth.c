@@ -29,6 +29,7 @@ typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
     const scene_field *scene_field; /* of the first layer that has it */
+    uint64_t joined;                /* session_joint_name() where values are recentred */
     int component;
     int value_count;
     mmbvh_interval *values; /* of all layers that have it */
@@ -56,7 +57,9 @@ static smooth_item *find_item(smooth_items *items, const smooth_item *like)
 {
     for (int i = 0; i < items->count; i++) {
         smooth_item *item = &items->items[i];
-        if (item->mesh == like->mesh && item->field == like->field && item->component == like->component) return item;
+        if (item->mesh == like->mesh && item->field == like->field && item->component == like->component &&
+            item->joined == like->joined)
+            return item;
     }
     smooth_item *more = base_realloc(items->items, (size_t)(items->count + 1) * sizeof *more);
     if (!more) return NULL;
@@ -70,7 +73,9 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
     if (layer->normals != SCENE_VERTEX || !field || !scene_field_is_on(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
-    smooth_item *item = find_item(items, &(smooth_item){mesh, field, &layer->field, component, 0, NULL});
+    const bool is_recentred = session_is_recentred(&layer->field, field->centring);
+    const uint64_t joined = is_recentred ? session_joint_name(mesh, layer->field.joined) : 0;
+    smooth_item *item = find_item(items, &(smooth_item){mesh, field, &layer->field, joined, component, 0, NULL});
     if (!item) return false;
     const size_t count = (size_t)item->value_count + (size_t)layer->value_count;
     mmbvh_interval *values = base_realloc(item->values, count * sizeof *values);

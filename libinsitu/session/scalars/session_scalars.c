@@ -22,14 +22,28 @@ const char *session_scalar_name(const session_mesh *mesh, const session_scalar *
     return session_is_distance(scalar) ? "distance from a slice" : mesh->fields[scalar->field].given.name;
 }
 
-static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred)
+static uint64_t joined_on(const session_mesh *mesh, const scene_field *field)
+{
+    return mesh->apart ? mesh->apart : field->joined;
+}
+
+/* joined: of recentred ones. */
+static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
+                                   uint64_t joined)
 {
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
-        if (scalar->field == field && scalar->component == component && scalar->is_recentred == is_recentred)
+        if (scalar->field == field && scalar->component == component && scalar->is_recentred == is_recentred &&
+            (!is_recentred || scalar->joined == joined))
             return scalar;
     }
     return NULL;
+}
+
+session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component, uint64_t joined)
+{
+    const int index = session_find_field(mesh, field);
+    return index < 0 ? NULL : find_scalar(mesh, index, component, true, joined);
 }
 
 /* -1 where the layer does not show the field on the mesh. */
@@ -56,7 +70,7 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, session_resolve_component(field, given->component_count),
-                       session_is_recentred(field, given->centring));
+                       session_is_recentred(field, given->centring), joined_on(mesh, field));
 }
 
 grid_field session_given_field(const session_mesh *mesh, int index, int component)
@@ -120,6 +134,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         scalar->field = index;
         scalar->component = session_resolve_component(field, given->component_count);
         scalar->is_recentred = session_is_recentred(field, given->centring);
+        scalar->joined = joined_on(mesh, field);
     }
     scalar->is_used = true;
     scalar->own = session_given_field(mesh, index, scalar->component);

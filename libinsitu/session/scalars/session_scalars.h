@@ -19,6 +19,9 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
 /* This rank's scalar for a layer's field: NULL where the mesh does not have it. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
+/* As above, for means at vertices that are over the meshes of this hash (scene_field.joined). */
+session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component, uint64_t joined);
+
 /* The mesh's field, or a component of it, as the caller gave it, in the order of the vertices or cells. */
 grid_field session_given_field(const session_mesh *mesh, int field, int component);
 

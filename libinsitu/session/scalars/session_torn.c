@@ -111,22 +111,23 @@ static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
 }
 
 /* Drops arrays that were made for other vertices. */
-static void forget_vertices(session_mesh *mesh)
+static void forget_vertices(session_meshes *meshes, session_mesh *mesh)
 {
+    mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
     session_drop_outers(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
 }
 
-static insitu_status update(session_mesh *mesh, bool is_torn, int threads, base_error *error)
+static insitu_status update(session_meshes *meshes, session_mesh *mesh, bool is_torn, int threads, base_error *error)
 {
     const bool was_torn = mesh->torn.is_torn;
     if (!is_torn && was_torn) {
         session_drop_torn(&mesh->torn);
         session_read_topology(mesh);
     }
-    if (is_torn != was_torn) forget_vertices(mesh);
+    if (is_torn != was_torn) forget_vertices(meshes, mesh);
     return is_torn && !mesh->torn.is_made ? tear(mesh, threads, error) : INSITU_OK;
 }
 
@@ -140,12 +141,12 @@ static bool has_corners(const session_catalogue *catalogue)
     return false;
 }
 
-insitu_status session_tear_meshes(const session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                   const session_team *team, base_error *error)
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        if (mesh->is_given) update(mesh, is_named(mesh, scene), team->threads, error);
+        if (mesh->is_given) update(meshes, mesh, is_named(mesh, scene), team->threads, error);
     }
     return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
 }

@@ -15,7 +15,7 @@
 
 /* Tear the meshes with a corner field that the scene names, unless they are torn by the present coordinates already;
  * make the others whole. Cells have been checked. Collective. */
-insitu_status session_tear_meshes(const session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                   const session_team *team, base_error *error);
 
 /* Returns the caller's vertex that stands at the corner of a torn mesh. */

@@ -26,6 +26,7 @@ typedef struct scene_field {
     int mesh_count;     /* 0: on the meshes that have the field */
     char **meshes;      /* a name stands for the meshes below it too: "a" for "a/0" */
     int meshes_line;    /* for messages about them */
+    uint64_t joined;    /* a hash of the meshes that means at vertices are over; the session's (session_joints.h) */
 } scene_field;
 
 /* Tells whether the layer is drawn on a mesh of this name, if that has the field. */

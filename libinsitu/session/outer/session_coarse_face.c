@@ -1,0 +1,189 @@
+#include "session_coarse_face.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "session_cell_faces.h"
+#include "vector3.h"
+
+/* Coordinates on the face are rounded to whole parts of it, from which they may be off by a hundredth of a part: 2:1,
+ * 3:1 and 4:1 are exact then, however coordinates round. */
+enum { PARTS = 96 };
+
+/* ---- faces ---------------------------------------------------------------------------------------------------- */
+
+static int compare_places(const double a[3], const double b[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
+    return 0;
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    const double off[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return sqrt(vector3_dot(off, off));
+}
+
+/* side: 1 where the cell is behind the face as its places go around, -1 before it. */
+static void measure(session_coarse_face *f, double side)
+{
+    double a[3], b[3];
+    for (int axis = 0; axis < 3; axis++) {
+        a[axis] = f->places[2][axis] - f->places[0][axis];
+        b[axis] = f->places[f->count == 4 ? 3 : 2][axis] - f->places[1][axis];
+        f->lower[axis] =
+            fmin(fmin(f->places[0][axis], f->places[1][axis]), fmin(f->places[2][axis], f->places[3][axis]));
+        f->upper[axis] =
+            fmax(fmax(f->places[0][axis], f->places[1][axis]), fmax(f->places[2][axis], f->places[3][axis]));
+    }
+    vector3_cross(a, b, f->normal);
+    f->area = sqrt(vector3_dot(f->normal, f->normal)) / 2;
+    f->width = sqrt(fmax(vector3_dot(a, a), vector3_dot(b, b)));
+    for (int axis = 0; axis < 3 && f->area > 0; axis++) f->normal[axis] *= side / (2 * f->area);
+}
+
+/* On which side of the face its cell is: see measure(). */
+static double side_of(const grid *g, int64_t cell, const session_coarse_face *f)
+{
+    double sums[3] = {0, 0, 0}, off[3], place[3];
+    int64_t vertex, count = 0;
+    grid_walk walk = grid_walk_cell(g, cell);
+    while (grid_walk_next(&walk, &vertex)) {
+        grid_vertex(g, vertex, place);
+        for (int axis = 0; axis < 3; axis++) sums[axis] += place[axis];
+        count++;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        off[axis] = -sums[axis] / (double)count;
+        for (int i = 0; i < f->count; i++) off[axis] += f->places[i][axis] / f->count;
+    }
+    const double along = vector3_dot(f->normal, off);
+    return (along > 0) - (along < 0);
+}
+
+bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4])
+{
+    const session_cell_faces faces = session_faces_of_cell(g, face->cell);
+    const session_face_loop loop = session_face_of(&faces, face->face);
+    double places[4][3];
+    const int count = (int)loop.size;
+    int least = 0;
+    if (loop.size < 3 || loop.size > 4 || faces.size) return false;
+    for (int i = 0; i < count; i++) {
+        grid_vertex(g, session_face_vertex(&loop, i), places[i]);
+        for (int k = 0; k < i; k++)
+            if (compare_places(places[k], places[i]) == 0) return false;
+        if (compare_places(places[i], places[least]) < 0) least = i;
+    }
+    const int step =
+        compare_places(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
+    out->count = count;
+    for (int i = 0; i < 4; i++) {
+        const int from = (least + step * (i < count ? i : count - 1)) % count;
+        memcpy(out->places[i], places[from], sizeof places[from]);
+        vertices[i] = session_face_vertex(&loop, from);
+    }
+    measure(out, 1);
+    if (!(out->area > 0)) return false;
+    measure(out, side_of(g, face->cell, out));
+    return true;
+}
+
+void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS])
+{
+    session_coarse_face other = *face;
+    measure(&other, 1);
+    const double along = vector3_dot(other.normal, face->normal);
+    memcpy(words, face->places, sizeof face->places);
+    words[SESSION_FACE_WORDS - 1] = (uint64_t)(4 * face->count + (along > 0) - (along < 0));
+}
+
+void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out)
+{
+    const int64_t last = (int64_t)words[SESSION_FACE_WORDS - 1];
+    memcpy(out->places, words, sizeof out->places);
+    out->count = (int)((last + 1) / 4);
+    measure(out, (double)(last - 4 * out->count));
+}
+
+bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b)
+{
+    if (a->area != b->area) return a->area > b->area;
+    for (int i = 0; i < 4; i++) {
+        const int sign = compare_places(a->places[i], b->places[i]);
+        if (sign) return sign < 0;
+    }
+    return false;
+}
+
+/* ---- places on faces ------------------------------------------------------------------------------------------ */
+
+bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack)
+{
+    for (int i = 0; i < face->count; i++)
+        if (distance(face->places[i], place) <= slack) return true;
+    return false;
+}
+
+/* A whole part of the face where it is one but for rounding. */
+static double rounded(double at)
+{
+    const double parts = round(at * PARTS);
+    return fabs(at * PARTS - parts) < 0.01 ? parts / PARTS : at;
+}
+
+static void place_on(const session_coarse_face *f, const double at[2], double out[3], double slopes[2][3])
+{
+    const double bent = f->count == 4;
+    for (int axis = 0; axis < 3; axis++) {
+        const double a = f->places[0][axis], b = f->places[1][axis], d = f->places[f->count - 1][axis];
+        const double c = bent > 0 ? f->places[2][axis] : b + d - a;
+        slopes[0][axis] = (1 - at[1]) * (b - a) + at[1] * (c - d);
+        slopes[1][axis] = (1 - at[0]) * (d - a) + at[0] * (c - b);
+        out[axis] = (1 - at[1]) * (a + at[0] * (b - a)) + at[1] * (d + at[0] * (c - d));
+    }
+}
+
+/* Newton's method, from the middle; a triangle is half of a parallelogram. */
+static bool solve(const session_coarse_face *f, const double place[3], double at[2])
+{
+    double on[3], slopes[2][3], off[3];
+    at[0] = at[1] = 0.5;
+    for (int step = 0; step < (f->count == 4 ? 12 : 2); step++) {
+        place_on(f, at, on, slopes);
+        for (int axis = 0; axis < 3; axis++) off[axis] = place[axis] - on[axis];
+        const double aa = vector3_dot(slopes[0], slopes[0]), ab = vector3_dot(slopes[0], slopes[1]),
+                     bb = vector3_dot(slopes[1], slopes[1]);
+        const double a = vector3_dot(slopes[0], off), b = vector3_dot(slopes[1], off), det = aa * bb - ab * ab;
+        if (!(det > 0)) return false;
+        at[0] += (a * bb - b * ab) / det;
+        at[1] += (b * aa - a * ab) / det;
+        if (!(fabs(at[0]) < 4 && fabs(at[1]) < 4)) return false;
+    }
+    return true;
+}
+
+bool session_find_on_face(const session_coarse_face *f, const double place[3], double slack, double weights[4])
+{
+    double at[2], on[3], slopes[2][3];
+    for (int axis = 0; axis < 3; axis++)
+        if (!(f->lower[axis] - slack <= place[axis] && place[axis] <= f->upper[axis] + slack)) return false;
+    if (!solve(f, place, at)) return false;
+    for (int k = 0; k < 2; k++) at[k] = rounded(at[k]);
+    const double u = at[0], w = at[1];
+    place_on(f, at, on, slopes);
+    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && distance(on, place) <= slack)) return false;
+    if (f->count == 4) {
+        const double bilinear[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};
+        memcpy(weights, bilinear, sizeof bilinear);
+        return true;
+    }
+    const double rest = 1 - u - w;
+    const bool is_on_edge = fabs(rest) * PARTS < 0.01;
+    weights[0] = is_on_edge ? 0 : rest;
+    weights[1] = u;
+    weights[2] = is_on_edge ? 1 - u : w;
+    weights[3] = 0;
+    return weights[0] >= 0;
+}

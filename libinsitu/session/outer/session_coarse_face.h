@@ -1,0 +1,36 @@
+/* Triangles and quads of cells that vertices may hang on, and places on them. */
+#ifndef SESSION_COARSE_FACE_H
+#define SESSION_COARSE_FACE_H
+
+#include "session_mesh.h"
+
+typedef struct session_coarse_face {
+    int count;           /* of corners: 3 or 4 */
+    double places[4][3]; /* around, from the least on, towards the lesser of its neighbours; of a triangle the last is
+                            the third */
+    double normal[3];    /* of length 1, away from the cell */
+    double lower[3], upper[3];
+    double area, width;
+} session_coarse_face;
+
+enum { SESSION_FACE_WORDS = 13 };
+
+/* Reads a face and its vertices, in the order of its places. False where it is no triangle or quad of a cell, or has no
+ * area. */
+bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
+
+/* Write the face as words for another rank, and read it there. */
+void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS]);
+void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out);
+
+/* Tells whether the place is within slack of a corner. */
+bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack);
+
+/* Finds the weights of the corners at the place, a triangle's last one 0; false where it is off the face by more than
+ * slack. */
+bool session_find_on_face(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
+
+/* An order of faces by area, then by places. */
+bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
+
+#endif

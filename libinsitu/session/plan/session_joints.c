@@ -1,0 +1,124 @@
+#include "session_joints.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_hash.h"
+#include "session_scalars.h"
+
+static bool is_member(const session_catalogue_mesh *mesh, const scene_field *field)
+{
+    const session_catalogue_field *found =
+        scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+    return found && session_is_recentred(field, found->centring);
+}
+
+static void hash_name(uint64_t *hash, const session_catalogue_mesh *mesh)
+{
+    session_hash_bytes(hash, mesh->name, strlen(mesh->name) + 1);
+}
+
+/* Adds a joint of up to count meshes, which is empty. NULL where memory runs out. */
+static session_joint *add_joint(session_catalogue *catalogue, uint64_t name, int count)
+{
+    session_joint **joints = base_realloc(catalogue->joints, (size_t)(catalogue->joint_count + 1) * sizeof *joints);
+    if (!joints) return NULL;
+    catalogue->joints = joints;
+    session_joint *joint = base_calloc(1, sizeof *joint);
+    if (joint) joint->meshes = base_calloc((size_t)count, sizeof *joint->meshes);
+    if (!joint || !joint->meshes) {
+        base_free(joint);
+        return NULL;
+    }
+    joint->name = name;
+    return joints[catalogue->joint_count++] = joint;
+}
+
+static bool set_apart(session_catalogue *catalogue, session_catalogue_mesh *mesh)
+{
+    if (session_find_joint(catalogue, mesh->apart)) return true;
+    session_joint *joint = add_joint(catalogue, mesh->apart, 1);
+    if (!joint) return false;
+    joint->meshes[joint->count++] = mesh;
+    joint->by_id = true;
+    return true;
+}
+
+/* Names the joint of a layer's meshes, those with ids left out, and adds it where it is new. */
+static bool join_field(session_catalogue *catalogue, scene_field *field)
+{
+    uint64_t hash = SESSION_HASH_BEGIN;
+    bool is_done = true;
+    int count = 0;
+    field->joined = 0;
+    for (int m = 0; m < catalogue->mesh_count && field->name && is_done; m++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        if (!is_member(mesh, field)) continue;
+        if (mesh->apart) {
+            is_done = set_apart(catalogue, mesh);
+            continue;
+        }
+        hash_name(&hash, mesh);
+        count++;
+    }
+    if (!count || !is_done) return is_done;
+    field->joined = hash | 1;
+    if (session_find_joint(catalogue, field->joined)) return true;
+    session_joint *joint = add_joint(catalogue, field->joined, count);
+    for (int m = 0; m < catalogue->mesh_count && joint; m++)
+        if (!catalogue->meshes[m].apart && is_member(&catalogue->meshes[m], field))
+            joint->meshes[joint->count++] = &catalogue->meshes[m];
+    return joint != NULL;
+}
+
+/* Meshes with ids are joints of their own. */
+static void find_apart(session_catalogue *catalogue, const session_meshes *meshes)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        session_mesh *own = session_find_mesh(meshes, mesh->name);
+        uint64_t hash = SESSION_HASH_BEGIN;
+        hash_name(&hash, mesh);
+        mesh->apart = mesh->has_ids ? hash | 1 : 0;
+        if (own) own->apart = mesh->apart;
+    }
+}
+
+static bool join_image(session_catalogue *catalogue, scene_image *image)
+{
+    bool is_done = true;
+    for (int i = 0; i < image->isosurface_count && is_done; i++)
+        is_done = join_field(catalogue, &image->isosurfaces[i].field) &&
+                  join_field(catalogue, &image->isosurfaces[i].colour_by);
+    for (int i = 0; i < image->volume_count && is_done; i++) is_done = join_field(catalogue, &image->volumes[i].field);
+    for (int i = 0; i < image->slice_count && is_done; i++) is_done = join_field(catalogue, &image->slices[i].field);
+    for (int i = 0; i < image->surface_count && is_done; i++)
+        is_done = join_field(catalogue, &image->surfaces[i].colour_by);
+    return is_done;
+}
+
+static void drop_other_scalars(const session_catalogue *catalogue, session_meshes *meshes)
+{
+    for (int m = 0; m < meshes->count; m++) {
+        session_mesh *mesh = meshes->items[m];
+        for (int i = mesh->scalar_count - 1; i >= 0; i--)
+            if (mesh->scalars[i].is_recentred && !session_find_joint(catalogue, mesh->scalars[i].joined))
+                session_drop_scalar(mesh, i);
+    }
+}
+
+void session_join_meshes(scene *scene, session_catalogue *catalogue, session_meshes *meshes, base_error *error)
+{
+    bool is_done = true;
+    if (catalogue->are_joined) return;
+    session_drop_joints(catalogue);
+    find_apart(catalogue, meshes);
+    for (int i = 0; i < scene->image_count && is_done; i++)
+        if (scene->images[i].variant.view == 0) is_done = join_image(catalogue, &scene->images[i]);
+    if (is_done)
+        drop_other_scalars(catalogue, meshes);
+    else
+        session_no_memory(error, (int64_t)sizeof(session_joint), "meshes that have one field");
+    catalogue->are_joined = is_done;
+}
