@@ -165,9 +165,9 @@ typedef struct insitu_mesh {
 
 /* A field has one value at each vertex, one in each cell, or one at each corner of each cell. Volumes and colours show
  * cell values as they are, unless the scene says `interpolate: vertex`; then, and always for isosurfaces, each vertex
- * gets the mean of its cells' values, over all ranks and without ghosts. Vertices of several meshes with bitwise equal
- * coordinates are one there, if one layer shows the field on these meshes and they have no vertex ids; a vertex that
- * hangs on a larger cell's triangle or quad gets that face's value. A vertex on the boundary gets the mean of the
+ * gets the mean of its cells' values, over all ranks and without ghosts. Vertices of several meshes at one place are
+ * one there, if one layer shows the field on these meshes and they have no vertex ids; a vertex that hangs on a larger
+ * cell's triangle or quad gets that face's value. A vertex on the boundary gets the mean of the
  * boundary's own values instead, where the field has some (insitu_patch).
  *
  * Corner fields may differ from cell to cell at a shared vertex, as in discontinuous Galerkin methods. They have one

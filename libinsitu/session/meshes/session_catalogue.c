@@ -83,15 +83,20 @@ uint64_t session_names_hash(const session_meshes *meshes)
 void session_hanging_free(session_hanging *hanging, int count, bool with_borders)
 {
     session_border *borders = hanging->borders;
+    const uint64_t twins = hanging->twins;
     base_free(hanging->vertices);
     base_free(hanging->sent_counts);
     base_free(hanging->sent_groups);
     for (int i = 0; i < count && borders && with_borders; i++) {
         base_free(borders[i].faces);
         base_free(borders[i].vertices);
+        base_free(borders[i].twins);
     }
     if (with_borders) base_free(borders);
-    *hanging = (session_hanging){.borders = with_borders ? NULL : borders};
+    *hanging = (session_hanging){0};
+    if (with_borders) return;
+    hanging->borders = borders;
+    hanging->twins = twins;
 }
 
 void session_drop_joints(session_catalogue *catalogue)

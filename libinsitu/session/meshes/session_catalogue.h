@@ -26,18 +26,27 @@ typedef struct session_hanging_vertex {
     bool is_received;
 } session_hanging_vertex;
 
+/* A vertex that is the same as others but for rounding, and the least of their places. */
+typedef struct session_twin {
+    int64_t vertex;
+    double place[3];
+} session_twin;
+
 /* What vertices may hang on, and which may, of this rank's part of a mesh; kept while vertices move. */
 typedef struct session_border {
     uint64_t cells; /* session_catalogue_mesh.cells that it is of; 0: not known */
     int64_t face_count, vertex_count;
     session_face *faces; /* that one cell alone has, over all ranks */
     int64_t *vertices;   /* of faces that this rank has once */
+    int64_t twin_count;  /* found again where vertices move: session_hanging.twins */
+    session_twin *twins; /* in the order of vertices */
 } session_border;
 
 /* This rank's hanging vertices of the meshes of a joint, and what it sends to others for theirs. */
 typedef struct session_hanging {
     uint64_t places;         /* session_joint.places that it is of; 0: not known */
     session_border *borders; /* of each mesh; NULL: none are known */
+    uint64_t twins;          /* the places that the borders' twins are of */
     int64_t count, total;    /* on this rank, on all */
     session_hanging_vertex *vertices;
     int64_t *sent_counts, *sent_groups; /* to each rank; whose values, rank by rank */

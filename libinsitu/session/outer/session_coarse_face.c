@@ -12,11 +12,21 @@ enum { PARTS = 96 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
 
-static int compare_places(const double a[3], const double b[3])
+int session_compare_places(const double a[3], const double b[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
     return 0;
+}
+
+double session_place_rounding(const session_mesh *mesh)
+{
+    double rounding = 0;
+    for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
+        const double largest = fmax(fabs(mesh->lower[axis]), fabs(mesh->upper[axis]));
+        rounding = fmax(rounding, largest * (mesh->cells.coordinates[axis].is_wide ? 0x1p-50 : 0x1p-21));
+    }
+    return rounding;
 }
 
 static double distance(const double a[3], const double b[3])
@@ -73,11 +83,11 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     for (int i = 0; i < count; i++) {
         grid_vertex(g, session_face_vertex(&loop, i), places[i]);
         for (int k = 0; k < i; k++)
-            if (compare_places(places[k], places[i]) == 0) return false;
-        if (compare_places(places[i], places[least]) < 0) least = i;
+            if (session_compare_places(places[k], places[i]) == 0) return false;
+        if (session_compare_places(places[i], places[least]) < 0) least = i;
     }
     const int step =
-        compare_places(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
+        session_compare_places(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
     out->count = count;
     for (int i = 0; i < 4; i++) {
         const int from = (least + step * (i < count ? i : count - 1)) % count;
@@ -111,7 +121,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 {
     if (a->area != b->area) return a->area > b->area;
     for (int i = 0; i < 4; i++) {
-        const int sign = compare_places(a->places[i], b->places[i]);
+        const int sign = session_compare_places(a->places[i], b->places[i]);
         if (sign) return sign < 0;
     }
     return false;

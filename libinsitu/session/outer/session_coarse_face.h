@@ -30,7 +30,11 @@ bool session_is_at_corner(const session_coarse_face *face, const double place[3]
  * slack. */
 bool session_find_on_face(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
 
-/* An order of faces by area, then by places. */
+/* By how much coordinates of the mesh may be rounded; 0 for NULL. */
+double session_place_rounding(const session_mesh *mesh);
+
+/* An order of places, and of faces by area, then by places. */
+int session_compare_places(const double a[3], const double b[3]);
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
 
 #endif

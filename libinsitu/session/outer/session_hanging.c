@@ -5,8 +5,10 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_bins.h"
 #include "session_coarse_face.h"
 #include "session_outer_faces.h"
+#include "session_twins.h"
 #include "vector3.h"
 
 /* The share of a face's width by which a vertex may be off it: roundings of codes that compute hanging vertices in
@@ -55,10 +57,7 @@ typedef struct hanging_search {
     double rounding; /* of coordinates */
     int64_t contact_count, contact_room;
     contact *contacts;
-    /* Bins of candidates. */
-    double lower[3], size;
-    int64_t bins[3];
-    int64_t *starts, *items;
+    session_bins bins; /* of candidates */
 } hanging_search;
 
 static void search_free(hanging_search *s)
@@ -66,8 +65,7 @@ static void search_free(hanging_search *s)
     base_free(s->faces);
     base_free(s->candidates);
     base_free(s->contacts);
-    base_free(s->starts);
-    base_free(s->items);
+    session_bins_free(&s->bins);
 }
 
 /* ---- borders -------------------------------------------------------------------------------------------------- */
@@ -81,6 +79,7 @@ static bool keep_border(const session_mesh *mesh, session_outer *outer, const un
     if (!vertices) return false;
     base_free(out->faces);
     base_free(out->vertices);
+    base_free(out->twins);
     *out = (session_border){.face_count = outer->face_count, .faces = outer->faces, .vertices = vertices};
     outer->faces = NULL;
     for (int64_t v = 0; v < mesh->cells.vertex_count; v++)
@@ -103,22 +102,27 @@ static insitu_status update_border(const session_mesh *mesh, const session_catal
     if (!status && mesh && !keep_border(mesh, &outer, is_border, border))
         session_no_memory(error, count * 8, "hanging vertices");
     if (!status) status = session_agree(team->comm, error);
-    if (!status && !mesh) border->face_count = border->vertex_count = 0;
+    if (!status && !mesh) border->face_count = border->vertex_count = border->twin_count = 0;
     if (!status) border->cells = of->cells;
     session_drop_outer(&outer, true);
     base_free(is_border);
     return status;
 }
 
-static insitu_status update_borders(const session_hanging_basis *basis, const session_team *team, base_error *error)
+insitu_status session_update_borders(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+                                     base_error *error)
 {
-    session_hanging *hanging = &basis->joint->hanging;
-    const int count = basis->joint->count;
+    session_hanging *hanging = &joint->hanging;
+    const int count = joint->count;
+    if (hanging->borders && hanging->twins == joint->places) return INSITU_OK;
     if (!hanging->borders) hanging->borders = base_calloc((size_t)count, sizeof *hanging->borders);
     if (!hanging->borders) session_no_memory(error, count * (int64_t)sizeof *hanging->borders, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < count && !status; i++)
-        status = update_border(basis->meshes[i], basis->joint->meshes[i], &hanging->borders[i], team, error);
+        status = update_border(meshes[i], joint->meshes[i], &hanging->borders[i], team, error);
+    if (!status && count > 1) status = session_find_twins(joint, meshes, team, error);
+    if (!status) status = session_agree(team->comm, error);
+    if (!status) hanging->twins = joint->places;
     return status;
 }
 
@@ -234,45 +238,9 @@ static bool list_candidates(hanging_search *s)
     return true;
 }
 
-static int64_t bin_along(const hanging_search *s, double place, int axis)
+static bool bin_candidates(hanging_search *s)
 {
-    const double at = (place - s->lower[axis]) / s->size;
-    return at < 0 ? 0 : at >= (double)s->bins[axis] ? s->bins[axis] - 1 : (int64_t)at;
-}
-
-static int64_t bin_of(const hanging_search *s, const double place[3])
-{
-    return bin_along(s, place[0], 0) +
-           s->bins[0] * (bin_along(s, place[1], 1) + s->bins[1] * bin_along(s, place[2], 2));
-}
-
-/* Cubes, about as many as there are candidates on a surface. */
-static bool make_bins(hanging_search *s)
-{
-    double upper[3], widest = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        s->lower[axis] = (double)INFINITY;
-        upper[axis] = -(double)INFINITY;
-        for (int64_t i = 0; i < s->candidate_count; i++) {
-            s->lower[axis] = fmin(s->lower[axis], s->candidates[i].place[axis]);
-            upper[axis] = fmax(upper[axis], s->candidates[i].place[axis]);
-        }
-        widest = fmax(widest, upper[axis] - s->lower[axis]);
-    }
-    const double across = fmin(fmax(sqrt((double)s->candidate_count) / 2, 1), 128);
-    s->size = widest > 0 ? widest / across : 1;
-    int64_t count = 1;
-    for (int axis = 0; axis < 3; axis++) {
-        s->bins[axis] = s->candidate_count ? (int64_t)((upper[axis] - s->lower[axis]) / s->size) + 1 : 1;
-        count *= s->bins[axis];
-    }
-    s->starts = base_calloc((size_t)count + 2, sizeof *s->starts);
-    s->items = base_alloc((size_t)(s->candidate_count + 1) * sizeof *s->items);
-    if (!s->starts || !s->items) return false;
-    for (int64_t i = 0; i < s->candidate_count; i++) s->starts[bin_of(s, s->candidates[i].place) + 2]++;
-    for (int64_t b = 0; b < count; b++) s->starts[b + 2] += s->starts[b + 1];
-    for (int64_t i = 0; i < s->candidate_count; i++) s->items[s->starts[bin_of(s, s->candidates[i].place) + 1]++] = i;
-    return true;
+    return session_bins_create(&s->bins, s->candidates->place, (int64_t)sizeof *s->candidates, s->candidate_count);
 }
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
@@ -319,18 +287,9 @@ static bool try_faces(hanging_search *s, try_function *try_one)
     bool is_done = true;
     for (int64_t number = 0; number < s->face_count && s->candidate_count && is_done; number++) {
         const session_coarse_face *f = &s->faces[number].face;
-        const double slack = slack_of(s, f);
-        int64_t low[3], high[3];
-        for (int axis = 0; axis < 3; axis++) {
-            low[axis] = bin_along(s, f->lower[axis] - slack, axis);
-            high[axis] = bin_along(s, f->upper[axis] + slack, axis);
-        }
-        for (int64_t k = low[2]; k <= high[2]; k++)
-            for (int64_t j = low[1]; j <= high[1]; j++) {
-                const int64_t row = s->bins[0] * (j + s->bins[1] * k);
-                for (int64_t i = s->starts[row + low[0]]; i < s->starts[row + high[0] + 1] && is_done; i++)
-                    is_done = try_one(s, number, &s->candidates[s->items[i]]);
-            }
+        session_bin_walk walk = session_walk_bins(&s->bins, f->lower, f->upper, slack_of(s, f));
+        int64_t near;
+        while (is_done && session_next_binned(&walk, &near)) is_done = try_one(s, number, &s->candidates[near]);
     }
     return is_done;
 }
@@ -464,27 +423,17 @@ static insitu_status count_all(const session_team *team, session_hanging *out, b
     return status;
 }
 
-static double rounding_of(const session_mesh *mesh)
-{
-    double rounding = 0;
-    for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
-        const double largest = fmax(fabs(mesh->lower[axis]), fabs(mesh->upper[axis]));
-        rounding = fmax(rounding, largest * (mesh->cells.coordinates[axis].is_wide ? 0x1p-50 : 0x1p-21));
-    }
-    return rounding;
-}
-
 insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error)
 {
     session_joint *joint = basis->joint;
     hanging_search search = {.basis = basis, .team = team};
     session_hanging found = {.places = joint->places};
     if (joint->hanging.places == joint->places) return INSITU_OK;
-    for (int i = 0; i < joint->count; i++) search.rounding = fmax(search.rounding, rounding_of(basis->meshes[i]));
-    insitu_status status = update_borders(basis, team, error);
-    if (!status && (!read_faces(&search) || !list_candidates(&search) || !make_bins(&search)))
+    for (int i = 0; i < joint->count; i++)
+        search.rounding = fmax(search.rounding, session_place_rounding(basis->meshes[i]));
+    if ((!read_faces(&search) || !list_candidates(&search) || !bin_candidates(&search)))
         session_no_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
-    if (!status) status = find_shared(&search, &found, error);
+    insitu_status status = find_shared(&search, &found, error);
     search_free(&search);
     if (!status) status = session_agree(team->comm, error);
     if (!status) status = count_all(team, &found, error);
@@ -494,6 +443,7 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
     }
     session_hanging_free(&joint->hanging, joint->count, false);
     found.borders = joint->hanging.borders;
+    found.twins = joint->hanging.twins;
     joint->hanging = found;
     return INSITU_OK;
 }

@@ -26,7 +26,12 @@ typedef struct session_hanging_basis {
     int64_t group_count;
 } session_hanging_basis;
 
-/* Finds the joint's hanging vertices where they are not known. Collective, agreed. */
+/* Finds the joint's borders, and of several meshes the twins of their vertices, where they are not known. meshes: as
+ * above. Collective, agreed. */
+insitu_status session_update_borders(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+                                     base_error *error);
+
+/* Finds the joint's hanging vertices where they are not known. Its borders are. Collective, agreed. */
 insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error);
 
 /* Gives hanging vertices their faces' values. means: of the groups. Where a face's own values are not finite, vertices

@@ -121,6 +121,8 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
     for (int64_t k = 0; k < face->size; k++) {
         const int64_t vertex = grid_array_index(&face->list, face->first + k);
         if (vertex < 0 || vertex >= count) return tell_range(p, patch, i, "has a vertex index outside", count, error);
+        groups[k] = p->mesh->torn.is_torn ? -1 : p->numbers->of_vertex[vertex];
+        if (groups[k] >= 0) continue;
         const session_key key = session_given_vertex_key(p->mesh, vertex, p->numbers->by_id);
         groups[k] = session_keys_find(p->numbers->keys, &key);
     }

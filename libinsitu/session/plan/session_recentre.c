@@ -122,18 +122,32 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's part ---------------------------------------------------------------------------------------- */
 
-static void group_vertices(const session_mesh *mesh, int64_t first, vertex_groups *groups)
+static session_key key_of_place(const double place[3])
+{
+    session_key key;
+    for (int axis = 0; axis < 3; axis++) {
+        const double unsigned_zero = place[axis] + 0.0;
+        memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
+    }
+    return key;
+}
+
+/* Until they have a group, of_vertex has -2 - i of the i-th twin. */
+static void group_vertices(const session_mesh *mesh, int64_t first, const session_border *border, vertex_groups *groups)
 {
     const grid *g = &mesh->cells;
     int64_t *of_vertex = groups->of_vertex + first;
     for (int64_t v = 0; v < g->vertex_count; v++) of_vertex[v] = -1;
+    for (int64_t i = 0; border && i < border->twin_count; i++) of_vertex[border->twins[i].vertex] = -2 - i;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
         grid_walk walk = grid_walk_cell(g, cell);
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
             if (of_vertex[vertex] >= 0) continue;
-            const session_key key = session_vertex_key(mesh, vertex, groups->by_id);
+            const int64_t twin = -2 - of_vertex[vertex];
+            const session_key key =
+                twin >= 0 ? key_of_place(border->twins[twin].place) : session_vertex_key(mesh, vertex, groups->by_id);
             const int64_t group = session_keys_add(&groups->keys, &key);
             of_vertex[vertex] = group;
             if (groups->by_id) groups->vertex[group] = vertex;
@@ -246,7 +260,7 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
     return true;
 }
 
-static bool number_groups(vertex_groups *groups)
+static bool number_groups(const session_hanging *hanging, vertex_groups *groups)
 {
     const int64_t count = groups->firsts[groups->part_count];
     groups->of_vertex = base_alloc((size_t)count * sizeof *groups->of_vertex);
@@ -254,7 +268,9 @@ static bool number_groups(vertex_groups *groups)
     if (!groups->of_vertex || (groups->by_id && !groups->vertex) || !session_keys_create(&groups->keys, count))
         return false;
     for (int i = 0; i < groups->part_count; i++)
-        if (groups->meshes[i]) group_vertices(groups->meshes[i], groups->firsts[i], groups);
+        if (groups->meshes[i])
+            group_vertices(groups->meshes[i], groups->firsts[i],
+                           hanging->borders && groups->part_count > 1 ? &hanging->borders[i] : NULL, groups);
     return groups_create(&groups->values, groups->keys.count);
 }
 
@@ -278,12 +294,10 @@ static insitu_status average_groups(vertex_groups *groups, int threads, base_err
     return INSITU_OK;
 }
 
-static insitu_status make_groups(const session_recentring *item, const session_meshes *meshes, int threads,
-                                 vertex_groups *groups, base_error *error)
+static insitu_status make_groups(const session_recentring *item, int threads, vertex_groups *groups, base_error *error)
 {
-    if (!list_parts(item, meshes, groups) || !number_groups(groups))
-        return session_no_memory(error, groups->firsts ? groups->firsts[groups->part_count] * 80 : 8,
-                                 "values recentred to vertices");
+    if (!number_groups(&item->joint->hanging, groups))
+        return session_no_memory(error, groups->firsts[groups->part_count] * 80, "values recentred to vertices");
     return average_groups(groups, threads, error);
 }
 
@@ -538,9 +552,14 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
 {
     const session_homes *homes = item->joint->homes;
     vertex_groups groups = {0};
-    if (!make_groups(item, meshes, team->threads, &groups, error)) make_room(&groups, error);
-    insitu_status status =
-        team->ranks > 1 ? merge_shared(team, homes, &groups, error) : session_agree(team->comm, error);
+    insitu_status status = INSITU_OK;
+    const bool is_listed = list_parts(item, meshes, &groups);
+    if (!is_listed) session_no_memory(error, item->joint->count * 64LL, "values recentred to vertices");
+    if (item->joint->count > 1 || is_of_cells(item))
+        status = session_update_borders(item->joint, groups.meshes, team, error);
+    if (!status && is_listed && !make_groups(item, team->threads, &groups, error)) make_room(&groups, error);
+    if (!status)
+        status = team->ranks > 1 ? merge_shared(team, homes, &groups, error) : session_agree(team->comm, error);
     if (!status && is_of_cells(item)) status = constrain_hanging(item, team, &groups, error);
     if (!status && !error->status) keep_means(&groups, item->joint, team->threads);
     vertex_groups_free(&groups);

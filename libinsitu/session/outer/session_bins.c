@@ -1,0 +1,99 @@
+#include "session_bins.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+
+static int64_t bin_along(const session_bins *b, double place, int axis)
+{
+    const double at = (place - b->lower[axis]) / b->size;
+    return at < 0 ? 0 : at >= (double)b->counts[axis] ? b->counts[axis] - 1 : (int64_t)at;
+}
+
+static int64_t bin_of(const session_bins *b, const double place[3])
+{
+    return bin_along(b, place[0], 0) +
+           b->counts[0] * (bin_along(b, place[1], 1) + b->counts[1] * bin_along(b, place[2], 2));
+}
+
+static const double *place_of(const double *places, int64_t stride, int64_t i)
+{
+    return (const double *)(const void *)((const char *)places + i * stride);
+}
+
+/* Returns how many bins there are. */
+static int64_t size_bins(session_bins *b, const double *places, int64_t stride, int64_t count)
+{
+    double upper[3], widest = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        b->lower[axis] = (double)INFINITY;
+        upper[axis] = -(double)INFINITY;
+        for (int64_t i = 0; i < count; i++) {
+            b->lower[axis] = fmin(b->lower[axis], place_of(places, stride, i)[axis]);
+            upper[axis] = fmax(upper[axis], place_of(places, stride, i)[axis]);
+        }
+        widest = fmax(widest, upper[axis] - b->lower[axis]);
+    }
+    const double across = fmin(fmax(sqrt((double)count) / 2, 1), 128);
+    int64_t bins = 1;
+    b->size = widest > 0 ? widest / across : 1;
+    for (int axis = 0; axis < 3; axis++) {
+        b->counts[axis] = count ? (int64_t)((upper[axis] - b->lower[axis]) / b->size) + 1 : 1;
+        bins *= b->counts[axis];
+    }
+    return bins;
+}
+
+bool session_bins_create(session_bins *b, const double *places, int64_t stride, int64_t count)
+{
+    const int64_t bins = size_bins(b, places, stride, count);
+    b->starts = base_calloc((size_t)bins + 2, sizeof *b->starts);
+    b->items = base_alloc((size_t)(count + 1) * sizeof *b->items);
+    if (!b->starts || !b->items) return false;
+    for (int64_t i = 0; i < count; i++) b->starts[bin_of(b, place_of(places, stride, i)) + 2]++;
+    for (int64_t n = 0; n < bins; n++) b->starts[n + 2] += b->starts[n + 1];
+    for (int64_t i = 0; i < count; i++) b->items[b->starts[bin_of(b, place_of(places, stride, i)) + 1]++] = i;
+    return true;
+}
+
+void session_bins_free(session_bins *bins)
+{
+    base_free(bins->starts);
+    base_free(bins->items);
+    *bins = (session_bins){0};
+}
+
+/* Goes to the row of bins at the walk's place. */
+static void enter_row(session_bin_walk *walk)
+{
+    const session_bins *b = walk->bins;
+    const int64_t row = b->counts[0] * (walk->at[1] + b->counts[1] * walk->at[2]);
+    walk->next = b->starts[row + walk->low[0]];
+    walk->end = b->starts[row + walk->high[0] + 1];
+}
+
+session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],
+                                   double margin)
+{
+    session_bin_walk walk = {.bins = bins};
+    for (int axis = 0; axis < 3; axis++) {
+        walk.at[axis] = walk.low[axis] = bin_along(bins, lower[axis] - margin, axis);
+        walk.high[axis] = bin_along(bins, upper[axis] + margin, axis);
+    }
+    enter_row(&walk);
+    return walk;
+}
+
+bool session_next_binned(session_bin_walk *walk, int64_t *point)
+{
+    while (walk->next == walk->end) {
+        if (++walk->at[1] > walk->high[1]) {
+            walk->at[1] = walk->low[1];
+            if (++walk->at[2] > walk->high[2]) return false;
+        }
+        enter_row(walk);
+    }
+    *point = walk->bins->items[walk->next++];
+    return true;
+}

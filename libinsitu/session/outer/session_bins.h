@@ -1,0 +1,32 @@
+/* Points in cubic bins, about as many of these as there are points on a surface. */
+#ifndef SESSION_BINS_H
+#define SESSION_BINS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct session_bins {
+    double lower[3], size;
+    int64_t counts[3];
+    int64_t *starts, *items; /* the points of bin b are items[starts[b]] .. items[starts[b + 1] - 1] */
+} session_bins;
+
+/* The places of count points are stride bytes apart. False where memory runs out. */
+bool session_bins_create(session_bins *bins, const double *places, int64_t stride, int64_t count);
+void session_bins_free(session_bins *bins);
+
+/* Visits the points near a box: some lie outside of it, none inside is left out.
+ *
+ *     for (session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin); session_next_binned(&walk, &point);)
+ */
+typedef struct session_bin_walk {
+    const session_bins *bins;
+    int64_t low[3], high[3], at[3];
+    int64_t next, end;
+} session_bin_walk;
+
+session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],
+                                   double margin);
+bool session_next_binned(session_bin_walk *walk, int64_t *point);
+
+#endif

@@ -1,0 +1,213 @@
+#include "session_twins.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_bins.h"
+#include "session_coarse_face.h"
+#include "session_cell_faces.h"
+#include "session_exchange.h"
+
+enum { CORNER_WORDS = 4 };
+
+/* A vertex of an outer face. */
+typedef struct face_corner {
+    double place[3];
+    double slack; /* what is nearer is the same vertex */
+} face_corner;
+
+/* A vertex of a face that this rank has once, and the least place of those that are the same. */
+typedef struct border_vertex {
+    double place[3], least[3];
+} border_vertex;
+
+typedef struct twin_search {
+    const session_joint *joint;
+    const session_mesh *const *meshes;
+    const session_team *team;
+    int64_t corner_count, vertex_count;
+    face_corner *corners;    /* this rank's, then received ones */
+    border_vertex *vertices; /* of all meshes, in their order */
+    double rounding;
+    session_bins bins;
+} twin_search;
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* ---- corners -------------------------------------------------------------------------------------------------- */
+
+/* Finds the shortest edge at each vertex of the face. */
+static void measure_edges(const grid *g, const session_face *face, double *edges)
+{
+    const session_cell_faces faces = session_faces_of_cell(g, face->cell);
+    const session_face_loop loop = session_face_of(&faces, face->face);
+    for (int64_t i = 0; i < loop.size; i++) {
+        const int64_t from = session_face_vertex(&loop, i), to = session_face_vertex(&loop, (i + 1) % loop.size);
+        double a[3], b[3];
+        grid_vertex(g, from, a);
+        grid_vertex(g, to, b);
+        const double length = distance(a, b);
+        if (!(length > 0)) continue;
+        edges[from] = fmin(edges[from], length);
+        edges[to] = fmin(edges[to], length);
+    }
+}
+
+/* Adds the corners of a mesh's outer faces. */
+static bool add_corners(twin_search *s, const session_mesh *mesh, const session_border *border)
+{
+    const grid *g = &mesh->cells;
+    double *edges = base_alloc((size_t)(g->vertex_count + 1) * sizeof *edges);
+    face_corner *corners =
+        base_realloc(s->corners, (size_t)(s->corner_count + border->vertex_count + 1) * sizeof *corners);
+    if (corners) s->corners = corners;
+    for (int64_t v = 0; v < g->vertex_count && edges && corners; v++) edges[v] = (double)INFINITY;
+    for (int64_t i = 0; i < border->face_count && edges && corners; i++) measure_edges(g, &border->faces[i], edges);
+    for (int64_t i = 0; i < border->vertex_count && edges && corners; i++) {
+        const double edge = edges[border->vertices[i]];
+        if (isinf(edge)) continue;
+        face_corner *c = &s->corners[s->corner_count++];
+        grid_vertex(g, border->vertices[i], c->place);
+        c->slack = fmin(fmax(1e-5 * edge, s->rounding), edge / 4);
+    }
+    base_free(edges);
+    return edges && corners;
+}
+
+static bool list_own(twin_search *s)
+{
+    const session_border *borders = s->joint->hanging.borders;
+    int64_t count = 0;
+    for (int m = 0; m < s->joint->count; m++) count += borders[m].vertex_count;
+    s->vertices = base_alloc((size_t)(count + 1) * sizeof *s->vertices);
+    if (!s->vertices) return false;
+    for (int m = 0; m < s->joint->count; m++) {
+        for (int64_t i = 0; i < borders[m].vertex_count; i++) {
+            border_vertex *v = &s->vertices[s->vertex_count++];
+            grid_vertex(&s->meshes[m]->cells, borders[m].vertices[i], v->place);
+            memcpy(v->least, v->place, sizeof v->least);
+        }
+        if (s->meshes[m] && !add_corners(s, s->meshes[m], &borders[m])) return false;
+    }
+    return session_bins_create(&s->bins, s->vertices->place, (int64_t)sizeof *s->vertices, s->vertex_count);
+}
+
+/* ---- what ranks share ----------------------------------------------------------------------------------------- */
+
+static bool is_in(const session_box *box, const double place[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (!(box->lower[axis] <= place[axis] && place[axis] <= box->upper[axis])) return false;
+    return true;
+}
+
+/* Lists the corners for each rank in whose box they are; counts words where there is no room. */
+static void send_corners(const twin_search *s, session_mail *mail)
+{
+    const session_homes *homes = s->joint->homes;
+    mail->total = 0;
+    for (int n = 0; n < homes->near_count; n++) {
+        const int64_t first = mail->total;
+        for (int64_t i = 0; i < s->corner_count && homes->near[n] != s->team->rank; i++) {
+            if (!is_in(&homes->boxes[n], s->corners[i].place)) continue;
+            if (mail->words) memcpy(mail->words + mail->total, &s->corners[i], sizeof s->corners[i]);
+            mail->total += CORNER_WORDS;
+        }
+        mail->counts[homes->near[n]] = mail->total - first;
+    }
+}
+
+static bool pack_corners(const twin_search *s, session_mail *mail)
+{
+    mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
+    if (!mail->counts) return false;
+    send_corners(s, mail);
+    mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
+    if (mail->words) send_corners(s, mail);
+    return mail->words != NULL;
+}
+
+static bool take_corners(twin_search *s, const session_mail *in)
+{
+    const int64_t count = in->total / CORNER_WORDS;
+    face_corner *corners = base_realloc(s->corners, (size_t)(s->corner_count + count + 1) * sizeof *corners);
+    if (!corners) return false;
+    s->corners = corners;
+    if (count) memcpy(corners + s->corner_count, in->words, (size_t)count * sizeof *corners);
+    s->corner_count += count;
+    return true;
+}
+
+/* ---- twins ---------------------------------------------------------------------------------------------------- */
+
+static void find_least(twin_search *s)
+{
+    for (int64_t i = 0; i < s->corner_count && s->vertex_count; i++) {
+        const face_corner *c = &s->corners[i];
+        session_bin_walk walk = session_walk_bins(&s->bins, c->place, c->place, c->slack);
+        int64_t near;
+        while (session_next_binned(&walk, &near)) {
+            border_vertex *v = &s->vertices[near];
+            if (distance(v->place, c->place) <= c->slack && session_compare_places(c->place, v->least) < 0)
+                memcpy(v->least, c->place, sizeof v->least);
+        }
+    }
+}
+
+static bool keep_twins(const border_vertex *vertices, session_border *border)
+{
+    int64_t count = 0;
+    for (int64_t i = 0; i < border->vertex_count; i++)
+        count += session_compare_places(vertices[i].least, vertices[i].place) != 0;
+    session_twin *twins = base_alloc((size_t)(count + 1) * sizeof *twins);
+    if (!twins) return false;
+    base_free(border->twins);
+    border->twins = twins;
+    border->twin_count = 0;
+    for (int64_t i = 0; i < border->vertex_count; i++) {
+        if (session_compare_places(vertices[i].least, vertices[i].place) == 0) continue;
+        session_twin *twin = &twins[border->twin_count++];
+        twin->vertex = border->vertices[i];
+        memcpy(twin->place, vertices[i].least, sizeof twin->place);
+    }
+    return true;
+}
+
+static bool keep_all(const twin_search *s)
+{
+    bool is_done = true;
+    int64_t first = 0;
+    for (int m = 0; m < s->joint->count && is_done; m++) {
+        session_border *border = &s->joint->hanging.borders[m];
+        is_done = keep_twins(s->vertices + first, border);
+        first += border->vertex_count;
+    }
+    return is_done;
+}
+
+insitu_status session_find_twins(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+                                 base_error *error)
+{
+    twin_search s = {.joint = joint, .meshes = meshes, .team = team};
+    session_mail out = {0}, in = {0};
+    for (int m = 0; m < joint->count; m++) s.rounding = fmax(s.rounding, session_place_rounding(meshes[m]));
+    if (!error->status && (!list_own(&s) || !pack_corners(&s, &out)))
+        session_no_memory(error, (s.corner_count + s.vertex_count) * 80, "vertices of several meshes");
+    const insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);
+    if (!status && !error->status) {
+        const bool is_taken = take_corners(&s, &in);
+        if (is_taken) find_least(&s);
+        if (!is_taken || !keep_all(&s)) session_no_memory(error, s.corner_count * 32, "vertices of several meshes");
+    }
+    session_mail_free(&out);
+    session_mail_free(&in);
+    session_bins_free(&s.bins);
+    base_free(s.corners);
+    base_free(s.vertices);
+    return status;
+}
