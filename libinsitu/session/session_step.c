@@ -112,6 +112,7 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
         *error = (base_error){0};
         session_take_back(&s->meshes);
         status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, false, error);
+        if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
         if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
     }
     if (!status && refused->status) plan->refusal = *refused;

@@ -6,7 +6,7 @@
 
 #include <insitu/insitu.h>
 
-static const char words[] = "images:\n"
+static const char words[] = "writing: step\nimages:\n"
                             "  - {name: kept, size: [32, 24], background: [1, 0, 0], layers: [surface: {}]}\n"
                             "  - {name: written, size: [32, 24], every: 2, layers: [surface: {}], "
                             "outputs: [{path: a.png}]}\n";
