@@ -1,15 +1,11 @@
-#define _GNU_SOURCE 1
 #include "memory.h"
 
 #include <stdatomic.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 
-/* In front of every block stands one cache line that holds its size, so that frees can be counted. Blocks of at least
- * large_bytes ask for huge pages. */
-enum { header_bytes = 64, huge_page_bytes = 2 << 20, large_bytes = 4 * huge_page_bytes };
+/* In front of every block stands one cache line that holds its size, so that frees can be counted. */
+enum { header_bytes = 64 };
 
 static atomic_llong held_bytes;
 static atomic_llong peak_bytes;
@@ -31,18 +27,6 @@ static int must_fail(void)
     return atomic_fetch_sub(&fail_countdown, 1) == 1;
 }
 
-/* Asks for the huge pages that lie in the block as a whole. Where they are refused the block has usual pages. */
-static void ask_for_huge_pages(char *block, size_t bytes)
-{
-#ifdef MADV_HUGEPAGE
-    const uintptr_t first = ((uintptr_t)block + huge_page_bytes - 1) / huge_page_bytes * huge_page_bytes;
-    const uintptr_t end = ((uintptr_t)block + bytes) / huge_page_bytes * huge_page_bytes;
-    if (bytes >= large_bytes) madvise((void *)first, end - first, MADV_HUGEPAGE);
-#else
-    (void)block, (void)bytes;
-#endif
-}
-
 /* An empty block has an address within its own memory too, so that a search for leaks finds who holds it. */
 static void *make_block(size_t bytes, size_t counted)
 {
@@ -51,7 +35,6 @@ static void *make_block(size_t bytes, size_t counted)
     const size_t rounded = bytes ? (bytes + header_bytes - 1) / header_bytes * header_bytes : header_bytes;
     char *raw = aligned_alloc(header_bytes, rounded + header_bytes);
     if (!raw) return NULL;
-    if (counted) ask_for_huge_pages(raw, rounded + header_bytes);
     memcpy(raw, &counted, sizeof counted);
     count_bytes((long long)counted);
     return raw + header_bytes;
