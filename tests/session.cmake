@@ -198,8 +198,11 @@ if(NOT CMAKE_PROJECT_INCLUDE)
   foreach(ranks 1 2)
     set_property(TEST session_small_stacks_np${ranks} APPEND PROPERTY ENVIRONMENT OMP_STACKSIZE=100k SMALL_STACKS=1)
   endforeach()
+  insitu_add_mpi_test(session_told_stacks test_session_stack 1 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+  set_property(TEST session_told_stacks_np1 APPEND PROPERTY ENVIRONMENT OMP_STACKSIZE=280k TOLD_STACKS=1)
   # They write scene files of the same name.
-  set_tests_properties(session_stack_np1 session_small_stacks_np1 session_small_stacks_np2 PROPERTIES
+  set_tests_properties(
+    session_stack_np1 session_small_stacks_np1 session_small_stacks_np2 session_told_stacks_np1 PROPERTIES
     RESOURCE_LOCK session_stack)
 endif()
 

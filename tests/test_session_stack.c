@@ -1,7 +1,8 @@
 /* A step takes less stack, of the calling thread's and of a worker's, than it checks for (session_threads.h). The
  * stacks are painted before a step, and inspected after it.
  *
- * With SMALL_STACKS in the environment OpenMP's are too small, and the step says so. */
+ * With SMALL_STACKS in the environment OpenMP's are too small, and the step says so, and what suffices; with
+ * TOLD_STACKS they are what it says. */
 #define _GNU_SOURCE
 #include <omp.h>
 #include <pthread.h>
@@ -14,6 +15,7 @@
 #include "session_threads.h"
 #include "test_session_fixture.h"
 
+enum { MOST_TOLD = 280 }; /* kB that the error of workers' stacks may ask for */
 enum { PAINT = 0xa5, PAINTED = 1 << 20, NEAR = 1024 /* frames of the painter itself */ };
 
 /* Two threads wherever the test runs. */
@@ -122,8 +124,24 @@ static void small_stacks_are_told(void **context)
     for (int cycle = 0; cycle < 2; cycle++) {
         const insitu_status status = insitu_step(session, cycle, 0);
         told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
-                        "of stack, a step needs 256 kB (OMP_STACKSIZE");
+                        "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
+        const char *figure = strstr(insitu_error(session), "OMP_STACKSIZE=");
+        const long told = figure ? strtol(figure + strlen("OMP_STACKSIZE="), NULL, 10) : 0;
+        everywhere(told > SESSION_WORKER_STACK >> 10 && told <= MOST_TOLD);
     }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* With OMP_STACKSIZE=MOST_TOLD in the environment. */
+static void told_stacks_suffice(void **context)
+{
+    (void)context;
+    session_input in;
+    input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    step_is_good(session, 0);
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -140,7 +158,14 @@ static int run_small(void)
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 
+static int run_told(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(told_stacks_suffice)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, getenv("SMALL_STACKS") ? run_small : run);
+    const char *told = getenv("TOLD_STACKS");
+    return run_session_tests(argc, argv, told ? run_told : getenv("SMALL_STACKS") ? run_small : run);
 }

@@ -368,8 +368,8 @@ INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *m
  *
  * A step that draws works on OpenMP threads: as many as the scene asks for, but no more than there are cores and than
  * can be started. Within a parallel region of the caller's it works on the calling thread alone. That thread needs 320
- * kB of stack, the others 256 kB (OMP_STACKSIZE); less is an error. On all these threads the caller's floating-point
- * traps and rounding modes are off meanwhile, here and in insitu_create(). */
+ * kB of stack below this call, the others 256 kB below OpenMP's own; less is an error, which says what to set. On all
+ * these threads the caller's floating-point traps and rounding modes are off meanwhile, here and in insitu_create(). */
 INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
 
 /* The report of the last step. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */

@@ -188,51 +188,71 @@ static int choose_threads(const session_threads *threads, int asked, int wanted,
 
 /* ---- stacks -------------------------------------------------------------------------------------------------- */
 
-/* The stack from here to this thread's lowest address; unlimited if it is not the system's. */
-static int64_t stack_left(void)
+/* This thread's stack; left: from here to its lowest address, INT64_MAX where it is not the system's. */
+typedef struct thread_stack {
+    int64_t left, size;
+} thread_stack;
+
+static thread_stack own_stack(void)
 {
     pthread_attr_t attributes;
     void *lowest = NULL;
     size_t size = 0;
-    if (pthread_getattr_np(pthread_self(), &attributes) != 0) return INT64_MAX;
+    const thread_stack unknown = {INT64_MAX, INT64_MAX};
+    if (pthread_getattr_np(pthread_self(), &attributes) != 0) return unknown;
     const int code = pthread_attr_getstack(&attributes, &lowest, &size);
     pthread_attr_destroy(&attributes);
     const uintptr_t here = (uintptr_t)__builtin_frame_address(0), low = (uintptr_t)lowest;
-    return code == 0 && here > low && here - low < size ? (int64_t)(here - low) : INT64_MAX;
+    if (code != 0 || here <= low || here - low >= size) return unknown;
+    return (thread_stack){(int64_t)(here - low), (int64_t)size};
 }
 
-/* The least that a worker has; INT64_MAX where there is none. */
-static int64_t least_worker_stack(int threads)
+/* The smallest that a worker has. */
+static thread_stack least_worker_stack(int threads)
 {
-    int64_t least = INT64_MAX;
-#pragma omp parallel num_threads(threads) reduction(min : least)
+    int64_t left = INT64_MAX, size = INT64_MAX;
+#pragma omp parallel num_threads(threads) reduction(min : left, size)
     {
         region_enter();
         if (omp_get_thread_num() > 0) {
-            least = stack_left();
+            const thread_stack own = own_stack();
+            left = own.left;
+            size = own.size;
             if (has_key) pthread_setspecific(key, &key);
         }
         region_leave();
     }
-    return least;
+    return (thread_stack){left, size};
+}
+
+/* The size, in kB, of a stack that has so many bytes left where this one has its own: what is taken already is added,
+ * and what systems take from a stack's size, a few pages. */
+static long long kilobytes_for(const thread_stack *stack, int64_t needed)
+{
+    enum { OF_SYSTEMS = 16 };
+    return ((needed + stack->size - stack->left) >> 10) + OF_SYSTEMS;
 }
 
 /* An error where a stack is too small. In the first parallel region. Collective. */
 static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
                                   base_error *error)
 {
-    const int64_t own = stack_left();
+    const thread_stack own = own_stack();
     session_guard_lend(guard);
-    const int64_t least = least_worker_stack(team->threads);
+    const thread_stack least = least_worker_stack(team->threads);
     session_guard_return();
-    if (own < SESSION_CALLER_STACK)
+    if (own.left < SESSION_CALLER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
-                  "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB (ulimit -s)",
-                  (long long)own >> 10, SESSION_CALLER_STACK >> 10);
-    else if (least < SESSION_WORKER_STACK)
+                  "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB: expected a "
+                  "stack of %lld kB (ulimit -s %lld)",
+                  (long long)own.left >> 10, SESSION_CALLER_STACK >> 10, kilobytes_for(&own, SESSION_CALLER_STACK),
+                  kilobytes_for(&own, SESSION_CALLER_STACK));
+    else if (least.left < SESSION_WORKER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
-                  "OpenMP's threads have %lld kB of stack, a step needs %d kB (OMP_STACKSIZE, ulimit -s)",
-                  (long long)least >> 10, SESSION_WORKER_STACK >> 10);
+                  "OpenMP's threads have %lld kB of stack left, a step needs %d kB: expected stacks of %lld kB "
+                  "(OMP_STACKSIZE=%lldk)",
+                  (long long)least.left >> 10, SESSION_WORKER_STACK >> 10, kilobytes_for(&least, SESSION_WORKER_STACK),
+                  kilobytes_for(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
     if (status) threads->count = 0; /* looked at again in the next step */
     return status;
