@@ -237,6 +237,14 @@ static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_id
     }
 }
 
+static bool keep_fault(base_error **fault, int rank, insitu_status status, const char *message)
+{
+    if (*fault) return true;
+    *fault = base_calloc(1, sizeof **fault);
+    base_fail(*fault, status, "rank %d: %.900s", rank, message);
+    return *fault != NULL;
+}
+
 /* Notes what is wrong on the rank; field: NULL where that is the mesh, mesh: NULL where it is not known. Where memory
  * ran out it is not known either: callers mostly leave out what they would have handed over next. */
 static bool take_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
@@ -244,11 +252,8 @@ static bool take_fault(session_catalogue *catalogue, session_catalogue_mesh *mes
 {
     base_error **fault = field ? &field->fault : mesh ? &mesh->fault : &catalogue->fault;
     catalogue->has_faults = true;
-    if (status == INSITU_ERROR_MEMORY) fault = &catalogue->fault;
-    if (*fault) return true;
-    *fault = base_calloc(1, sizeof **fault);
-    base_fail(*fault, status, "rank %d: %.900s", rank, message);
-    return *fault != NULL;
+    return keep_fault(fault, rank, status, message) &&
+           (status != INSITU_ERROR_MEMORY || keep_fault(&catalogue->fault, rank, status, message));
 }
 
 static bool take_table(session_catalogue *catalogue, const char *text, size_t size, int rank)
