@@ -272,6 +272,13 @@ bool session_writes_behind;
 
 library_loading library_loaded;
 
+bool has_font = true;
+
+bool session_has_font(void)
+{
+    return has_font;
+}
+
 double session_load_image_library(void)
 {
     library_loaded.count++;

@@ -137,4 +137,7 @@ typedef struct library_loading {
 
 extern library_loading library_loaded;
 
+/* Whether the image library finds a font. */
+extern bool has_font;
+
 #endif

@@ -14,6 +14,9 @@ enum { SIDE = 4 };
     "    outputs: [{path: \"a_{cycle}.exr\"}]\n"
 #define SURFACE "{isosurface: {field: f, values: [0.1]}}"
 #define VOLUME "{volume: {field: f}}"
+#define IMAGE_OF_PNG(keys)                                                                                             \
+    "images:\n  - name: a\n    size: [24, 16]\n    layers: [" SURFACE "]\n" keys                                       \
+    "    outputs: [{path: \"a_{cycle}.png\"}]\n"
 #define ERROR "    sampling: {max_error: 0.01}\n"
 #define SAMPLES "    sampling: {step_cells: 0.5}\n"
 #define CAMERA(text) "    camera: {" text "}\n"
@@ -419,6 +422,31 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     test_free(values);
 }
 
+/* In the step that draws the words first, though they are written after it. */
+static void lack_of_a_font_is_told_at_once(void **context)
+{
+    (void)context;
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    for (int i = 0; i < 3; i++) {
+        const bool has_words = i > 0, is_told = i == 2;
+        has_font = !is_told;
+        insitu_session *session =
+            open_session(MPI_COMM_WORLD,
+                         write_scene(has_words ? IMAGE_OF_PNG("    decorations: {title: Words}\n") : IMAGE_OF_PNG("")));
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        for (int cycle = 0; cycle < 2; cycle++) {
+            step_is_good(session, cycle);
+            const char *warnings = insitu_last_report(session)->warnings;
+            everywhere(is_told && cycle == 0 ? strstr(warnings, "image \"a\": no font was found, so its words") != NULL
+                                             : !*warnings);
+        }
+        insitu_destroy(&session);
+    }
+    has_font = true;
+    input_free(&in);
+}
+
 /* ---- errors -------------------------------------------------------------------------------------------------- */
 
 static const struct {
@@ -485,6 +513,7 @@ static int run(void)
         cmocka_unit_test(warnings_come_back_with_what_they_are_about),
         cmocka_unit_test(pictures_that_would_take_hours_are_refused),
         cmocka_unit_test(control_characters_are_escaped),
+        cmocka_unit_test(lack_of_a_font_is_told_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

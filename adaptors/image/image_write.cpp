@@ -23,6 +23,7 @@
 #include "encoded_file.h"
 #include "memory_reserve.h"
 #include "picture_file.h"
+#include "typeface.h"
 
 namespace
 {
@@ -250,6 +251,15 @@ insitu_status fail(insitu_status status, const char *path, const char *what, cha
 }
 
 } // namespace
+
+extern "C" int insitu_image_has_font(void)
+{
+    try {
+        return typeface().found();
+    } catch (...) {
+        return 1; /* the picture's own warning says what is wrong */
+    }
+}
 
 extern "C" insitu_status insitu_image_write(const insitu_image *image, insitu_image_format format, const char *path,
                                             char *message, size_t size)

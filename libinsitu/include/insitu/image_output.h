@@ -140,6 +140,11 @@ typedef insitu_status insitu_image_write_function(const insitu_image *image, ins
 
 INSITU_API insitu_image_write_function insitu_image_write;
 
+/* Tells whether a font for words is found; if not, words are left out. Local. */
+typedef int insitu_image_has_font_function(void);
+
+INSITU_API insitu_image_has_font_function insitu_image_has_font;
+
 #ifdef __cplusplus
 }
 #endif

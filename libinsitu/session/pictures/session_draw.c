@@ -389,12 +389,24 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
+/* The picture's own warning, which is the same, would come a step later. */
+static void warn_of_font(const session_drawing *d, const scene_image *image)
+{
+    if (!d->lacks_font || !scene_has_words(image)) return;
+    session_warn(
+        d->report, &(session_warning){WARNING_WORDS, image->name, NULL, 0}, true,
+        "image \"%s\": no font was found, so its words are left out; expected DejaVuSans in the system's fonts or "
+        "in a folder that OPENIMAGEIO_FONTS names",
+        image->name);
+}
+
 /* Collective where the outline is of meshes or ranks; what fails on rank 0 alone is for the next agreement. */
 static insitu_status decorate(const session_drawing *d, const scene_image *image, const session_view *view,
                               const session_layers *layers, canvas *out, base_error *error)
 {
     session_outline outline;
     const scene_moment moment = moment_of(d, image);
+    warn_of_font(d, image);
     const insitu_status status =
         session_find_outline(&image->decorations, d->catalogue, d->meshes, &d->space->extent, d->team, &outline, error);
     if (status) return status;

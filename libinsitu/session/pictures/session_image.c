@@ -26,6 +26,7 @@
 static const char library[] = "libinsitu_image.so";
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static insitu_image_write_function *loaded_writer;
+static insitu_image_has_font_function *loaded_font_finder; /* NULL: not loaded, or of another version */
 
 static void *open_library(const char *path, char *why, size_t size)
 {
@@ -119,6 +120,8 @@ static insitu_status load(base_error *error)
                          library);
     }
     memcpy(&loaded_writer, &symbol, sizeof symbol);
+    symbol = dlsym(handle, "insitu_image_has_font");
+    if (symbol) memcpy(&loaded_font_finder, &symbol, sizeof symbol);
     return INSITU_OK;
 }
 
@@ -144,6 +147,12 @@ double session_load_image_library(void)
     load_once(NULL, &unused);
     clock_gettime(CLOCK_MONOTONIC, &end);
     return is_there ? 0 : 1e3 * (double)(end.tv_sec - start.tv_sec) + 1e-6 * (double)(end.tv_nsec - start.tv_nsec);
+}
+
+bool session_has_font(void)
+{
+    insitu_image_write_function *unused;
+    return load_once(NULL, &unused) != INSITU_OK || !loaded_font_finder || loaded_font_finder();
 }
 
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,

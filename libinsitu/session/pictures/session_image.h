@@ -16,6 +16,9 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
  * where it was there. Local. Thread-safe. */
 double session_load_image_library(void);
 
+/* Tells whether words can be drawn, as far as is known: true where the library cannot be loaded. Local. Thread-safe. */
+bool session_has_font(void);
+
 /* Whether pictures may be written by a thread of their own (session_writer.h). Tests that replace this file set it to
  * false. */
 extern bool session_writes_behind;

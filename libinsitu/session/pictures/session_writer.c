@@ -214,7 +214,16 @@ bool session_writer_is_behind(const session_writer *w, const scene *scene)
     return scene->writing == SCENE_WRITE_BEHIND && (w->is_running || (session_writes_behind && !w->is_refused));
 }
 
-double session_writer_begin(session_writer *w, const scene *scene)
+static void find_font(session_writer *w, const scene *scene)
+{
+    for (int i = 0; i < scene->image_count && !w->is_font_known; i++) {
+        if (!scene_has_words(&scene->images[i])) continue;
+        w->is_font_known = true;
+        w->lacks_font = !session_has_font();
+    }
+}
+
+static double start_thread(session_writer *w, const scene *scene)
 {
     sigset_t all, before;
     if (w->is_running || scene->image_count == 0 || !session_writer_is_behind(w, scene)) return 0;
@@ -226,6 +235,13 @@ double session_writer_begin(session_writer *w, const scene *scene)
     w->is_refused = !w->is_running;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (w->is_running) enlist(w);
+    return ms;
+}
+
+double session_writer_begin(session_writer *w, const scene *scene)
+{
+    const double ms = start_thread(w, scene);
+    find_font(w, scene);
     return ms;
 }
 

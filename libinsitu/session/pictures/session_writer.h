@@ -36,6 +36,7 @@ typedef struct session_writer {
     session_picture free_memory[SESSION_FREE_PICTURES]; /* for pictures that come */
     base_error failure;                                 /* the first that no step has told yet; the caller's thread's */
     int failures;                                       /* how many there were */
+    bool is_font_known, lacks_font;                     /* whether one was looked for; none was found for words */
     double loading_ms;                                  /* of insitu_create(), for the next report */
     struct session_writer *next;                        /* of the process's */
 } session_writer;
@@ -44,7 +45,9 @@ typedef struct session_writer {
 void session_writer_create(session_writer *writer);
 
 /* Load the image library and start the thread, if the scene has pictures, which are to be written by one, and there is
- * none. Returns the milliseconds that the library took. Local. */
+ * none; find out whether there is a font, if the scene has words. Returns the milliseconds that the library took.
+ * Local.
+ */
 double session_writer_begin(session_writer *writer, const scene *scene);
 
 /* Tells whether session_writer_begin() has started the thread, or will start it for this scene. Local. */

@@ -359,6 +359,16 @@ static inline bool scene_is_first_variant(const scene_image *image)
     return image->variant.layers == 0 && image->variant.view == 0;
 }
 
+/* Tells whether words are written into pictures of the image. */
+static inline bool scene_has_words(const scene_image *image)
+{
+    const scene_decorations *d = &image->decorations;
+    bool is_decorated = false;
+    for (int i = 0; i < image->output_count; i++) is_decorated = is_decorated || image->outputs[i].has_decorations;
+    return is_decorated && d->is_given &&
+           (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
+}
+
 /* The cells that trees are built over: all cells, those that the images can show, or what costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
