@@ -15,6 +15,29 @@
 
 #include <string.h>
 
+const reference_box reference_empty_box = {{(double)INFINITY, (double)INFINITY, (double)INFINITY},
+                                           {-(double)INFINITY, -(double)INFINITY, -(double)INFINITY}};
+
+void reference_box_add(reference_box *box, const double point[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        box->low[axis] = fmin(box->low[axis], point[axis]);
+        box->high[axis] = fmax(box->high[axis], point[axis]);
+    }
+}
+
+bool reference_box_is_near(const reference_box *box, const reference_line *line, double share, double slack)
+{
+    for (int axis = 0; axis < 2; axis++) {
+        const double front = line->slope[axis] * box->low[2], back = line->slope[axis] * box->high[2];
+        const double low = box->low[axis] - line->base[axis] - fmax(front, back);
+        const double high = box->high[axis] - line->base[axis] - fmin(front, back);
+        const double most = share * (high - low) + slack;
+        if (low > most || high < -most) return false;
+    }
+    return true;
+}
+
 typedef struct cell_faces {
     int count;
     int vertices[6][4]; /* the fourth is -1 for a triangle */

@@ -33,6 +33,18 @@ typedef struct reference_line {
     double base[2], slope[2];
 } reference_line;
 
+/* The bounds of points in camera coordinates. */
+typedef struct reference_box {
+    double low[3], high[3];
+} reference_box;
+
+extern const reference_box reference_empty_box;
+void reference_box_add(reference_box *box, const double point[3]);
+
+/* Tells whether the line may pass the points: false only if their distances from it along x or y, of which low is the
+ * least and high the greatest, are all above share * (high - low) + slack, or all as much below 0. */
+bool reference_box_is_near(const reference_box *box, const reference_line *line, double share, double slack);
+
 /* A place where a line meets the cell's surface: on triangles as they are, on a quad's bilinear patch at the
  * coordinates u, w. The quad's triangles tell whether the line meets it an odd number of times. */
 typedef struct reference_crossing {

@@ -15,6 +15,7 @@
 
 typedef struct placed_cell {
     reference_cell cell;
+    reference_box box;
     double values[REFERENCE_MAX_VERTICES];
     const render_transfer *transfer;
 } placed_cell;
@@ -60,6 +61,7 @@ static void add_cell(reference_integral *scene, int volume, int part, int64_t in
     int64_t vertices[REFERENCE_MAX_VERTICES];
     placed_cell *c = &scene->cells[scene->count];
     if (grid_is_ghost(g, index) || !field->ranges[part].low) return;
+    c->box = reference_empty_box;
     c->transfer = job->volumes[volume].transfer;
     c->cell.type = grid_cell_type(g, index);
     if (c->cell.type == GRID_POLYHEDRON)
@@ -72,6 +74,7 @@ static void add_cell(reference_integral *scene, int volume, int part, int64_t in
         grid_vertex(g, vertices[i], c->cell.world[i]);
         for (int axis = 0; axis < 3; axis++) from_eye[axis] = c->cell.world[i][axis] - job->camera.eye[axis];
         for (int axis = 0; axis < 3; axis++) c->cell.position[i][axis] = reference_dot(axes[axis], from_eye);
+        reference_box_add(&c->box, c->cell.position[i]);
     }
     if (c->cell.type == GRID_POLYHEDRON) reference_polyhedron_setup(&c->cell);
     scene->count++;
@@ -212,7 +215,8 @@ static stretch *collect(const reference_integral *scene, const reference_line *l
     for (int64_t i = 0; i < scene->count; i++) {
         reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
         const reference_cell *cell = &scene->cells[i].cell;
-        const int found = is_near(cell, line) ? reference_crossings(cell, line, crossings) : 0;
+        const bool may_pass = reference_box_is_near(&scene->cells[i].box, line, 0, 1e-9) && is_near(cell, line);
+        const int found = may_pass ? reference_crossings(cell, line, crossings) : 0;
         for (int k = 0; k + 1 < found; k += 2) {
             if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
             if (*count == capacity)

@@ -25,7 +25,8 @@ typedef struct event {
 
 struct reference_scene {
     const render_job *job;
-    double **positions; /* of each part's vertices, × 3, camera coordinates */
+    double **positions;    /* of each part's vertices, × 3, camera coordinates */
+    reference_box **boxes; /* of each part's cells, in the same; unset of ghosts */
 };
 
 /* One ray under way. */
@@ -58,12 +59,26 @@ static bool normalize(double *v)
     return length > 0;
 }
 
+static reference_box *bound_cells(const grid *g, const double *positions)
+{
+    reference_box *boxes = reference_reserve(NULL, sizeof *boxes * (size_t)g->cell_count);
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        int64_t vertex;
+        if (grid_is_ghost(g, cell)) continue;
+        boxes[cell] = reference_empty_box;
+        grid_walk walk = grid_walk_cell(g, cell);
+        while (grid_walk_next(&walk, &vertex)) reference_box_add(&boxes[cell], positions + 3 * vertex);
+    }
+    return boxes;
+}
+
 reference_scene *reference_create(const render_job *job)
 {
     const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
     reference_scene *scene = reference_reserve(NULL, sizeof *scene);
     scene->job = job;
     scene->positions = reference_reserve(NULL, sizeof *scene->positions * (size_t)job->part_count);
+    scene->boxes = reference_reserve(NULL, sizeof *scene->boxes * (size_t)job->part_count);
     for (int i = 0; i < job->part_count; i++) {
         const grid *g = job->parts[i].cells;
         double *p = scene->positions[i] = reference_reserve(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
@@ -73,6 +88,7 @@ reference_scene *reference_create(const render_job *job)
             for (int axis = 0; axis < 3; axis++) world[axis] -= job->camera.eye[axis];
             for (int axis = 0; axis < 3; axis++) p[3 * v + axis] = reference_dot(axes[axis], world);
         }
+        scene->boxes[i] = bound_cells(g, p);
     }
     return scene;
 }
@@ -80,8 +96,12 @@ reference_scene *reference_create(const render_job *job)
 void reference_free(reference_scene *scene)
 {
     if (!scene) return;
-    for (int i = 0; i < scene->job->part_count; i++) free(scene->positions[i]);
+    for (int i = 0; i < scene->job->part_count; i++) {
+        free(scene->positions[i]);
+        free(scene->boxes[i]);
+    }
     free(scene->positions);
+    free(scene->boxes);
     free(scene);
 }
 
@@ -516,6 +536,7 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, pl
 static bool is_near(const trace *t, int part, int64_t index)
 {
     const grid *g = t->scene->job->parts[part].cells;
+    if (!reference_box_is_near(&t->scene->boxes[part][index], &t->line, 1e-3, 1e-6)) return false;
     for (int axis = 0; axis < 2; axis++) {
         double low = (double)INFINITY, high = -(double)INFINITY;
         grid_walk walk = grid_walk_cell(g, index);
