@@ -150,7 +150,7 @@ insitu_session_program(test_session_left_out)
 insitu_add_mpi_test(session_left_out test_session_left_out 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session)
-insitu_add_mpi_test(session test_session 1 2 3 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session test_session 1 2 3 7 WHOLE 4 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_regions)
 insitu_add_mpi_test(session_regions test_session_regions 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

@@ -158,7 +158,7 @@ static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doubl
         f.job.camera.half_height = 0.03;
         const double unit = pow(10, test_uniform_in(0, 100 * seed, -2, 1));
         fixture_set_function(&f, &function, 100 * seed + 9, false, 0.95, unit);
-        step_judge(&f, 1, 1e-8, worst);
+        step_judge(&f, test_effort(2, 1), 1e-7, worst);
         fixture_free(&f);
     }
     test_mesh_free(&mesh);
