@@ -335,5 +335,6 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
         return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);
     }
     caught[caught_count++] = picture;
+    if (error && image->decorations && !has_font) snprintf(error->message, sizeof error->message, "no font was found");
     return INSITU_OK;
 }
