@@ -25,6 +25,11 @@ double session_load_image_library(void)
     return 0;
 }
 
+bool session_has_font(void)
+{
+    return true;
+}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {
