@@ -486,7 +486,7 @@ static const mistake mistakes[] = {
      2,
      "      - slice: {field: heat, planes: z}",
      7,
-     {"images[0].layers[0].slice.planes", "\"z\"", "expected a list of 1 to 16 mappings with"}},
+     {"images[0].layers[0].slice.planes", "\"z\"", "expected a list of 1 to 64 mappings with"}},
     {7,
      2,
      "      - volume: {field: heat, opacity: 0.5}",
