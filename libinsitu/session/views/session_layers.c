@@ -339,9 +339,8 @@ static void warn_of_samples(const session_layer_basis *basis, const scene_image 
     const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};
     session_warn(basis->report, &warning, image->has_default_samples,
                  "image \"%s\": its %d volumes are sampled half a cell apart, to no known error, and coarse cells may "
-                 "show it; sampling: {max_error: 0.01} bounds the error and takes some 6 times as long, sampling: "
-                 "{step_cells: 0.5} "
-                 "asks for samples and silences this",
+                 "show it; sampling: {max_error: 0.01} bounds the error and takes 4 to 12 times as long, sampling: "
+                 "{step_cells: 0.5} asks for samples and silences this",
                  image->name, image->volume_count);
 }
 
