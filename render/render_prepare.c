@@ -298,9 +298,9 @@ static bool has_curved_cells(const render_job *job)
     return false;
 }
 
-/* An eighth of max_error goes to the colours' table, and four fifths to the field (docs/development/error_budget.md): half of these
- * over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half of that for
- * their mixing. */
+/* An eighth of max_error goes to the colours' table, and four fifths to the field (docs/development/error_budget.md):
+ * half of these over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half
+ * of that for their mixing. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;

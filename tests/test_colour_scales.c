@@ -338,8 +338,8 @@ static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t se
 }
 
 /* What a ramp is off adds up along a ray, in a cell of one value most of all. Polyhedra have values in single precision
- * (docs/development/error_budget.md, narrow ramps): at the foot of a ramp that begins at 1e-6 of the range they were off by 1.6e-3
- * where 1e-3 was asked. */
+ * (docs/development/error_budget.md, narrow ramps): at the foot of a ramp that begins at 1e-6 of the range they were
+ * off by 1.6e-3 where 1e-3 was asked. */
 static void ramps_along_scales_keep_max_error(void **state)
 {
     (void)state;

@@ -1,6 +1,7 @@
 /* Degenerate polyhedra: faces that repeat a vertex, have no area or are all in one place, and cells without volume. The
  * same cell written in another way is drawn to the same bits, cells without volume change no bit, and all else agrees
- * with the reference. All are listed in docs/development/hard-cases.md; those that are refused are in test_session_faces.c. */
+ * with the reference. All are listed in docs/development/hard-cases.md; those that are refused are in
+ * test_session_faces.c. */
 #include "reference_integral.h"
 #include "test_mesh_make.h"
 #include "test_render_fixture.h"

@@ -1,5 +1,5 @@
-/* Rays of ambient occlusion as docs/development/decisions/surface.md has them, written apart from the library's: a spiral of equal
- * steps in area on the disk below, turned and begun by the pixel. */
+/* Rays of ambient occlusion as docs/development/decisions/surface.md has them, written apart from the library's: a
+ * spiral of equal steps in area on the disk below, turned and begun by the pixel. */
 #ifndef TEST_HEMISPHERE_H
 #define TEST_HEMISPHERE_H
 

@@ -85,8 +85,8 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
 
 /* Light of less than 1e-7 of a ray's is left out, of colours up to 1. A thousand times as much would show as nearly
  * 1e-4, some ten times what samples may be off (fixture_usual_bounds), and segments: values at their ends are off by up
- * to 4e-7 of the function's domain (docs/development/decisions/volume.md), and colours by as many times that as there are
- * entries. */
+ * to 4e-7 of the function's domain (docs/development/decisions/volume.md), and colours by as many times that as there
+ * are entries. */
 static void pictures_are_those_of_all_cells(void **state)
 {
     (void)state;

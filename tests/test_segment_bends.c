@@ -44,8 +44,7 @@ static void cell_of(const render_fixture *f, const test_mesh *mesh, reference_ce
     for (int i = 0; i < cell->count; i++)
         for (int a = 0; a < 3; a++) {
             cell->world[i][a] = mesh->coordinates[3 * i + a];
-            for (int b = 0; b < 3; b++)
-                cell->position[i][a] += axes[a][b] * (mesh->coordinates[3 * i + b] - c->eye[b]);
+            for (int b = 0; b < 3; b++) cell->position[i][a] += axes[a][b] * (mesh->coordinates[3 * i + b] - c->eye[b]);
         }
 }
 

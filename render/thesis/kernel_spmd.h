@@ -1,6 +1,7 @@
 /* SPMD traversal (thesis, section 4.3.1): every ray goes down the tree on its own, with a stack and an order of its
  * own, all of a packet's rays at once but each at another node. Rays that are at one leaf meet its cells together.
- * It is here to be compared with: packets that stay together are faster (thesis, table 4.1; docs/development/measurements.md). */
+ * It is here to be compared with: packets that stay together are faster (thesis, table 4.1;
+ * docs/development/measurements.md). */
 #ifndef RENDER_KERNEL_SPMD_H
 #define RENDER_KERNEL_SPMD_H
 

@@ -43,14 +43,14 @@
  * short that it does not show.
  *
  * The error of a subinterval of length L, T being the light that comes to it from the stretch's begin
- * (docs/development/error_budget.md has the rest). Over the subinterval's values let extinction be from s0 to s1 and change by no
- * more than s' per value, the colour by c', and let R be the colours' contrast. A field that is off by d on average
- * changes extinction by ds <= s' d, and no more than s1 - s0; light in the subinterval falls at least as exp(-s0 t), so
- * that R ds  is seen for no more than min(L, 1 / s0),    s1 dc  for min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) +
- * dc min(s1 L, 1), times T. It may be 7/8 of the share that equal subintervals have, a = allowance: T error <= 7/8 a (L
- * / reach + T D / (1 + D)),    D = s0 L, The rest is for subintervals that no bisection makes good, about an extreme
- * that touches a step: where T error of one, by s1 - s0 alone, is no more than a 32nd of a (stretch / reach) it is left
- * as it is. A cubic has two extremes, and four such subintervals are in an eighth. */
+ * (docs/development/error_budget.md has the rest). Over the subinterval's values let extinction be from s0 to s1 and
+ * change by no more than s' per value, the colour by c', and let R be the colours' contrast. A field that is off by d
+ * on average changes extinction by ds <= s' d, and no more than s1 - s0; light in the subinterval falls at least as
+ * exp(-s0 t), so that R ds  is seen for no more than min(L, 1 / s0),    s1 dc  for min(s1 L, 1) / s1: error <= R ds
+ * min(L, 1 / s0) + dc min(s1 L, 1), times T. It may be 7/8 of the share that equal subintervals have, a = allowance: T
+ * error <= 7/8 a (L / reach + T D / (1 + D)),    D = s0 L, The rest is for subintervals that no bisection makes good,
+ * about an extreme that touches a step: where T error of one, by s1 - s0 alone, is no more than a 32nd of a (stretch /
+ * reach) it is left as it is. A cubic has two extremes, and four such subintervals are in an eighth. */
 
 /* KERNEL_BISECTION_DEPTH: 2^-40 of a stretch is nothing to any medium. The count of subintervals is a guard that no
  * function in use comes to: what is left of the stretch is then one subinterval each time. */

@@ -24,10 +24,10 @@
  * are exact; their own rounding is in o. The mean is taken as one of positive terms, so that nothing cancels however
  * close the two ends are.
  *
- * The budget (docs/development/error_budget.md). A segment may be wrong by 0.15 max_error A + 0.05 max_error L / reach, both times
- * the light that gets there: summed over a ray no more than 0.2 max_error. A segment for which that does not suffice is
- * cut into subintervals, equal in values; what is wrong of the absorption falls with the square of their number. Where
- * they would be too many, and where a bin is not fine enough, kernel_integrate() has it. */
+ * The budget (docs/development/error_budget.md). A segment may be wrong by 0.15 max_error A + 0.05 max_error L / reach,
+ * both times the light that gets there: summed over a ray no more than 0.2 max_error. A segment for which that does not
+ * suffice is cut into subintervals, equal in values; what is wrong of the absorption falls with the square of their
+ * number. Where they would be too many, and where a bin is not fine enough, kernel_integrate() has it. */
 #ifndef RENDER_KERNEL_PREINTEGRAL_H
 #define RENDER_KERNEL_PREINTEGRAL_H
 

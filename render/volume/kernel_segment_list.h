@@ -377,8 +377,8 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
     return any;
 }
 
-/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/development/error_budget.md: 4e-7 at
- * most).
+/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/development/error_budget.md:
+ * 4e-7 at most).
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 

@@ -325,8 +325,9 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* A share of the domain. Wider ramps need only equal parts, up to 1000 optical depths (docs/development/error_budget.md). A ramp
- * along a scale is as steep within that of 0, and less beyond, as its slope is the inverse of the value there. */
+/* A share of the domain. Wider ramps need only equal parts, up to 1000 optical depths
+ * (docs/development/error_budget.md). A ramp along a scale is as steep within that of 0, and less beyond, as its slope
+ * is the inverse of the value there. */
 static const double steep_width = 1.0 / 64;
 
 static void fill_steep(kernel_pieces *out, const render_transfer *t)
