@@ -4,12 +4,19 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #define SESSION_HASH_BEGIN 0xcbf29ce484222325u
 
 static inline void session_hash_bytes(uint64_t *hash, const void *data, size_t size)
 {
     for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
+}
+
+/* Takes in a text with its end, so that texts in a row differ from others cut elsewhere. */
+static inline void session_hash_text(uint64_t *hash, const char *text)
+{
+    session_hash_bytes(hash, text, strlen(text) + 1);
 }
 
 #endif

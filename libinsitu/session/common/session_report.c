@@ -94,7 +94,7 @@ static uint64_t key_of(const session_warning *w)
     const int numbers[2] = {(int)w->kind, w->number};
     uint64_t key = SESSION_HASH_BEGIN;
     session_hash_bytes(&key, numbers, sizeof numbers);
-    for (int i = 0; i < 2; i++) session_hash_bytes(&key, texts[i], strlen(texts[i]) + 1);
+    for (int i = 0; i < 2; i++) session_hash_text(&key, texts[i]);
     return key;
 }
 

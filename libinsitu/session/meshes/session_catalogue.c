@@ -67,12 +67,12 @@ uint64_t session_names_hash(const session_meshes *meshes)
         if (!mesh->is_given) continue;
         const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, mesh->field_count};
         session_hash_bytes(&hash, head, sizeof head);
-        session_hash_bytes(&hash, mesh->name, strlen(mesh->name) + 1);
+        session_hash_text(&hash, mesh->name);
         for (int f = 0; f < mesh->field_count; f++) {
             const insitu_field *field = &mesh->fields[f].given;
             const int tail[] = {field->component_count, (int)field->centring};
             session_hash_bytes(&hash, tail, sizeof tail);
-            session_hash_bytes(&hash, field->name, strlen(field->name) + 1);
+            session_hash_text(&hash, field->name);
         }
     }
     return hash;

@@ -62,7 +62,7 @@ static bool do_boxes_meet(const session_box *a, const session_box *b)
     return true;
 }
 
-static bool is_in_box(const session_box *box, const double point[3])
+bool session_is_in_box(const session_box *box, const double point[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (!(box->lower[axis] <= point[axis] && point[axis] <= box->upper[axis])) return false;
@@ -141,7 +141,7 @@ insitu_status session_homes_find(session_homes *homes, const session_mesh *const
 bool session_homes_share(const session_homes *homes, const double point[3])
 {
     for (int i = 0; i < homes->near_count; i++)
-        if (homes->near[i] != homes->rank && is_in_box(&homes->boxes[i], point)) return true;
+        if (homes->near[i] != homes->rank && session_is_in_box(&homes->boxes[i], point)) return true;
     return false;
 }
 
@@ -161,7 +161,7 @@ static int home_by_id(const session_homes *homes, int64_t id)
 static bool are_in_box(const session_box *box, const double (*points)[3], int count)
 {
     for (int i = 0; i < count; i++)
-        if (!is_in_box(box, points[i])) return false;
+        if (!session_is_in_box(box, points[i])) return false;
     return true;
 }
 

@@ -45,6 +45,9 @@ void session_homes_free(session_homes *homes);
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 
+/* Tells whether the point lies in the box, whose border belongs to it. */
+bool session_is_in_box(const session_box *box, const double point[3]);
+
 /* Tells whether the point lies in another rank's box. */
 bool session_homes_share(const session_homes *homes, const double point[3]);
 

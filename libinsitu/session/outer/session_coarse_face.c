@@ -29,7 +29,7 @@ double session_place_rounding(const session_mesh *mesh)
     return rounding;
 }
 
-static double distance(const double a[3], const double b[3])
+double session_place_distance(const double a[3], const double b[3])
 {
     const double off[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
     return sqrt(vector3_dot(off, off));
@@ -132,7 +132,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack)
 {
     for (int i = 0; i < face->count; i++)
-        if (distance(face->places[i], place) <= slack) return true;
+        if (session_place_distance(face->places[i], place) <= slack) return true;
     return false;
 }
 
@@ -183,7 +183,7 @@ bool session_find_on_face(const session_coarse_face *f, const double place[3], d
     for (int k = 0; k < 2; k++) at[k] = rounded(at[k]);
     const double u = at[0], w = at[1];
     place_on(f, at, on, slopes);
-    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && distance(on, place) <= slack)) return false;
+    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_place_distance(on, place) <= slack)) return false;
     if (f->count == 4) {
         const double bilinear[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};
         memcpy(weights, bilinear, sizeof bilinear);

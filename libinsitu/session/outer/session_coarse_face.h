@@ -33,6 +33,8 @@ bool session_find_on_face(const session_coarse_face *face, const double place[3]
 /* By how much coordinates of the mesh may be rounded; 0 for NULL. */
 double session_place_rounding(const session_mesh *mesh);
 
+double session_place_distance(const double a[3], const double b[3]);
+
 /* An order of places, and of faces by area, then by places. */
 int session_compare_places(const double a[3], const double b[3]);
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);

@@ -34,11 +34,6 @@ typedef struct twin_search {
     session_bins bins;
 } twin_search;
 
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 /* ---- corners -------------------------------------------------------------------------------------------------- */
 
 /* Finds the shortest edge at each vertex of the face. */
@@ -51,7 +46,7 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
         double a[3], b[3];
         grid_vertex(g, from, a);
         grid_vertex(g, to, b);
-        const double length = distance(a, b);
+        const double length = session_place_distance(a, b);
         if (!(length > 0)) continue;
         edges[from] = fmin(edges[from], length);
         edges[to] = fmin(edges[to], length);
@@ -99,13 +94,6 @@ static bool list_own(twin_search *s)
 
 /* ---- what ranks share ----------------------------------------------------------------------------------------- */
 
-static bool is_in(const session_box *box, const double place[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (!(box->lower[axis] <= place[axis] && place[axis] <= box->upper[axis])) return false;
-    return true;
-}
-
 /* Lists the corners for each rank in whose box they are; counts words where there is no room. */
 static void send_corners(const twin_search *s, session_mail *mail)
 {
@@ -114,7 +102,7 @@ static void send_corners(const twin_search *s, session_mail *mail)
     for (int n = 0; n < homes->near_count; n++) {
         const int64_t first = mail->total;
         for (int64_t i = 0; i < s->corner_count && homes->near[n] != s->team->rank; i++) {
-            if (!is_in(&homes->boxes[n], s->corners[i].place)) continue;
+            if (!session_is_in_box(&homes->boxes[n], s->corners[i].place)) continue;
             if (mail->words) memcpy(mail->words + mail->total, &s->corners[i], sizeof s->corners[i]);
             mail->total += CORNER_WORDS;
         }
@@ -153,7 +141,8 @@ static void find_least(twin_search *s)
         int64_t near;
         while (session_next_binned(&walk, &near)) {
             border_vertex *v = &s->vertices[near];
-            if (distance(v->place, c->place) <= c->slack && session_compare_places(c->place, v->least) < 0)
+            if (session_place_distance(v->place, c->place) <= c->slack &&
+                session_compare_places(c->place, v->least) < 0)
                 memcpy(v->least, c->place, sizeof v->least);
         }
     }

@@ -1,7 +1,5 @@
 #include "session_joints.h"
 
-#include <string.h>
-
 #include "memory.h"
 #include "session_agree.h"
 #include "session_hash.h"
@@ -12,11 +10,6 @@ static bool is_member(const session_catalogue_mesh *mesh, const scene_field *fie
     const session_catalogue_field *found =
         scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
     return found && session_is_recentred(field, found->centring);
-}
-
-static void hash_name(uint64_t *hash, const session_catalogue_mesh *mesh)
-{
-    session_hash_bytes(hash, mesh->name, strlen(mesh->name) + 1);
 }
 
 /* Adds a joint of up to count meshes, which is empty. NULL where memory runs out. */
@@ -59,7 +52,7 @@ static bool join_field(session_catalogue *catalogue, scene_field *field)
             is_done = set_apart(catalogue, mesh);
             continue;
         }
-        hash_name(&hash, mesh);
+        session_hash_text(&hash, mesh->name);
         count++;
     }
     if (!count || !is_done) return is_done;
@@ -79,7 +72,7 @@ static void find_apart(session_catalogue *catalogue, const session_meshes *meshe
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
         session_mesh *own = session_find_mesh(meshes, mesh->name);
         uint64_t hash = SESSION_HASH_BEGIN;
-        hash_name(&hash, mesh);
+        session_hash_text(&hash, mesh->name);
         mesh->apart = mesh->has_ids ? hash | 1 : 0;
         if (own) own->apart = mesh->apart;
     }

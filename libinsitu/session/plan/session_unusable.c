@@ -1,7 +1,5 @@
 #include "session_unusable.h"
 
-#include <string.h>
-
 #include "memory.h"
 #include "session_agree.h"
 #include "session_hash.h"
@@ -42,8 +40,8 @@ uint64_t session_unusable_key(const session_plan *plan, const session_meshes *me
             const int64_t count = unusable_of(mesh, field);
             if (!count) continue;
             if (!key) key = SESSION_HASH_BEGIN;
-            session_hash_bytes(&key, mesh->name, strlen(mesh->name) + 1);
-            session_hash_bytes(&key, field->name, strlen(field->name) + 1);
+            session_hash_text(&key, mesh->name);
+            session_hash_text(&key, field->name);
             session_hash_bytes(&key, &field->component, sizeof field->component);
         }
     return key;
