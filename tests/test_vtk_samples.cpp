@@ -362,14 +362,9 @@ void write_ensight_text(const std::string &folder, vtkUnstructuredGrid *grid)
                                    "scalar per node: x t.x\nscalar per element: c t.c\n");
 }
 
-/* A structured zone. */
-void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
+void write_cgns_places(int file, int base, int zone, vtkUnstructuredGrid *grid)
 {
-    int file = 0, base = 0, zone = 0, solution = 0, number = 0;
-    const cgsize_t sizes[9] = {size[0], size[1], size[2], size[0] - 1, size[1] - 1, size[2] - 1, 0, 0, 0};
-    cg_open(path.c_str(), CG_MODE_WRITE, &file);
-    cg_base_write(file, "Base", 3, 3, &base);
-    cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Structured), &zone);
+    int number = 0;
     for (int axis = 0; axis < 3; axis++) {
         std::vector<float> values;
         for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); i++)
@@ -377,12 +372,29 @@ void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
         const std::string name = std::string("Coordinate") + "XYZ"[axis];
         cg_coord_write(file, base, zone, CGNS_ENUMV(RealSingle), name.c_str(), values.data(), &number);
     }
+}
+
+void write_cgns_fields(int file, int base, int zone, vtkUnstructuredGrid *grid)
+{
+    int solution = 0, number = 0;
     cg_sol_write(file, base, zone, "AtVertices", CGNS_ENUMV(Vertex), &solution);
     cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "x",
                    grid->GetPointData()->GetArray("x")->GetVoidPointer(0), &number);
     cg_sol_write(file, base, zone, "InCells", CGNS_ENUMV(CellCenter), &solution);
     cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "c",
                    grid->GetCellData()->GetArray("c")->GetVoidPointer(0), &number);
+}
+
+/* A structured zone. */
+void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
+{
+    int file = 0, base = 0, zone = 0;
+    const cgsize_t sizes[9] = {size[0], size[1], size[2], size[0] - 1, size[1] - 1, size[2] - 1, 0, 0, 0};
+    cg_open(path.c_str(), CG_MODE_WRITE, &file);
+    cg_base_write(file, "Base", 3, 3, &base);
+    cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Structured), &zone);
+    write_cgns_places(file, base, zone, grid);
+    write_cgns_fields(file, base, zone, grid);
     cg_close(file);
 }
 
@@ -396,7 +408,7 @@ std::string foam_file(const std::string &kind, const std::string &name, const st
 
 void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, bool is_boundary_first)
 {
-    int file = 0, base = 0, zone = 0, solution = 0, number = 0;
+    int file = 0, base = 0, zone = 0, number = 0;
     const cgsize_t sizes[3] = {point_count, cell_count, 0}, quads = (size[0] - 1) * (size[1] - 1);
     std::vector<cgsize_t> boundary, cells;
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
@@ -409,23 +421,12 @@ void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, boo
     cg_open(path.c_str(), CG_MODE_WRITE, &file);
     cg_base_write(file, "Base", 3, 3, &base);
     cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Unstructured), &zone);
-    for (int axis = 0; axis < 3; axis++) {
-        std::vector<float> values;
-        for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); i++)
-            values.push_back(static_cast<float>(grid->GetPoint(i)[axis]));
-        const std::string name = std::string("Coordinate") + "XYZ"[axis];
-        cg_coord_write(file, base, zone, CGNS_ENUMV(RealSingle), name.c_str(), values.data(), &number);
-    }
+    write_cgns_places(file, base, zone, grid);
     const cgsize_t wall = is_boundary_first ? 1 : cell_count + 1, fluid = is_boundary_first ? quads + 1 : 1;
     cg_section_write(file, base, zone, "Wall", CGNS_ENUMV(QUAD_4), wall, wall + quads - 1, 0, boundary.data(), &number);
     cg_section_write(file, base, zone, "Fluid", CGNS_ENUMV(HEXA_8), fluid, fluid + cell_count - 1, 0, cells.data(),
                      &number);
-    cg_sol_write(file, base, zone, "AtVertices", CGNS_ENUMV(Vertex), &solution);
-    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "x",
-                   grid->GetPointData()->GetArray("x")->GetVoidPointer(0), &number);
-    cg_sol_write(file, base, zone, "InCells", CGNS_ENUMV(CellCenter), &solution);
-    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "c",
-                   grid->GetCellData()->GetArray("c")->GetVoidPointer(0), &number);
+    write_cgns_fields(file, base, zone, grid);
     cg_close(file);
 }
 

@@ -19,6 +19,7 @@
 #include <vtkDataArray.h>
 #include <vtkDataSetSurfaceFilter.h>
 #include <vtkGenericCell.h>
+#include <vtkMath.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
@@ -117,21 +118,6 @@ struct seen_value {
     double value, area;
 };
 
-vector minus(const vector &a, const vector &b)
-{
-    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
-double dot(const vector &a, const vector &b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-vector cross(const vector &a, const vector &b)
-{
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 /* Twice the area of a face as it is seen from that direction; below 0 if it looks away. */
 double seen_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, const vector &towards)
 {
@@ -140,9 +126,12 @@ double seen_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, c
     faces->GetPoint(points[1], last.data());
     double area = 0;
     for (vtkIdType k = 2; k < count; k++) {
-        vector next{};
+        vector next{}, to_last{}, to_next{}, normal{};
         faces->GetPoint(points[k], next.data());
-        area += dot(cross(minus(last, first), minus(next, first)), towards);
+        vtkMath::Subtract(last, first, to_last);
+        vtkMath::Subtract(next, first, to_next);
+        vtkMath::Cross(to_last.data(), to_next.data(), normal.data());
+        area += vtkMath::Dot(normal, towards);
         last = next;
     }
     return area;

@@ -9,6 +9,8 @@
 #include <sstream>
 #include <system_error>
 
+#include <vtkMath.h>
+
 #include "file_kinds.h"
 
 namespace render_tool
@@ -34,14 +36,11 @@ std::string quoted(const std::string &text)
     return out + '"';
 }
 
-double dot(const std::array<double, 3> &a, const std::array<double, 3> &b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 std::array<double, 3> cross(const std::array<double, 3> &a, const std::array<double, 3> &b)
 {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    std::array<double, 3> out{};
+    vtkMath::Cross(a.data(), b.data(), out.data());
+    return out;
 }
 
 std::array<double, 3> unit(const std::array<double, 3> &a)
@@ -75,8 +74,8 @@ framing frame(const options &o, const std::array<double, 3> &half, const std::ar
     for (int corner = 0; corner < 8; corner++) {
         std::array<double, 3> at{};
         for (size_t i = 0; i < 3; i++) at[i] = (corner >> i) & 1 ? half[i] : -half[i];
-        const double x = std::fabs(dot(at, right)), y = std::fabs(dot(at, above));
-        needed.distance = std::max(needed.distance, dot(at, towards) + std::max(x / wide, y / high));
+        const double x = std::fabs(vtkMath::Dot(at, right)), y = std::fabs(vtkMath::Dot(at, above));
+        needed.distance = std::max(needed.distance, vtkMath::Dot(at, towards) + std::max(x / wide, y / high));
         needed.height = std::max(needed.height, 2 * std::max(x * o.height / o.width, y) / filled);
     }
     return needed;

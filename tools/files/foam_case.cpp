@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -60,13 +59,6 @@ bool has_mesh(const fs::path &folder)
     const auto regions = folders_in(constant);
     return std::any_of(regions.begin(), regions.end(),
                        [&](const std::string &name) { return fs::is_directory(constant / name / "polyMesh", code); });
-}
-
-std::string number_text(double number)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, "%.9g", number);
-    return text;
 }
 
 std::string folder_of(size_t processor)
@@ -146,8 +138,8 @@ std::unique_ptr<data_file> open_decomposed_foam(const std::string &path)
     check_processors(path, folder, numbers);
     auto file = open_processors(path, numbers.size());
     if (is_whole)
-        file->warn("the folders of its processors are read, which go on to " + number_text(last(of_first)) +
-                   ": the case itself has no step after " + (own.empty() ? "its mesh" : number_text(last(own))));
+        file->warn("the folders of its processors are read, which go on to " + time_text(last(of_first)) +
+                   ": the case itself has no step after " + (own.empty() ? "its mesh" : time_text(last(own))));
     return file;
 }
 

@@ -26,9 +26,8 @@ vtkSmartPointer<vtkDataObject> parts_file::read_part(size_t part, size_t step)
     const std::vector<double> &times = file->times();
     const auto at = std::find(times.begin(), times.end(), times_[step]);
     if (at != times.end()) return file->read(static_cast<size_t>(at - times.begin()), 0, 1);
-    char time[32];
-    std::snprintf(time, sizeof time, "%.9g", times_[step]);
-    throw std::runtime_error(parts_[part] + ": has no step at the time " + time + ", which other parts have");
+    throw std::runtime_error(parts_[part] + ": has no step at the time " + time_text(times_[step]) +
+                             ", which other parts have");
 }
 
 vtkSmartPointer<vtkDataObject> parts_file::read(size_t step, int piece, int pieces)
@@ -61,6 +60,13 @@ bool parse_nemesis(const std::string &path, nemesis_name &name)
     if (!std::regex_match(path, parts, form)) return false;
     name = {parts[1], std::atoi(parts[2].str().c_str()), parts[3].str().size()};
     return std::atoi(parts[3].str().c_str()) < name.count;
+}
+
+std::string time_text(double time)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g", time);
+    return text;
 }
 
 std::string plain_name(const std::string &path)

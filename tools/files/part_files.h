@@ -48,6 +48,9 @@ bool parse_nemesis(const std::string &path, nemesis_name &name);
  * mesh changes: run.e for run.e.4.0, run.e-s002 and run.e-s002.4.0. */
 std::string plain_name(const std::string &path);
 
+/* A time as messages have it. */
+std::string time_text(double time);
+
 /* Opens all files of which path is one. Throws std::runtime_error with the file that is missing. */
 std::unique_ptr<data_file> open_nemesis(const std::string &path, const nemesis_name &name);
 
