@@ -41,7 +41,7 @@ MMBVH_INLINE void prefetch_cells(const grid *g, const uint32_t *cells, int cell_
 {
     for (int k = 0; k < cell_count; k++) {
         const int64_t first = fetch_first(g, cells[k], fetch_vertex_count(g, cells[k], shape), shape);
-        __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
+        fetch_soon(g, first, shape);
     }
 }
 
@@ -158,6 +158,11 @@ static void span_of(const grid_array *a, int64_t count, int threads, double *lea
 {
     enum { BLOCK = 65536 };
     float low = INFINITY, high = -INFINITY;
+    if (a->axis) {
+        const grid_array places = {.data = (const char *)a->axis->places, .stride = sizeof(double), .is_wide = true};
+        span_of_any(&places, a->axis->count, 1, least, most);
+        return;
+    }
     if (a->is_wide || a->is_integer) {
         span_of_any(a, count, threads, least, most);
         return;
@@ -192,8 +197,8 @@ fetch_box bounds_guess(const bounds_source *source, int threads)
             span_of(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
         } else {
             double unused;
-            const grid_array lower = {(const char *)(source->lower + axis), 3 * size, false, false, 0};
-            const grid_array upper = {(const char *)(source->upper + axis), 3 * size, false, false, 0};
+            const grid_array lower = {.data = (const char *)(source->lower + axis), .stride = 3 * size};
+            const grid_array upper = {.data = (const char *)(source->upper + axis), .stride = 3 * size};
             span_of(&lower, source->box_count, 1, &box.lower[axis], &unused);
             span_of(&upper, source->box_count, 1, &unused, &box.upper[axis]);
         }

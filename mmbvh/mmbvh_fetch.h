@@ -12,11 +12,19 @@
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
 /* The way in which a cell's vertices are found. Cells are all tets, one after the other, or all hexes, or all of
- * another type, or each has a type of its own. */
-typedef enum fetch_shape { FETCH_TETS, FETCH_HEXES, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
+ * another type, or each has a type of its own, or they are a lattice's. */
+typedef enum fetch_shape {
+    FETCH_TETS,
+    FETCH_HEXES,
+    FETCH_UNIFORM,
+    FETCH_BY_CELL,
+    FETCH_LATTICE,
+    FETCH_SHAPES
+} fetch_shape;
 
 static inline fetch_shape fetch_grid_shape(const grid *g)
 {
+    if (g->lattice) return FETCH_LATTICE;
     if (g->cell_types || g->offsets.data) return FETCH_BY_CELL;
     if (g->cell_type == GRID_TET) return FETCH_TETS;
     return g->cell_type == GRID_HEX ? FETCH_HEXES : FETCH_UNIFORM;
@@ -39,13 +47,28 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
 {
     if (shape == FETCH_TETS) return 4;
     if (shape == FETCH_HEXES) return 8;
-    return grid_type_vertices(shape == FETCH_UNIFORM ? g->cell_type : grid_cell_type(g, cell));
+    if (shape == FETCH_LATTICE) return g->cell_type == GRID_HEX ? 8 : 4;
+    return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
-/* Returns where a cell's vertices begin in the connectivity. */
+/* Returns where a cell's vertices begin in the connectivity; of a lattice, the cell's first vertex. */
 MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
+    if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
+}
+
+/* Returns a vertex of the cell, from fetch_first() of the cell and the vertex's place in it. */
+MMBVH_INLINE int64_t fetch_corner(const grid *g, int64_t first, int i, const fetch_shape shape, const bool wide_index)
+{
+    return shape == FETCH_LATTICE ? first + g->lattice->corner[i]
+                                  : fetch_index(&g->connectivity, first + i, wide_index);
+}
+
+/* Prefetches a cell's entries of the connectivity from first on. A lattice has none. */
+MMBVH_INLINE void fetch_soon(const grid *g, int64_t first, const fetch_shape shape)
+{
+    if (shape != FETCH_LATTICE) __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
 }
 
 /* Prefetches the connectivity of later cells, in a pass over cells in the mesh's order. Though the pass is regular, the
@@ -53,8 +76,8 @@ MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const f
 MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape shape)
 {
     enum { AHEAD = 512 }; /* entries */
-    const int64_t soon = fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD;
-    __builtin_prefetch(g->connectivity.data + soon * g->connectivity.stride);
+    if (shape == FETCH_LATTICE) return;
+    fetch_soon(g, fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
 }
 
 /* Tells whether an array's numbers follow each other: a constant stride becomes part of an address. */
@@ -70,7 +93,7 @@ MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t 
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
-        out[i] = values->data + fetch_index(&g->connectivity, first + (i < count ? i : count - 1), wide_index) * stride;
+        out[i] = values->data + fetch_corner(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
 }
 
 /* Reads a cell's values, which are floats, and tells whether all are finite. */
@@ -191,12 +214,6 @@ static inline fetch_box fetch_span_box(const fetch_span *span)
     return box;
 }
 
-/* Returns where a vertex's coordinates are, in arrays whose axes have one stride. */
-MMBVH_INLINE const char *fetch_vertex(const grid *g, int64_t entry, const bool wide_index)
-{
-    return g->coordinates[0].data + fetch_index(&g->connectivity, entry, wide_index) * g->coordinates[0].stride;
-}
-
 /* The box grows by a cell whose coordinates are floats. */
 MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell, const fetch_shape shape,
                                   const bool wide_index, const bool is_packed)
@@ -206,7 +223,7 @@ MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell,
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     for (int i = 0; i < count; i++) {
-        const int64_t at = fetch_index(&g->connectivity, first + i, wide_index) * stride;
+        const int64_t at = fetch_corner(g, first, i, shape, wide_index) * stride;
         const vec4 p = {*(const float *)(const void *)(x + at), *(const float *)(const void *)(y + at),
                         *(const float *)(const void *)(z + at), 0};
         span->lower = vec4_min(p, span->lower);
@@ -221,7 +238,8 @@ MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, co
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     for (int i = 0; i < count; i++) {
-        const char *at = fetch_vertex(g, first + i, wide_index);
+        const int64_t vertex = fetch_corner(g, first, i, shape, wide_index);
+        const char *at = g->coordinates[0].data + vertex * g->coordinates[0].stride;
         for (int axis = 0; axis < 3; axis++) {
             const int64_t offset = g->coordinates[axis].data - g->coordinates[0].data;
             const double x = *(const double *)(const void *)(at + offset);
@@ -277,15 +295,30 @@ MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3
  * a polyhedron. */
 static inline bool fetch_is_plain(const grid *g)
 {
-    if (grid_has_faces(g)) return false;
+    if (grid_has_faces(g) || g->coordinates[0].axis) return false;
     const grid_array *c = g->coordinates;
     const bool integer = c[0].is_integer || c[1].is_integer || c[2].is_integer;
     return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide && c[0].stride == c[1].stride &&
            c[0].stride == c[2].stride;
 }
 
+/* The box grows by a cell of a uniform or rectilinear lattice. */
+static inline void fetch_box_axes(fetch_box *box, const grid_lattice *l, int64_t cell)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const double *at = l->axes[axis].places + grid_index_along(&l->by_cell, axis, cell);
+        const double a = at[0], b = l->cells[axis] ? at[1] : a;
+        box->lower[axis] = fmin(fmin(a, b), box->lower[axis]);
+        box->upper[axis] = fmax(fmax(a, b), box->upper[axis]);
+    }
+}
+
 static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
 {
+    if (g->coordinates[0].axis) {
+        fetch_box_axes(box, g->lattice, cell);
+        return;
+    }
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
@@ -300,7 +333,10 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
 
 /* One instance of a pass for each way an array can be laid out: DEFINE(name, shape, wide_index, wide_number) makes a
  * function, and FETCH_TABLE(prefix) is the table of them, by [shape][wide_index][wide_number]. */
-#define FETCH_INSTANCES(DEFINE, prefix) FETCH_EACH_SHAPE(FETCH_SHAPE_INSTANCES, DEFINE, prefix)
+#define FETCH_INSTANCES(DEFINE, prefix)                                                                                \
+    FETCH_EACH_SHAPE(FETCH_SHAPE_INSTANCES, DEFINE, prefix)                                                            \
+    DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)                                                            \
+    DEFINE(prefix##_lattice_8, FETCH_LATTICE, false, true)
 
 #define FETCH_EACH_SHAPE(INSTANCES, DEFINE, prefix)                                                                    \
     INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                                       \
@@ -320,11 +356,14 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
         {{prefix##_hexes_44, prefix##_hexes_48}, {prefix##_hexes_84, prefix##_hexes_88}},                              \
         {{prefix##_uniform_44, prefix##_uniform_48}, {prefix##_uniform_84, prefix##_uniform_88}},                      \
         {{prefix##_by_cell_44, prefix##_by_cell_48}, {prefix##_by_cell_84, prefix##_by_cell_88}},                      \
+        {{prefix##_lattice_4, prefix##_lattice_8}, {prefix##_lattice_4, prefix##_lattice_8}},                          \
     }
 /* clang-format on */
 
 /* As above, for floats alone: a table by [shape][wide_index]. */
-#define FETCH_FLOAT_INSTANCES(DEFINE, prefix) FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)
+#define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
+    FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)                                                      \
+    DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)
 
 #define FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                             \
     DEFINE(prefix##_44, shape, false, false)                                                                           \
@@ -337,6 +376,7 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
         {prefix##_hexes_44, prefix##_hexes_84},                                                                        \
         {prefix##_uniform_44, prefix##_uniform_84},                                                                    \
         {prefix##_by_cell_44, prefix##_by_cell_84},                                                                    \
+        {prefix##_lattice_4, prefix##_lattice_4},                                                                      \
     }
 /* clang-format on */
 

@@ -86,15 +86,13 @@ sweep_sum sweep_tree(const sweep *s, int threads)
  * of a cache line may lie across two. */
 MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
 {
-    const grid_array *connectivity = &s->g->connectivity;
     const int64_t distance = shape == FETCH_TETS ? PREFETCH_TETS : PREFETCH_CELLS;
-    if (entry < distance) return;
+    if (shape == FETCH_LATTICE || entry < distance) return;
     const int64_t later = s->tree->cells[entry - distance];
     const int count = fetch_vertex_count(s->g, later, shape);
     const int64_t first = fetch_first(s->g, later, count, shape);
-    __builtin_prefetch(connectivity->data + first * connectivity->stride);
-    if (shape != FETCH_TETS || wide_index)
-        __builtin_prefetch(connectivity->data + (first + count - 1) * connectivity->stride);
+    fetch_soon(s->g, first, shape);
+    if (shape != FETCH_TETS || wide_index) fetch_soon(s->g, first + count - 1, shape);
 }
 
 /* Rounds a range outward. It is empty where no cell was read. */

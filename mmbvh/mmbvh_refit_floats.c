@@ -37,7 +37,7 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
     fetch_span span = fetch_span_empty();
     vec4 poison = {0};
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(&g->connectivity, first + i, how.wide_index);
+        const int64_t vertex = fetch_corner(g, first, i, how.shape, how.wide_index);
         const vec4 p = {*(const float *)(const void *)(x + vertex * stride),
                         *(const float *)(const void *)(y + vertex * stride),
                         *(const float *)(const void *)(z + vertex * stride),
@@ -68,14 +68,13 @@ MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading ho
 
 MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
 {
-    const grid_array *connectivity = &s->source->g->connectivity;
     const uint32_t *cells = s->tree->cells;
     p->first = first;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t later = cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep goes down */
         const int64_t entry =
             fetch_first(s->source->g, later, fetch_vertex_count(s->source->g, later, how.shape), how.shape);
-        __builtin_prefetch(connectivity->data + entry * connectivity->stride);
+        fetch_soon(s->source->g, entry, how.shape);
         prefetch_vertex(s, cells[i > PREFETCH_VERTICES ? i - PREFETCH_VERTICES : 0], how);
         p->spans[i - first] = read_cell(s, cells[i], how, &p->unusable);
     }

@@ -150,7 +150,7 @@ MMBVH_INLINE void find_four(const selector *s, const four_ranges *r, uint64_t *u
 static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
 {
     uint64_t bits = 0;
-    if (!g->ghosts && !g->flat) return count < WORD_CELLS ? (UINT64_C(1) << count) - 1 : ~UINT64_C(0);
+    if (!grid_has_ghosts(g) && !g->flat) return count < WORD_CELLS ? (UINT64_C(1) << count) - 1 : ~UINT64_C(0);
     for (int64_t i = 0; i < count; i++) bits |= (uint64_t)grid_is_drawn(g, first + i) << i;
     return bits;
 }
@@ -213,7 +213,7 @@ MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, f
     }                                                                                                                  \
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
-        if (shape != FETCH_BY_CELL)                                                                                    \
+        if (shape < FETCH_BY_CELL)                                                                                     \
             return fetch_is_packed(&s->values)                                                                         \
                        ? mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, true})       \
                        : mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, false});     \

@@ -58,7 +58,7 @@ static inline grid_array make_array(char **memory, int64_t count, bool wide, boo
 {
     const int64_t stride = (wide ? 8 : 4) * (strided ? 3 : 1);
     *memory = calloc((size_t)(count ? count : 1), (size_t)stride);
-    return (grid_array){*memory, stride, wide, integer, 0};
+    return (grid_array){.data = *memory, .stride = stride, .is_wide = wide, .is_integer = integer};
 }
 
 static inline void make_points(lattice *l, int n, lattice_layout layout)
@@ -74,7 +74,8 @@ static inline void make_points(lattice *l, int n, lattice_layout layout)
     l->field.component_count = 1;
     l->field.component_stride = 4;
     for (int axis = 0; axis < 3; axis++) {
-        g->coordinates[axis] = (grid_array){l->coordinates + axis * next, stride, layout.wide_coordinates, false, 0};
+        g->coordinates[axis] =
+            (grid_array){.data = l->coordinates + axis * next, .stride = stride, .is_wide = layout.wide_coordinates};
     }
     for (int64_t v = 0; v < g->vertex_count; v++) {
         const int64_t ijk[3] = {v % side, v / side % side, v / side / side};

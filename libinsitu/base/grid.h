@@ -23,14 +23,53 @@ enum {
     GRID_MAX_CELL_VERTICES = 8 /* of a type that fixes the number: all types but polyhedra and polygons */
 };
 
+/* The three indices of a lattice's vertices or cells, by their numbers: the index along an axis of number n is
+ * n % outer / stride, where outer is the next larger stride. Strides nest, so that each triple of indices has a number
+ * of its own; numbers between them are padding. */
+typedef struct grid_numbering {
+    int64_t stride[3];
+    double inverse_stride[3]; /* 0 along an axis with a single index */
+    double outer[3];          /* 0 along the axis of the largest stride */
+    double inverse_outer[3];  /* likewise */
+} grid_numbering;
+
+/* Returns the index of number n along an axis. Each quotient is rounded down from (n + 1/2) / stride, which is at least
+ * 1/2 / stride away from the next integer; the two roundings move it by at most n / stride * 2^-52, which is less if
+ * n < 2^51. */
+static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64_t n)
+{
+    const double whole = (double)n, outer = (double)(int64_t)((whole + 0.5) * of->inverse_outer[axis]);
+    return (int64_t)((whole - outer * of->outer[axis] + 0.5) * of->inverse_stride[axis]);
+}
+
+/* Coordinates along one axis of a uniform or rectilinear lattice. */
+typedef struct grid_axis {
+    const double *places; /* by index */
+    int64_t count;        /* of places */
+    const grid_numbering *vertices;
+    int axis;
+} grid_axis;
+
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
 typedef struct grid_array {
     const char *data;
     int64_t stride; /* bytes, never 0 */
     bool is_wide;
     bool is_integer;
-    int64_t base; /* for indices and offsets: the entry that counts as 0 */
+    int64_t base;          /* for indices and offsets: the entry that counts as 0 */
+    const grid_axis *axis; /* NULL, or what computes the numbers, coordinates by vertex; there is no data then */
 } grid_array;
+
+/* Cells by three indices instead of connectivity. */
+typedef struct grid_lattice {
+    int64_t cells[3]; /* along each axis; 0 along the third: quads */
+    grid_numbering by_vertex, by_cell;
+    int64_t corner[8];                    /* from the number of a cell's first vertex to that of each, in VTK's order */
+    int64_t drawn_first[3], drawn_end[3]; /* the indices of the cells that are no ghost layers */
+    int64_t cell_count;                   /* without padding */
+    bool has_ghosts;                      /* some numbers of cells are padding, or of ghost layers */
+    grid_axis axes[3];                    /* no places: coordinates are given by vertex */
+} grid_lattice;
 
 typedef struct grid {
     int64_t vertex_count;
@@ -44,7 +83,8 @@ typedef struct grid {
     int cell_type;
     const char *ghosts; /* NULL: none */
     int64_t ghosts_stride;
-    const uint64_t *flat; /* NULL, or a bit for each cell, set where it has no volume and is not drawn */
+    const grid_lattice *lattice; /* NULL, or what replaces connectivity, offsets and cell_types */
+    const uint64_t *flat;        /* NULL, or a bit for each cell, set where it has no volume and is not drawn */
     /* Faces of polyhedra, shared between them; no data: there are no polyhedra. */
     int64_t face_count;
     grid_array face_offsets;      /* face_count + 1 */
@@ -64,6 +104,7 @@ typedef struct grid_field {
 
 static inline double grid_array_number(const grid_array *a, int64_t i)
 {
+    if (a->axis) return a->axis->places[grid_index_along(a->axis->vertices, a->axis->axis, i)];
     const char *p = a->data + i * a->stride;
     if (!a->is_integer) return a->is_wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
     return a->is_wide ? (double)*(const int64_t *)(const void *)p : (double)*(const int32_t *)(const void *)p;
@@ -106,11 +147,46 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
+/* Returns the number of a cell's first vertex. */
+static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
+{
+    int64_t first = 0;
+    for (int axis = 0; axis < 3; axis++) first += grid_index_along(&l->by_cell, axis, cell) * l->by_vertex.stride[axis];
+    return first;
+}
+
+/* Tells whether the number is that of a cell; else it is padding. */
+static inline bool grid_lattice_has(const grid_lattice *l, int64_t cell)
+{
+    int64_t number = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t index = grid_index_along(&l->by_cell, axis, cell);
+        if (index >= (l->cells[axis] ? l->cells[axis] : 1)) return false;
+        number += index * l->by_cell.stride[axis];
+    }
+    return number == cell;
+}
+
+/* Tells whether the number is that of a cell outside of the ghost layers. */
+static inline bool grid_lattice_draws(const grid_lattice *l, int64_t cell)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t index = grid_index_along(&l->by_cell, axis, cell);
+        if (index < l->drawn_first[axis] || index >= l->drawn_end[axis]) return false;
+    }
+    return grid_lattice_has(l, cell);
+}
+
 /* The cell's vertex indices, in VTK's order; returns how many. It has none for polyhedra and polygons: see grid_walk.
  */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));
+    if (g->lattice) {
+        const int64_t base = grid_lattice_first(g->lattice, cell);
+        for (int i = 0; i < count; i++) vertices[i] = base + g->lattice->corner[i];
+        return count;
+    }
     const int64_t first = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
     for (int i = 0; i < count; i++) vertices[i] = grid_array_index(&g->connectivity, first + i);
     return count;
@@ -141,7 +217,9 @@ static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *firs
 typedef struct grid_walk {
     const grid *cells;
     bool is_polyhedron;
-    int64_t next, end;           /* entries of connectivity */
+    const int64_t *corner;       /* of a lattice: from its first vertex to each; else NULL */
+    int64_t base;                /* that first vertex */
+    int64_t next, end;           /* entries of connectivity, or of corner */
     int64_t face_next, face_end; /* entries of face_connectivity */
 } grid_walk;
 
@@ -154,6 +232,12 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
         grid_cell_faces(g, cell, &w.next, &w.end);
         return w;
     }
+    if (g->lattice) {
+        w.corner = g->lattice->corner;
+        w.base = grid_lattice_first(g->lattice, cell);
+        w.end = count;
+        return w;
+    }
     w.next = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
     w.end = type == GRID_POLYGON ? grid_array_index(&g->offsets, cell + 1) : w.next + count;
     return w;
@@ -164,7 +248,8 @@ static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
 {
     if (!w->is_polyhedron) {
         if (w->next == w->end) return false;
-        *vertex = grid_array_index(&w->cells->connectivity, w->next++);
+        *vertex = w->corner ? w->base + w->corner[w->next] : grid_array_index(&w->cells->connectivity, w->next);
+        w->next++;
         return true;
     }
     while (w->face_next == w->face_end) {
@@ -183,7 +268,14 @@ static inline void grid_vertex(const grid *g, int64_t vertex, double position[3]
 
 static inline bool grid_is_ghost(const grid *g, int64_t cell)
 {
-    return g->ghosts && g->ghosts[cell * g->ghosts_stride] != 0;
+    if (g->ghosts && g->ghosts[cell * g->ghosts_stride] != 0) return true;
+    return g->lattice && g->lattice->has_ghosts && !grid_lattice_draws(g->lattice, cell);
+}
+
+/* Tells whether some cells may be ghosts. */
+static inline bool grid_has_ghosts(const grid *g)
+{
+    return g->ghosts || (g->lattice && g->lattice->has_ghosts);
 }
 
 static inline bool grid_is_flat(const grid *g, int64_t cell)

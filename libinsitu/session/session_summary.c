@@ -24,6 +24,8 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     bytes += array_bytes(&m->neighbour, m->neighbour_count);
     bytes += array_bytes(&m->connectivity, m->connectivity_count);
     bytes += array_bytes(&m->offsets, m->offsets.data ? m->cell_count + 1 : 0);
+    for (int axis = 0; m->lattice && axis < 3; axis++)
+        bytes += array_bytes(&m->lattice->axes[axis], m->lattice->cells[axis] + 1);
     return bytes + array_bytes(&m->ghosts, m->cell_count);
 }
 
@@ -126,6 +128,11 @@ static void report_topology(session_report *out, const session_mesh *mesh)
     if (face_bytes)
         session_text_add(&out->copied_why, "mesh \"%s\": its faces' vertices, out of lists: %lld bytes", mesh->name,
                          face_bytes);
+    if (mesh->lattice.bytes) {
+        out->numbers.bytes_copied += mesh->lattice.bytes;
+        session_text_add(&out->copied_why, "mesh \"%s\": coordinates along the axes of its lattice: %lld bytes",
+                         mesh->name, (long long)mesh->lattice.bytes);
+    }
     if (!mesh->torn.bytes) return;
     out->numbers.bytes_copied += mesh->torn.bytes;
     session_text_add(&out->copied_why,
@@ -138,7 +145,7 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
     if (!mesh->is_given) return;
     insitu_report *report = &out->numbers;
     int64_t unusable = 0;
-    report->cells += mesh->given.cell_count;
+    report->cells += session_cell_count(mesh);
     report->bytes_borrowed += mesh_bytes(&mesh->given);
     report_topology(out, mesh);
     if (!mesh->is_check_stale) {

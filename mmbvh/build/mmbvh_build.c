@@ -42,7 +42,7 @@ static int64_t chunk_start(const build *b, int chunk)
 
 static bool may_leave_out(const build *b)
 {
-    return !b->selected && b->source.g && (b->source.g->ghosts || b->source.g->flat);
+    return !b->selected && b->source.g && (grid_has_ghosts(b->source.g) || b->source.g->flat);
 }
 
 static bool is_left_out(const build *b, int64_t cell)

@@ -92,10 +92,19 @@ SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
     return p->type != GRID_NO_TYPE ? p->type : grid_cell_type(p->cells, cell);
 }
 
-/* The first of the cell's entries in the connectivity, of cells of so many vertices. */
+/* Returns the first of the cell's entries in the connectivity, for cells of so many vertices; for a lattice, the cell's
+ * first vertex. */
 SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertices)
 {
+    if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first(g->lattice, cell);
     return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
+}
+
+/* Stores the vertices of a lattice's cell, each room after the one before. */
+static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out, int room)
+{
+    const int64_t first = grid_lattice_first(l, cell);
+    for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner[i]);
 }
 
 /* vertices: of each cell; a constant where this is called from. */
@@ -104,6 +113,11 @@ SIMD_INLINE void kernel_arrays_indices(const kernel_arrays *p, const uint32_t *c
 {
     const grid_array c = p->cells->connectivity;
     const int32_t base = (int32_t)c.base;
+    if (__builtin_expect(p->cells->lattice != NULL, 0)) {
+        for (int n = 0; n < count; n++, lane++)
+            kernel_lattice_indices(p->cells->lattice, cells[n], vertices, out[0] + lane, SIMD_WIDTH);
+        return;
+    }
     for (int n = 0; n < count; n++, lane++) {
         const char *at = c.data + kernel_arrays_first(p->cells, cells[n], vertices) * c.stride;
         if (c.is_wide)
@@ -127,6 +141,10 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
 SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const grid_array c = p->cells->connectivity;
+    if (__builtin_expect(p->cells->lattice != NULL, 0)) {
+        kernel_lattice_indices(p->cells->lattice, cell, vertices, out, room);
+        return;
+    }
     const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
     for (int i = 0; i < vertices; i++, at += c.stride) {
         const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
@@ -163,10 +181,32 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* ---- numbers ---- */
 
+/* Returns the coordinates along a lattice's axis at vertices: grid_index_along() a lane. */
+static void kernel_axis_take(const grid_axis *axis, vi vertex, kernel_whole *out)
+{
+    const grid_numbering *of = axis->vertices;
+    const double outer = of->outer[axis->axis], inverse_outer = of->inverse_outer[axis->axis];
+    const double inverse_stride = of->inverse_stride[axis->axis];
+    double places[SIMD_WIDTH];
+    int32_t at[SIMD_WIDTH];
+    memcpy(at, &vertex, sizeof vertex);
+    for (int n = 0; n < SIMD_WIDTH; n++) {
+        const double number = (double)at[n];
+        const double above = (double)(int32_t)((number + 0.5) * inverse_outer);
+        at[n] = (int32_t)((number - above * outer + 0.5) * inverse_stride);
+    }
+    for (int n = 0; n < SIMD_WIDTH; n++) places[n] = axis->places[at[n]];
+    memcpy(out, places, sizeof places);
+}
+
 static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_whole *out)
 {
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
+    if (c->array.axis) {
+        kernel_axis_take(c->array.axis, index, out);
+        return;
+    }
     memcpy(at, &index, sizeof index);
     for (int n = 0; n < SIMD_WIDTH; n++)
         v[n] = c->field ? grid_field_value(c->field, at[n]) : grid_array_number(&c->array, at[n]);

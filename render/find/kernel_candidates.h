@@ -82,7 +82,7 @@ static void kernel_find_queued(kernel_finder *s)
 static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
 {
     const grid *g = s->arrays.cells;
-    const bool is_plain = !g->offsets.data && !g->cell_types;
+    const bool is_plain = !g->offsets.data && !g->cell_types && !g->lattice;
     const char *indices = g->connectivity.data;
     const int64_t stride = g->connectivity.stride * grid_type_vertices(g->cell_type);
     for (int n = 0; n < count; n++) {

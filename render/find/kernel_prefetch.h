@@ -9,12 +9,14 @@
 SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, int64_t v)
 {
     __builtin_prefetch(field->values.data + v * field->values.stride);
-    for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
+    for (int a = 0; a < 3 && g->coordinates[a].data; a++)
+        __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
 /* Prefetches a cell's indices and its type. An offset is read at once, as only the prefetch waits for it. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
+    if (g->lattice) return;
     const int64_t first = kernel_arrays_first(g, cell, grid_type_vertices(g->cell_type));
     __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
     if (g->cell_types) __builtin_prefetch(g->cell_types + cell * g->cell_types_stride);
@@ -25,7 +27,9 @@ SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field
 {
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));
     const int64_t first = kernel_arrays_first(g, cell, vertices);
-    for (int i = 0; i < vertices; i++) kernel_prefetch_vertex(g, field, grid_array_index(&g->connectivity, first + i));
+    for (int i = 0; i < vertices; i++)
+        kernel_prefetch_vertex(
+            g, field, g->lattice ? first + g->lattice->corner[i] : grid_array_index(&g->connectivity, first + i));
 }
 
 /* All that the cells are made of is on its way from memory before the first of it is looked at. */

@@ -93,6 +93,32 @@ enum {
     INSITU_CHANGED_ALL = 7
 };
 
+/* A structured block: its cells are found by three indices i, j, k instead of connectivity. Vertex and cell arrays are
+ * read as they are, in C's or Fortran's order, padded or with ghost layers. Cells are hexes, or quads where cells[2] is
+ * 0. The coordinates are either uniform (spacing), rectilinear (axes) or given for each vertex in the mesh's
+ * coordinates, which are not given otherwise. docs/structured.md has examples. */
+typedef struct insitu_lattice {
+    int64_t cells[3]; /* along i, j and k, at least 1 each; the third 0: quads. All 0 on a rank that has no cells. */
+    /* How far, in vertices, the vertices' arrays are from one vertex to the next along i, j and k, at least 1 each: the
+     * vertex i, j, k has the number i * vertex_strides[0] + j * vertex_strides[1] + k * vertex_strides[2]. Each larger
+     * stride spans all that the smaller ones reach, so that no two vertices have one number. All 0: packed with i
+     * fastest, as in Fortran's x(i, j, k) and C's x[k][j][i]. */
+    int64_t vertex_strides[3];
+    int64_t cell_strides[3]; /* likewise, in cells, of the cells' arrays */
+    /* Ghost layers: the cells with indices from interior_first to interior_end - 1 are drawn, those outside of it count
+     * as ghosts. All 0: all cells are drawn. */
+    int64_t interior_first[3], interior_end[3];
+    /* Uniform: vertex n along an axis is at origin + spacing * (first + n), in double. first is the place of the
+     * block's first vertex in the whole lattice, so that blocks of one lattice have the same origin and spacing and
+     * their common vertices the same coordinates, to the bit. That is how vertices of several blocks and ranks are
+     * found to be one. spacing is not 0 along the axes that have cells; all 0: the lattice is not uniform. */
+    double origin[3], spacing[3];
+    int64_t first[3];
+    /* Rectilinear: cells[a] + 1 coordinates along each axis, float32 or float64; not given where the lattice is
+     * uniform. A lattice of quads may lack the third, whose coordinate is 0 then. */
+    insitu_array axes[3];
+} insitu_lattice;
+
 /* One rank's part of a mesh. All arrays are borrowed until the next insitu_step() returns or the mesh is set again
  * under the same name, whichever is later. They must stay valid that long, and a step reads the values that they hold
  * when it is called. Fill with insitu_mesh_defaults() first. */
@@ -161,6 +187,10 @@ typedef struct insitu_mesh {
                                  other. So cells of higher order can be given whose vertices are the first nodes of each
                                  row. connectivity_count counts the other nodes too, but those of the last cell may be
                                  missing. */
+    /* Optional, instead of connectivity, offsets, cell_types and faces, which are not given then; cell_type is not
+     * read. vertex_count and cell_count are the lengths of the vertices' and the cells' arrays, padding included. The
+     * description is copied, the axes are borrowed. Nothing is held for each cell or vertex. */
+    const insitu_lattice *lattice;
 } insitu_mesh;
 
 /* A field has one value at each vertex, one in each cell, or one at each corner of each cell. Volumes and colours show

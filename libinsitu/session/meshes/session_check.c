@@ -14,6 +14,7 @@
 #include "memory.h"
 #include "region.h"
 #include "session_agree.h"
+#include "session_lattice.h"
 #include "session_tally.h"
 #include "session_topology.h"
 
@@ -275,7 +276,8 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
 static long long given_type(const grid *g, int64_t cell)
 {
     if (!g->cell_types || g->cell_types_bytes < 8) return grid_cell_type(g, cell);
-    const grid_array types = {g->cell_types, g->cell_types_stride, true, true, 0};
+    const grid_array types = {
+        .data = g->cell_types, .stride = g->cell_types_stride, .is_wide = true, .is_integer = true};
     return grid_array_index(&types, cell);
 }
 
@@ -494,7 +496,7 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
         mesh->upper[axis] = tally.upper[axis];
     }
     mesh->drawn_count = tally.drawn;
-    mesh->ghost_count = tally.ghosts;
+    mesh->ghost_count = tally.ghosts - (mesh->cells.cell_count - session_cell_count(mesh)); /* without padding */
     mesh->inverted_count = tally.inverted;
     mesh->flat_count = tally.flat;
     mesh->shell_count = tally.shells;
@@ -507,7 +509,8 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
-    const insitu_status status = check_cells_of(mesh, threads, error);
+    insitu_status status = session_make_axes(mesh, error);
+    if (!status) status = check_cells_of(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
     return status;
 }

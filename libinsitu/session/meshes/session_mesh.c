@@ -5,6 +5,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_lattice.h"
 
 grid_array session_grid_array(const insitu_array *array)
 {
@@ -35,7 +36,7 @@ bool session_make_indices(const session_mesh *mesh, const char *what, int64_t co
         base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name, bytes, what);
         return false;
     }
-    *out = (grid_array){data, size, is_wide, true, 0};
+    *out = (grid_array){.data = data, .stride = size, .is_wide = is_wide, .is_integer = true};
     return true;
 }
 
@@ -194,6 +195,7 @@ static void drop_cells(session_mesh *mesh)
     session_drop_tree(mesh);
     session_drop_topology(&mesh->topology);
     session_drop_torn(&mesh->torn);
+    session_drop_axes(&mesh->lattice);
     base_free(mesh->flat);
     mesh->flat = NULL;
 }

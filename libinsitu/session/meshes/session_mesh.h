@@ -142,12 +142,21 @@ typedef struct session_torn {
     int64_t bytes;
 } session_torn;
 
+/* A structured block. */
+typedef struct session_lattice {
+    insitu_lattice given; /* what given.lattice of the mesh points to, unless that is NULL */
+    grid_lattice cells;
+    double *places[3]; /* coordinates along the axes, of uniform and rectilinear ones: a declared copy */
+    int64_t bytes;     /* of places */
+} session_lattice;
+
 /* One rank's part of a mesh. */
 typedef struct session_mesh {
     char *name;
     insitu_mesh given;
     session_topology topology;
     session_torn torn;
+    session_lattice lattice;
     grid cells;
     bool is_given;               /* false after an insitu_set_mesh() that failed: problem says why */
     base_error problem;          /* of the last insitu_set_mesh(), */
@@ -278,6 +287,12 @@ typedef struct session_part_walk {
 
 /* Returns false after the last part. */
 bool session_next_part(session_part_walk *walk);
+
+/* The number of cells that the caller gave; a lattice's array of cells may have padding. */
+static inline int64_t session_cell_count(const session_mesh *mesh)
+{
+    return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
+}
 
 /* The number of vertices that scalars have values at. */
 static inline int64_t session_vertex_count(const session_mesh *mesh)

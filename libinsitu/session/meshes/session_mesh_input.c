@@ -8,6 +8,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_lattice.h"
 #include "session_topology.h"
 
 void insitu_mesh_defaults(insitu_mesh *mesh)
@@ -139,13 +140,13 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         &mesh->connectivity,   &mesh->offsets,        &mesh->ghosts,           &mesh->face_offsets, &mesh->face_sizes,
         &mesh->owner,          &mesh->neighbour,      &mesh->face_connectivity};
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
-    const bool has_lists = mesh->face_lists.data != NULL;
+    const bool has_lists = mesh->face_lists.data != NULL, has_axes = session_has_axes(mesh);
     const int floats = SESSION_ALLOW_FLOATS, integers = SESSION_ALLOW_INTEGERS, bytes = SESSION_ALLOW_BYTES;
     const int optional = SESSION_IS_OPTIONAL, end = SESSION_HAS_END;
     const session_array_rule rules[] = {
-        {"x coordinates", vertices, floats, 1},
-        {"y coordinates", vertices, floats, 1},
-        {"z coordinates", vertices, floats, 1},
+        {"x coordinates", vertices, floats | (has_axes ? optional : 0), 1},
+        {"y coordinates", vertices, floats | (has_axes ? optional : 0), 1},
+        {"z coordinates", vertices, floats | (has_axes ? optional : 0), 1},
         {"vertex ids", vertices, integers | optional, 1},
         {"cell types", cells, integers | bytes | optional, 1},
         {"connectivity indices", mesh->connectivity_count, integers, 1},
@@ -250,7 +251,7 @@ static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 
 static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
 {
-    if (mesh->cell_count == 0 || mesh->owner.data) return INSITU_OK;
+    if (mesh->cell_count == 0 || mesh->owner.data || mesh->lattice) return INSITU_OK;
     if (mesh->cell_types.data) {
         if (!mesh->offsets.data)
             return base_fail(error, INSITU_ERROR_MESH, "cell types are given without offsets: mixed cells need both");
@@ -283,6 +284,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_owner(mesh, error);
     if (!status) status = check_shape(mesh, error);
     if (!status) status = check_rows(mesh, error);
+    if (!status && mesh->lattice) status = session_check_lattice(mesh, error);
     return status;
 }
 
@@ -296,7 +298,8 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count ||
            a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra ||
            a->vertex_order != b->vertex_order || a->connectivity_row != b->connectivity_row ||
-           !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data;
+           !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data ||
+           session_lattice_changes(a->lattice, b->lattice) == INSITU_CHANGED_ALL;
 }
 
 bool session_is_same_array(const insitu_array *a, const insitu_array *b)
@@ -320,7 +323,8 @@ static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
     bool has_same_vertices = session_is_same_array(&a->vertex_ids, &b->vertex_ids);
     for (int axis = 0; axis < 3; axis++)
         has_same_vertices = has_same_vertices && session_is_same_array(&a->coordinates[axis], &b->coordinates[axis]);
-    return (has_same_cells ? 0 : INSITU_CHANGED_TOPOLOGY) | (has_same_vertices ? 0 : INSITU_CHANGED_GEOMETRY);
+    return (has_same_cells ? 0 : INSITU_CHANGED_TOPOLOGY) | (has_same_vertices ? 0 : INSITU_CHANGED_GEOMETRY) |
+           session_lattice_changes(a->lattice, b->lattice);
 }
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
@@ -354,6 +358,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
         for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
     }
     mesh->given = *given;
+    session_take_lattice(mesh);
     session_read_topology(mesh);
     mesh->is_given = true;
     mesh->problem = (base_error){0};

@@ -219,11 +219,11 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
 
 /* The vertices' positions; false where an index is out of range or, of a drawn cell, a coordinate is not finite. */
 MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_ghost, double points[][3],
-                              const bool wide_index, const bool wide_number)
+                              const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
     double poison = 0;
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
+        const int64_t vertex = fetch_corner(g, first, i, shape, wide_index);
         if (vertex < 0 || vertex >= g->vertex_count) return false;
         for (int axis = 0; axis < 3; axis++) {
             points[i][axis] = fetch_number(&g->coordinates[axis], vertex, wide_number);
@@ -243,7 +243,7 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
     if (count == 0 || (shape == FETCH_BY_CELL && !offsets_are_good(mesh, cell, count))) return false;
     const bool is_ghost = grid_is_ghost(g, cell);
     double points[GRID_MAX_CELL_VERTICES][3];
-    if (!take_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, wide_index, wide_number))
+    if (!take_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, shape, wide_index, wide_number))
         return false;
     t->ghosts += is_ghost;
     if (is_ghost) return true;
@@ -278,7 +278,7 @@ MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64
 static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    if (alike->count < LANES) return 0;
+    if (alike->count < LANES || alike->g->lattice) return 0;
     lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
@@ -305,6 +305,36 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
     double box = 1;
     for (int axis = 0; axis < 3; axis++) box *= t->upper[axis] - t->lower[axis];
     return is_flat(least, box);
+}
+
+/* Tallies cells of a uniform or rectilinear lattice, which are boxes, or flat. */
+static int64_t run_axes(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
+{
+    const grid *g = &mesh->cells;
+    mesh_tally t = tally_empty();
+    for (int64_t cell = begin; cell < end; cell++) {
+        if (grid_is_ghost(g, cell)) {
+            t.ghosts++;
+            continue;
+        }
+        fetch_box box;
+        double volume = 1;
+        fetch_box_empty(&box);
+        fetch_box_axes(&box, g->lattice, cell);
+        tally_point(&t, box.lower);
+        tally_point(&t, box.upper);
+        for (int axis = 0; axis < 3; axis++) {
+            const double *at = g->lattice->axes[axis].places + grid_index_along(&g->lattice->by_cell, axis, cell);
+            volume *= g->lattice->cells[axis] ? at[1] - at[0] : 0;
+        }
+        t.flat += volume == 0;
+        if (g->cell_type == GRID_QUAD)
+            t.shells++, t.drawn++;
+        else
+            tally_volume(&t, volume);
+    }
+    tally_merge(tally, &t);
+    return end;
 }
 
 MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally,
@@ -342,6 +372,7 @@ tally_run tally_choose(const session_mesh *mesh)
 {
     static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run);
     const grid *g = &mesh->cells;
+    if (g->coordinates[0].axis) return run_axes;
     if (!fetch_is_plain(g) || (!g->cell_types && grid_is_shell_type(g->cell_type))) return NULL;
     return table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
 }

@@ -26,6 +26,7 @@
 #include "memory.h"
 #include "region.h"
 #include "session_cell_order.h"
+#include "session_lattice.h"
 #include "session_tally.h"
 
 /* ---- the grid --------------------------------------------------------------------------------------------------- */
@@ -78,6 +79,7 @@ void session_read_topology(session_mesh *mesh)
         g.connectivity = mesh->torn.corners;
         for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = mesh->torn.coordinates[axis];
     }
+    session_read_lattice(mesh, &g);
     g.flat = mesh->flat;
     mesh->cells = g;
 }

@@ -31,7 +31,7 @@ static inline const session_face_table *session_faces_of_type(int type)
 
 typedef struct session_cell_faces {
     const grid *cells;
-    const session_face_table *table; /* NULL: of polyhedra and shells */
+    const session_face_table *table; /* NULL: of polyhedra, and of shells but a lattice's */
     int64_t count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     int64_t first; /* of the entries of connectivity */
@@ -46,6 +46,13 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
         int64_t end;
         grid_cell_faces(g, cell, &out.first, &end);
         out.count = end - out.first;
+        return out;
+    }
+    if (g->lattice && type == GRID_QUAD) {
+        static const session_face_table quad = {1, {{0, 1, 2, 3}}};
+        out.table = &quad;
+        out.count = 1;
+        out.size = grid_cell_vertices(g, cell, out.vertices);
         return out;
     }
     if (grid_is_shell_type(type)) {

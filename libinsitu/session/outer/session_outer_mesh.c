@@ -374,14 +374,16 @@ static grid describe(const outer_work *w)
 {
     const session_outer *out = w->out;
     const int64_t size = (int64_t)sizeof(double);
-    grid g = {.vertex_count = w->vertex_count,
-              .cell_count = w->cell_count,
-              .connectivity = {(const char *)out->connectivity, size, true, true, 0},
-              .cell_type = w->pyramid_count ? GRID_PYRAMID : GRID_TET};
+    grid g = {
+        .vertex_count = w->vertex_count,
+        .cell_count = w->cell_count,
+        .connectivity = {.data = (const char *)out->connectivity, .stride = size, .is_wide = true, .is_integer = true},
+        .cell_type = w->pyramid_count ? GRID_PYRAMID : GRID_TET};
     for (int axis = 0; axis < 3; axis++)
-        g.coordinates[axis] = (grid_array){(const char *)(out->coordinates + axis), 3 * size, true, false, 0};
+        g.coordinates[axis] =
+            (grid_array){.data = (const char *)(out->coordinates + axis), .stride = 3 * size, .is_wide = true};
     if (w->pyramid_count == 0 || w->pyramid_count == w->cell_count) return g;
-    g.offsets = (grid_array){(const char *)out->offsets, size, true, true, 0};
+    g.offsets = (grid_array){.data = (const char *)out->offsets, .stride = size, .is_wide = true, .is_integer = true};
     g.cell_types = (const char *)out->types;
     g.cell_types_stride = g.cell_types_bytes = 1;
     return g;

@@ -77,6 +77,9 @@ static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *
                          row, (int)field->centring, (int)INSITU_CORNER);
     }
     if (mesh->cell_count == 0) return INSITU_OK;
+    if (mesh->lattice)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "has values at corners, and the mesh is a lattice: corners need cells by connectivity");
     if (mesh->owner.data || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has values at corners, and the mesh has polyhedra, whose corners have no order");

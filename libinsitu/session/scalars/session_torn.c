@@ -71,7 +71,7 @@ static bool copy_coordinates(const grid *shared, int threads, session_torn *torn
         const size_t size = from.is_wide ? 8 : 4;
         char *to = base_alloc((size_t)(torn->corner_count + 1) * size);
         if (!to) return false;
-        torn->coordinates[axis] = (grid_array){to, (int64_t)size, from.is_wide, false, 0};
+        torn->coordinates[axis] = (grid_array){.data = to, .stride = (int64_t)size, .is_wide = from.is_wide};
         torn->bytes += torn->corner_count * (int64_t)size;
 #pragma omp parallel num_threads(threads)
         {

@@ -1,0 +1,332 @@
+/* A lattice's cells need no connectivity: the number of a vertex follows from its three indices. Uniform and
+ * rectilinear coordinates are a table along each axis. A uniform coordinate is origin + spacing * index with the index
+ * in the whole lattice, so that blocks and ranks that share a vertex compute the same bits. */
+#include "session_lattice.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_mesh_input.h"
+
+static const char axis_name[3] = {'i', 'j', 'k'};
+
+/* ---- descriptions -------------------------------------------------------------------------------------------- */
+
+static int64_t vertices_along(const insitu_lattice *l, int axis)
+{
+    return l->cells[axis] + 1;
+}
+
+static int64_t cells_along(const insitu_lattice *l, int axis)
+{
+    return l->cells[axis] ? l->cells[axis] : 1;
+}
+
+static bool are_zero(const int64_t values[3])
+{
+    return !values[0] && !values[1] && !values[2];
+}
+
+static bool is_uniform(const insitu_lattice *l)
+{
+    return l->spacing[0] != 0 || l->spacing[1] != 0 || l->spacing[2] != 0;
+}
+
+static bool is_rectilinear(const insitu_lattice *l)
+{
+    return l->axes[0].data || l->axes[1].data || l->axes[2].data;
+}
+
+bool session_has_axes(const insitu_mesh *mesh)
+{
+    return mesh->lattice && (is_uniform(mesh->lattice) || is_rectilinear(mesh->lattice));
+}
+
+static insitu_status check_cells(const insitu_lattice *l, base_error *error)
+{
+    const int64_t most = 4294967294;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t least = axis == 2 || are_zero(l->cells) ? 0 : 1;
+        if (l->cells[axis] >= least && l->cells[axis] <= most) continue;
+        return base_fail(error, INSITU_ERROR_MESH, "lattice: cells along %c are %lld, expected %lld..%lld",
+                         axis_name[axis], (long long)l->cells[axis], (long long)least, (long long)most);
+    }
+    return INSITU_OK;
+}
+
+/* The axes in the order of their strides; an axis with a single index comes first, as its stride is never used. */
+static void order_axes(const int64_t strides[3], const int64_t counts[3], int order[3])
+{
+    for (int i = 0; i < 3; i++) {
+        int at = i;
+        const int64_t own = counts[i] > 1 ? strides[i] : 0;
+        for (; at > 0 && (counts[order[at - 1]] > 1 ? strides[order[at - 1]] : 0) > own; at--)
+            order[at] = order[at - 1];
+        order[at] = i;
+    }
+}
+
+/* Checks that the strides nest, and that the numbers of all count[0] x count[1] x count[2] lie within an array. */
+static insitu_status check_strides(const char *what, const int64_t strides[3], const int64_t counts[3], int64_t length,
+                                   base_error *error)
+{
+    int order[3];
+    int64_t reach = 1; /* numbers from the first to the last of the axes so far */
+    order_axes(strides, counts, order);
+    for (int i = 0; i < 3; i++) {
+        const int axis = order[i];
+        if (counts[axis] == 1) continue;
+        if (strides[axis] < reach)
+            return base_fail(
+                error, INSITU_ERROR_MESH,
+                "lattice: the stride of %s along %c is %lld, at least %lld is needed so that no two have one "
+                "number",
+                what, axis_name[axis], (long long)strides[axis], (long long)reach);
+        if (strides[axis] > (length - reach) / (counts[axis] - 1))
+            return base_fail(error, INSITU_ERROR_MESH,
+                             "lattice: %lld %s along %c with a stride of %lld do not fit into arrays of %lld",
+                             (long long)counts[axis], what, axis_name[axis], (long long)strides[axis],
+                             (long long)length);
+        reach += strides[axis] * (counts[axis] - 1);
+    }
+    return INSITU_OK;
+}
+
+/* Packed strides of so many, the first index fastest. The last cannot overflow where counts have been checked. */
+static void packed_strides(const int64_t counts[3], int64_t out[3])
+{
+    out[0] = 1;
+    out[1] = counts[0];
+    out[2] = counts[0] * counts[1];
+}
+
+static insitu_status check_numbers(const insitu_mesh *mesh, base_error *error)
+{
+    const insitu_lattice *l = mesh->lattice;
+    int64_t vertices[3], cells[3], packed[3];
+    for (int axis = 0; axis < 3; axis++) {
+        vertices[axis] = vertices_along(l, axis);
+        cells[axis] = cells_along(l, axis);
+    }
+    if (vertices[0] > INT64_MAX / 32 / vertices[1])
+        return base_fail(error, INSITU_ERROR_MESH, "lattice: %lld x %lld cells along i and j are too many",
+                         (long long)l->cells[0], (long long)l->cells[1]);
+    packed_strides(vertices, packed);
+    insitu_status status = check_strides("vertices", are_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices,
+                                         mesh->vertex_count, error);
+    packed_strides(cells, packed);
+    if (!status)
+        status = check_strides("cells", are_zero(l->cell_strides) ? packed : l->cell_strides, cells, mesh->cell_count,
+                               error);
+    return status;
+}
+
+static insitu_status check_interior(const insitu_lattice *l, base_error *error)
+{
+    if (are_zero(l->interior_first) && are_zero(l->interior_end)) return INSITU_OK;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t first = l->interior_first[axis], end = l->interior_end[axis], most = cells_along(l, axis);
+        if (first < 0 || end < first || end > most)
+            return base_fail(error, INSITU_ERROR_MESH,
+                             "lattice: the interior along %c is %lld..%lld, expected a range within 0..%lld",
+                             axis_name[axis], (long long)first, (long long)end, (long long)most);
+    }
+    return INSITU_OK;
+}
+
+static insitu_status check_uniform(const insitu_lattice *l, base_error *error)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        if (!isfinite(l->origin[axis]) || !isfinite(l->spacing[axis]))
+            return base_fail(error, INSITU_ERROR_MESH, "lattice: origin %g and spacing %g along %c are not finite",
+                             l->origin[axis], l->spacing[axis], axis_name[axis]);
+        if (l->spacing[axis] == 0 && l->cells[axis])
+            return base_fail(error, INSITU_ERROR_MESH, "lattice: the spacing along %c is 0", axis_name[axis]);
+    }
+    if (is_rectilinear(l))
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "lattice: spacing and axes are given: give coordinates by one of them");
+    return INSITU_OK;
+}
+
+static insitu_status check_axes(const insitu_lattice *l, base_error *error)
+{
+    static const char *const names[3] = {"coordinates along i", "coordinates along j", "coordinates along k"};
+    for (int axis = 0; axis < 3; axis++) {
+        const int optional = axis == 2 && !l->cells[2] ? SESSION_IS_OPTIONAL : 0;
+        const session_array_rule rule = {names[axis], vertices_along(l, axis), SESSION_ALLOW_FLOATS | optional, 1};
+        const insitu_status status = session_check_array(&l->axes[axis], &rule, INSITU_ERROR_MESH, error);
+        if (status) return status;
+    }
+    return INSITU_OK;
+}
+
+/* What a mesh with a lattice must not have. */
+static insitu_status check_others(const insitu_mesh *mesh, base_error *error)
+{
+    const struct {
+        const char *name;
+        bool is_given;
+    } others[] = {{"connectivity indices", mesh->connectivity.data || mesh->connectivity_count},
+                  {"offsets", mesh->offsets.data},
+                  {"cell types", mesh->cell_types.data},
+                  {"face vertex indices", mesh->face_connectivity.data || mesh->face_count},
+                  {"owners of faces", mesh->owner.data},
+                  {"rows of connectivity", mesh->connectivity_row}};
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        if (others[i].is_given)
+            return base_fail(error, INSITU_ERROR_MESH, "a lattice and %s are given: give cells by one of them",
+                             others[i].name);
+    return INSITU_OK;
+}
+
+insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error)
+{
+    const insitu_lattice *l = mesh->lattice;
+    insitu_status status = check_others(mesh, error);
+    if (!status) status = check_cells(l, error);
+    if (status || (are_zero(l->cells) && !mesh->cell_count)) return status;
+    if (are_zero(l->cells))
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "lattice: there are no cells along i, j and k, and cell_count is %lld",
+                         (long long)mesh->cell_count);
+    status = check_numbers(mesh, error);
+    if (!status) status = check_interior(l, error);
+    if (!status && session_has_axes(mesh) &&
+        (mesh->coordinates[0].data || mesh->coordinates[1].data || mesh->coordinates[2].data))
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "lattice: %s and coordinates of vertices are given: give one of them",
+                         is_uniform(l) ? "spacing" : "axes");
+    if (!status && is_uniform(l)) status = check_uniform(l, error);
+    if (!status && !is_uniform(l) && is_rectilinear(l)) status = check_axes(l, error);
+    return status;
+}
+
+unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *b)
+{
+    unsigned changes = 0;
+    if (!a || !b) return a == b ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_ALL;
+    if (memcmp(a->cells, b->cells, sizeof a->cells) ||
+        memcmp(a->vertex_strides, b->vertex_strides, sizeof a->vertex_strides) ||
+        memcmp(a->cell_strides, b->cell_strides, sizeof a->cell_strides))
+        return INSITU_CHANGED_ALL;
+    if (memcmp(a->interior_first, b->interior_first, sizeof a->interior_first) ||
+        memcmp(a->interior_end, b->interior_end, sizeof a->interior_end))
+        changes |= INSITU_CHANGED_TOPOLOGY;
+    for (int axis = 0; axis < 3; axis++)
+        if (a->origin[axis] != b->origin[axis] || a->spacing[axis] != b->spacing[axis] ||
+            a->first[axis] != b->first[axis] || !session_is_same_array(&a->axes[axis], &b->axes[axis]))
+            changes |= INSITU_CHANGED_GEOMETRY;
+    return changes;
+}
+
+/* ---- the grid ------------------------------------------------------------------------------------------------ */
+
+static grid_numbering number(const int64_t strides[3], const int64_t counts[3])
+{
+    grid_numbering out = {{0}, {0}, {0}, {0}};
+    int order[3], above = -1;
+    order_axes(strides, counts, order);
+    for (int i = 2; i >= 0; i--) {
+        const int axis = order[i];
+        if (counts[axis] == 1) continue;
+        out.stride[axis] = strides[axis];
+        out.inverse_stride[axis] = 1 / (double)strides[axis];
+        if (above >= 0) {
+            out.outer[axis] = (double)strides[above];
+            out.inverse_outer[axis] = 1 / (double)strides[above];
+        }
+        above = axis;
+    }
+    return out;
+}
+
+void session_take_lattice(session_mesh *mesh)
+{
+    session_lattice *own = &mesh->lattice;
+    const bool is_given = mesh->given.lattice && !are_zero(mesh->given.lattice->cells);
+    if (!mesh->given.lattice) return;
+    own->given = *mesh->given.lattice;
+    mesh->given.lattice = &own->given;
+    if (!is_given) return;
+    static const signed char hex[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                          {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    const insitu_lattice *l = &own->given;
+    grid_lattice *out = &own->cells;
+    int64_t vertices[3], cells[3], packed[3];
+    const bool has_all = are_zero(l->interior_first) && are_zero(l->interior_end);
+    for (int axis = 0; axis < 3; axis++) {
+        vertices[axis] = vertices_along(l, axis);
+        cells[axis] = cells_along(l, axis);
+        out->cells[axis] = l->cells[axis];
+        out->drawn_first[axis] = has_all ? 0 : l->interior_first[axis];
+        out->drawn_end[axis] = has_all ? cells[axis] : l->interior_end[axis];
+        out->axes[axis] = (grid_axis){NULL, vertices[axis], &out->by_vertex, axis};
+    }
+    packed_strides(vertices, packed);
+    out->by_vertex = number(are_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
+    for (int i = 0; i < 8; i++) {
+        out->corner[i] = 0;
+        for (int axis = 0; axis < 3; axis++) out->corner[i] += hex[i][axis] * out->by_vertex.stride[axis];
+    }
+    packed_strides(cells, packed);
+    out->by_cell = number(are_zero(l->cell_strides) ? packed : l->cell_strides, cells);
+    out->cell_count = cells[0] * cells[1] * cells[2];
+    out->has_ghosts = !has_all || out->cell_count != mesh->given.cell_count;
+}
+
+void session_read_lattice(session_mesh *mesh, grid *g)
+{
+    const insitu_lattice *l = mesh->given.lattice;
+    if (!l || are_zero(l->cells)) return;
+    g->lattice = &mesh->lattice.cells;
+    g->cell_type = l->cells[2] ? GRID_HEX : GRID_QUAD;
+    for (int axis = 0; axis < 3 && session_has_axes(&mesh->given); axis++)
+        g->coordinates[axis] = (grid_array){.is_wide = true, .axis = &mesh->lattice.cells.axes[axis]};
+}
+
+static void fill_axis(const insitu_lattice *l, int axis, double *out)
+{
+    const grid_array given = session_grid_array(&l->axes[axis]);
+    for (int64_t n = 0; n < vertices_along(l, axis); n++) {
+        out[n] = 0;
+        if (is_uniform(l)) out[n] = l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + n);
+        if (given.data) out[n] = grid_array_number(&given, n);
+    }
+}
+
+insitu_status session_make_axes(session_mesh *mesh, base_error *error)
+{
+    session_lattice *own = &mesh->lattice;
+    session_drop_axes(own);
+    if (!mesh->cells.lattice || !mesh->cells.coordinates[0].axis) return INSITU_OK;
+    const insitu_lattice *l = &own->given;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t count = vertices_along(l, axis);
+        double *places = base_alloc((size_t)count * sizeof *places);
+        if (!places)
+            return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",
+                             mesh->name, (long long)count, axis_name[axis]);
+        fill_axis(l, axis, places);
+        own->places[axis] = places;
+        own->cells.axes[axis].places = places;
+        own->bytes += count * (int64_t)sizeof *places;
+        for (int64_t n = 0; n < count; n++)
+            if (!isfinite(places[n]))
+                return base_fail(error, INSITU_ERROR_MESH,
+                                 "mesh \"%s\": lattice: coordinate %lld along %c is not finite: %g", mesh->name,
+                                 (long long)n, axis_name[axis], places[n]);
+    }
+    return INSITU_OK;
+}
+
+void session_drop_axes(session_lattice *lattice)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        base_free(lattice->places[axis]);
+        lattice->places[axis] = NULL;
+        lattice->cells.axes[axis].places = NULL;
+    }
+    lattice->bytes = 0;
+}

@@ -1,0 +1,340 @@
+/* Structured blocks: the pictures, statistics and counts of a lattice are those of the same cells handed over as hexes,
+ * to the bit, for uniform, rectilinear and curvilinear coordinates, for arrays in any order with padding, for ghost
+ * layers and for blanked cells. Padding holds values that are not finite, so that a picture that read them would have
+ * holes. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+typedef enum place_form { UNIFORM, RECTILINEAR, RECTILINEAR_FLOAT, CURVILINEAR, CURVILINEAR_FLOAT, FORMS } place_form;
+typedef enum array_order { PACKED, FORTRAN_PADDED, C_PADDED, ORDERS } array_order;
+
+/* Cells along the axes of the whole lattice, which ranks share along k. */
+static const int64_t whole[3] = {9, 7, 12};
+static const double origin[3] = {0.1, -0.3, 1.7}, spacing[3] = {0.1, 0.07, 0.13};
+
+static const char *const images[] = {
+    "[{isosurface: {field: f, values: [0.1, 0.6], colour_by: {field: c}}}]",
+    "[{slice: {planes: [{normal: [1, 2, 3]}], field: f}}]",
+    "[{surface: {colour_by: {field: f}, opacity: 0.5, edges: {}}}]",
+    "[{volume: {field: f, opacity: [[0, 0], [1, 0.9]]}}]",
+    "[{volume: {field: c, opacity: [[0, 0.2], [1, 0.9]]}}]",
+    "[{isosurface: {field: c, values: [0.4], normals: vertex}}]",
+    "[{surface: {colour_by: {field: c}, threshold: {field: f, from: 0.2}}}]",
+};
+enum { IMAGES = sizeof images / sizeof images[0] };
+
+/* A rank's block: its cells and vertices, ghost layers and padding included, in the whole lattice's indices. */
+typedef struct block {
+    place_form form;
+    int64_t first[3], cells[3];       /* with the ghost layers */
+    int64_t own_first[3], own_end[3]; /* without them, in the block's indices */
+    int64_t vertex_strides[3], cell_strides[3], vertex_count, cell_count;
+    double *places[3];
+    float *narrow[3];
+    double *axes[3], *f, *c;
+    float *narrow_axes[3];
+    unsigned char *ghosts;
+    int64_t hex_count, *hexes;
+    int64_t *hex_cells; /* the number of each hex's cell in the block */
+    double *hex_values;
+    insitu_lattice lattice;
+} block;
+
+static double place_along(place_form form, int axis, int64_t index)
+{
+    const double uniform = origin[axis] + spacing[axis] * (double)index;
+    if (form == UNIFORM) return uniform;
+    const double bent = uniform + 0.004 * (double)(index * index % 17);
+    return form == RECTILINEAR_FLOAT ? (double)(float)bent : bent;
+}
+
+static void place_of(place_form form, const int64_t index[3], double out[3])
+{
+    for (int axis = 0; axis < 3; axis++) out[axis] = place_along(form, axis, index[axis]);
+    if (form != CURVILINEAR && form != CURVILINEAR_FLOAT) return;
+    const double x = out[0], y = out[1], z = out[2];
+    out[0] = x + 0.05 * sin(3 * y + z);
+    out[1] = y + 0.04 * sin(4 * z);
+    out[2] = z + 0.05 * sin(5 * x + 2 * y);
+    for (int axis = 0; axis < 3 && form == CURVILINEAR_FLOAT; axis++) out[axis] = (double)(float)out[axis];
+}
+
+static void set_strides(array_order order, const int64_t counts[3], int64_t strides[3], int64_t *length)
+{
+    const int64_t pad = order == PACKED ? 0 : 2;
+    int64_t reach = 1;
+    for (int n = 0; n < 3; n++) {
+        const int axis = order == C_PADDED ? 2 - n : n;
+        strides[axis] = reach;
+        reach *= counts[axis] + pad + (pad ? n : 0);
+    }
+    *length = reach;
+}
+
+static void *room(int64_t count, size_t size)
+{
+    void *out = calloc((size_t)count + 1, size);
+    assert_non_null(out);
+    return out;
+}
+
+static int64_t number_of(const int64_t strides[3], int64_t i, int64_t j, int64_t k)
+{
+    return i * strides[0] + j * strides[1] + k * strides[2];
+}
+
+static void fill_vertices(block *b)
+{
+    for (int64_t v = 0; v < b->vertex_count; v++) b->f[v] = (double)NAN;
+    for (int axis = 0; axis < 3; axis++)
+        for (int64_t v = 0; v < b->vertex_count; v++) b->places[axis][v] = (double)INFINITY;
+    for (int64_t k = 0; k <= b->cells[2]; k++)
+        for (int64_t j = 0; j <= b->cells[1]; j++)
+            for (int64_t i = 0; i <= b->cells[0]; i++) {
+                const int64_t at[3] = {b->first[0] + i, b->first[1] + j, b->first[2] + k};
+                const int64_t v = number_of(b->vertex_strides, i, j, k);
+                double place[3];
+                place_of(b->form, at, place);
+                for (int axis = 0; axis < 3; axis++) {
+                    b->places[axis][v] = place[axis];
+                    b->narrow[axis][v] = (float)place[axis];
+                }
+                b->f[v] = 0.5 + 0.5 * sin(0.7 * (double)at[0]) * cos(0.5 * (double)at[1] + 0.4 * (double)at[2]);
+            }
+    for (int axis = 0; axis < 3; axis++)
+        for (int64_t n = 0; n <= b->cells[axis]; n++) {
+            b->axes[axis][n] = place_along(b->form, axis, b->first[axis] + n);
+            b->narrow_axes[axis][n] = (float)b->axes[axis][n];
+        }
+}
+
+static bool is_own(const block *b, const int64_t at[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (at[axis] < b->own_first[axis] || at[axis] >= b->own_end[axis]) return false;
+    return true;
+}
+
+static bool is_blanked(const int64_t at[3])
+{
+    return (at[0] * 5 + at[1] * 3 + at[2]) % 11 == 0;
+}
+
+static void add_hex(block *b, int64_t i, int64_t j, int64_t k)
+{
+    static const int corner[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                     {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    for (int n = 0; n < 8; n++)
+        b->hexes[8 * b->hex_count + n] =
+            number_of(b->vertex_strides, i + corner[n][0], j + corner[n][1], k + corner[n][2]);
+    b->hex_values[b->hex_count++] = b->c[number_of(b->cell_strides, i, j, k)];
+}
+
+static void fill_cells(block *b, bool blanking)
+{
+    for (int64_t c = 0; c < b->cell_count; c++) b->c[c] = (double)NAN;
+    for (int64_t k = 0; k < b->cells[2]; k++)
+        for (int64_t j = 0; j < b->cells[1]; j++)
+            for (int64_t i = 0; i < b->cells[0]; i++) {
+                const int64_t own[3] = {i, j, k}, c = number_of(b->cell_strides, i, j, k);
+                const int64_t at[3] = {b->first[0] + i, b->first[1] + j, b->first[2] + k};
+                b->c[c] = 0.5 + 0.5 * cos(0.9 * (double)at[0] + 0.3 * (double)(at[1] * at[2]));
+                b->ghosts[c] = blanking && is_blanked(at);
+                if (is_own(b, own) && !b->ghosts[c]) add_hex(b, i, j, k);
+            }
+}
+
+/* Rank's share of the layers along k; rank_count may exceed them. */
+static void make_block(block *b, place_form form, array_order order, bool layers, bool blanking)
+{
+    int64_t vertices[3];
+    *b = (block){.form = form};
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t first = axis < 2 ? 0 : whole[2] * own_rank / rank_count;
+        const int64_t end = axis < 2 ? whole[axis] : whole[2] * (own_rank + 1) / rank_count;
+        const int64_t low = layers ? 1 : 0, high = layers ? 2 : 0; /* the layers reach beyond the domain, too */
+        b->first[axis] = first - low;
+        b->cells[axis] = end - first + low + high;
+        b->own_first[axis] = low;
+        b->own_end[axis] = low + end - first;
+        vertices[axis] = b->cells[axis] + 1;
+    }
+    set_strides(order, vertices, b->vertex_strides, &b->vertex_count);
+    set_strides(order, b->cells, b->cell_strides, &b->cell_count);
+    for (int axis = 0; axis < 3; axis++) {
+        b->places[axis] = room(b->vertex_count, sizeof(double));
+        b->narrow[axis] = room(b->vertex_count, sizeof(float));
+        b->axes[axis] = room(b->cells[axis] + 1, sizeof(double));
+        b->narrow_axes[axis] = room(b->cells[axis] + 1, sizeof(float));
+    }
+    b->f = room(b->vertex_count, sizeof(double));
+    b->c = room(b->cell_count, sizeof(double));
+    b->ghosts = room(b->cell_count, 1);
+    b->hexes = room(8 * b->cell_count, sizeof(int64_t));
+    b->hex_values = room(b->cell_count, sizeof(double));
+    fill_vertices(b);
+    fill_cells(b, blanking);
+    for (int axis = 0; axis < 3; axis++) {
+        b->lattice.cells[axis] = b->cells[axis];
+        if (order != PACKED) b->lattice.vertex_strides[axis] = b->vertex_strides[axis];
+        if (order != PACKED) b->lattice.cell_strides[axis] = b->cell_strides[axis];
+        if (layers) b->lattice.interior_first[axis] = b->own_first[axis];
+        if (layers) b->lattice.interior_end[axis] = b->own_end[axis];
+        if (form == UNIFORM) {
+            b->lattice.origin[axis] = origin[axis];
+            b->lattice.spacing[axis] = spacing[axis];
+            b->lattice.first[axis] = b->first[axis];
+        } else if (form == RECTILINEAR) {
+            b->lattice.axes[axis] = (insitu_array){b->axes[axis], INSITU_FLOAT64, 0};
+        } else if (form == RECTILINEAR_FLOAT) {
+            b->lattice.axes[axis] = (insitu_array){b->narrow_axes[axis], INSITU_FLOAT32, 0};
+        }
+    }
+}
+
+static void free_block(block *b)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        free(b->places[axis]);
+        free(b->narrow[axis]);
+        free(b->axes[axis]);
+        free(b->narrow_axes[axis]);
+    }
+    free(b->f);
+    free(b->c);
+    free(b->ghosts);
+    free(b->hexes);
+    free(b->hex_values);
+}
+
+static void give_places(const block *b, insitu_mesh *mesh)
+{
+    const bool is_float = b->form == CURVILINEAR_FLOAT;
+    for (int axis = 0; axis < 3; axis++)
+        mesh->coordinates[axis] = is_float ? (insitu_array){b->narrow[axis], INSITU_FLOAT32, 0}
+                                           : (insitu_array){b->places[axis], INSITU_FLOAT64, 0};
+}
+
+static bool set_fields(insitu_session *session, const block *b, const double *cells, int64_t cell_count)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.count = b->vertex_count;
+    field.values = (insitu_array){b->f, INSITU_FLOAT64, 0};
+    if (insitu_set_field(session, "m", &field)) return false;
+    field.name = "c";
+    field.centring = INSITU_CELL;
+    field.count = cell_count;
+    field.values = (insitu_array){cells, INSITU_FLOAT64, 0};
+    return insitu_set_field(session, "m", &field) == INSITU_OK;
+}
+
+static bool set_lattice(insitu_session *session, const block *b, bool blanking)
+{
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = b->vertex_count;
+    mesh.cell_count = b->cell_count;
+    mesh.lattice = &b->lattice;
+    if (b->form >= CURVILINEAR) give_places(b, &mesh);
+    if (blanking) mesh.ghosts = (insitu_array){b->ghosts, INSITU_UINT8, 0};
+    return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, b, b->c, b->cell_count);
+}
+
+static bool set_hexes(insitu_session *session, const block *b)
+{
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = b->vertex_count;
+    mesh.cell_type = INSITU_HEX;
+    mesh.cell_count = b->hex_count;
+    mesh.connectivity_count = 8 * b->hex_count;
+    mesh.connectivity = (insitu_array){b->hexes, INSITU_INT64, 0};
+    give_places(b, &mesh);
+    return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, b, b->hex_values, b->hex_count);
+}
+
+static const char *all_images(void)
+{
+    static char text[4096];
+    int at = snprintf(text, sizeof text, "statistics:\n  - {field: c, path: numbers.csv}\nimages:\n");
+    for (int i = 0; i < IMAGES; i++)
+        at += snprintf(text + at, sizeof text - (size_t)at,
+                       "  - {name: a%d, size: [40, 30], layers: %s, outputs: [{path: a%d.exr}]}\n", i, images[i], i);
+    return write_scene(text);
+}
+
+static bool is_same(const caught_picture *a, const caught_picture *b)
+{
+    const size_t pixels = (size_t)a->width * (size_t)a->height;
+    if (a->width != b->width || a->height != b->height || !a->depth != !b->depth) return false;
+    if (memcmp(a->rgba, b->rgba, 4 * pixels * sizeof(float))) return false;
+    return !a->depth || memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0;
+}
+
+static int covered(const caught_picture *p)
+{
+    int count = 0;
+    for (int i = 0; i < p->width * p->height; i++) count += p->rgba[4 * i + 3] > 0;
+    return count;
+}
+
+/* Both are drawn in the same session, one after the other: hexes first. */
+static void compare(place_form form, array_order order, bool layers, bool blanking)
+{
+    block b;
+    insitu_report reports[2];
+    char statistics[2][4096] = {"", ""};
+    make_block(&b, form, order, layers, blanking);
+    forget_pictures();
+    for (int lattice = 0; lattice < 2; lattice++) {
+        remove("numbers.csv");
+        insitu_session *session = open_session(MPI_COMM_WORLD, all_images());
+        everywhere(lattice ? set_lattice(session, &b, blanking) : set_hexes(session, &b));
+        const insitu_status status = insitu_step(session, 0, 0);
+        if (status) fprintf(stderr, "%s\n", insitu_error(session));
+        everywhere(status == INSITU_OK);
+        reports[lattice] = *insitu_last_report(session);
+        insitu_destroy(&session);
+        read_file("numbers.csv", sizeof statistics[lattice], statistics[lattice]);
+    }
+    everywhere(own_rank || caught_count == 2 * IMAGES);
+    for (int i = 0; i < IMAGES && !own_rank; i++) {
+        if (!is_same(&caught[i], &caught[IMAGES + i]))
+            fprintf(stderr, "form %d, order %d, layers %d, blanking %d: %s\n", form, order, layers, blanking,
+                    images[i]);
+        assert_true(covered(&caught[i]) > 50);
+        assert_true(is_same(&caught[i], &caught[IMAGES + i]));
+    }
+    everywhere(strcmp(statistics[0], statistics[1]) == 0);
+    const int64_t own =
+        (b.own_end[0] - b.own_first[0]) * (b.own_end[1] - b.own_first[1]) * (b.own_end[2] - b.own_first[2]);
+    everywhere(reports[1].cells == b.cells[0] * b.cells[1] * b.cells[2]);
+    everywhere(reports[1].cells - reports[1].cells_ghost == b.hex_count);
+    everywhere(blanking || reports[1].cells_ghost == reports[1].cells - own);
+    free_block(&b);
+}
+
+static void lattices_are_their_hexes(void **state)
+{
+    (void)state;
+    for (int form = 0; form < FORMS; form++)
+        for (int order = 0; order < ORDERS; order++)
+            compare((place_form)form, (array_order)order, (form + order) % 2, (form + order) % 3 == 0);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
