@@ -8,6 +8,7 @@
 #include "memory.h"
 #include "mmbvh.h"
 #include "mmbvh_fetch.h"
+#include "mmbvh_rows.h"
 #include "mmbvh_sweep.h"
 #include "region.h"
 
@@ -233,6 +234,44 @@ static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
     return mark(s, begin, end, find_any, false);
 }
 
+/* A bit for each cell whose range meets an interval. */
+static uint64_t row_bits(const selector *s, const rows_ranges *r)
+{
+    unsigned char meets[ROWS_CELLS] = {0};
+    uint64_t bits = 0;
+    for (int i = 0; i < s->wish->interval_count; i++) {
+        const mmbvh_interval of = s->wish->intervals[i];
+        for (int64_t n = 0; n < r->count; n++)
+            meets[n] = (unsigned char)(meets[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
+    }
+    for (int64_t n = 0; n < r->count; n++) bits |= (uint64_t)meets[n] << n;
+    return bits;
+}
+
+/* A lattice's cells, row by row. The two words that a row's bits may lie in are in one block of a thread's. */
+static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
+{
+    const grid *g = s->g;
+    rows_ranges r;
+    int64_t unusable = 0;
+    for (int64_t from = begin; rows_read(g, s->wish->field, from, end, &r); from = r.first + r.count) {
+        uint64_t meeting = row_bits(s, &r), finite = 0, drawn = 0;
+        for (int64_t n = 0; n < r.count; n++) finite |= (uint64_t)r.is_finite[n] << n;
+        for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
+            const int64_t cell = r.first + n;
+            drawn |= (uint64_t) !((g->ghosts && g->ghosts[cell * g->ghosts_stride]) || grid_is_flat(g, cell)) << n;
+        }
+        if (!g->ghosts && !g->flat) drawn = r.count < WORD_CELLS ? (UINT64_C(1) << r.count) - 1 : ~UINT64_C(0);
+        unusable += __builtin_popcountll(drawn & ~finite);
+        meeting &= drawn & finite;
+        const int64_t shift = r.first % WORD_CELLS;
+        s->bits[r.first / WORD_CELLS] |= meeting << shift;
+        if (shift && meeting >> (WORD_CELLS - shift))
+            s->bits[r.first / WORD_CELLS + 1] |= meeting >> (WORD_CELLS - shift);
+    }
+    return unusable;
+}
+
 static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *bits)
 {
     static const selector_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(mark_vertices);
@@ -241,6 +280,7 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
     if (is_float && !field->own && !grid_has_faces(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
+    if (rows_fit(g, field)) s.run = mark_rows;
     if (field->component > 0) s.values.data += field->component * field->component_stride;
     return s;
 }

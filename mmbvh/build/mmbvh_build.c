@@ -1,4 +1,5 @@
-/* A tree is built in three steps: the boxes of all cells in 16 bytes each, or their keys, twice 8 bytes; the tree
+/* A tree over all cells of a lattice is built by halving boxes of indices (mmbvh_bricks.c). Any other is built in three
+ * steps: the boxes of all cells in 16 bytes each, or their keys, twice 8 bytes; the tree
  * without bounds, 4 bytes a node; then the nodes, whose bounds and ranges come from the sweeps that refit them.
  *
  * Peak memory in bytes a cell: 16 for items or keys, 4 for each node (0.35 nodes a tet), 4 for the cell indices of the
@@ -10,6 +11,7 @@
 #include "memory.h"
 #include "mmbvh_bounds.h"
 #include "mmbvh_branch.h"
+#include "mmbvh_bricks.h"
 #include "mmbvh_cost.h"
 #include "mmbvh_morton.h"
 #include "mmbvh_store.h"
@@ -55,8 +57,19 @@ static uint32_t listed_cell(const build *b, int64_t i)
     return b->selected ? b->selected[i] : (uint32_t)i;
 }
 
+/* Tells whether the tree is over all cells of a lattice, except ghost layers. */
+static bool is_by_bricks(const build *b)
+{
+    const grid *g = b->source.g;
+    return g && g->lattice && !b->selected && !g->ghosts && !g->flat;
+}
+
 static void count_cells(build *b)
 {
+    if (is_by_bricks(b)) {
+        b->count = bricks_count(b->source.g->lattice);
+        return;
+    }
     b->starts[0] = 0;
 #pragma omp parallel num_threads(b->threads)
     {
@@ -182,6 +195,31 @@ static topology *build_morton(build *b, topology_build *t)
     return morton_build(t, b->keys, b->count);
 }
 
+/* Also finds the exact bounds, of all vertices of the cells. */
+static topology *build_bricks(build *b, topology_build *t)
+{
+    uint32_t *cells = b->tree.cells = base_alloc((size_t)b->count * sizeof *cells);
+    if (!cells) return NULL;
+    b->tree.cell_count = b->count;
+    topology *root = bricks_build(t, b->source.g, cells);
+    fetch_box_empty(&b->exact);
+#pragma omp parallel num_threads(t->threads)
+    {
+        region_enter();
+        fetch_box box;
+        fetch_box_empty(&box);
+#pragma omp for schedule(static) nowait
+        for (int64_t first = 0; first < b->count; first += BOUNDS_BLOCK) {
+            const int64_t count = b->count - first < BOUNDS_BLOCK ? b->count - first : BOUNDS_BLOCK;
+            b->source.unite(&b->source, cells + first, (int)count, NULL, &box);
+        }
+#pragma omp critical(mmbvh_bricks)
+        fetch_box_unite(&b->exact, &box);
+        region_leave();
+    }
+    return root;
+}
+
 static bool list_cells(build *b)
 {
     uint32_t *cells = b->tree.cells = base_alloc((size_t)b->count * sizeof *cells);
@@ -206,10 +244,12 @@ static topology *build_topology(build *b, int threads)
     topology_build t;
     topology *root = NULL;
     if (topology_begin(&t, b->count, threads)) {
-        root = b->options.builder == MMBVH_MORTON ? build_morton(b, &t) : build_sah(b, &t);
+        root = is_by_bricks(b)                      ? build_bricks(b, &t)
+               : b->options.builder == MMBVH_MORTON ? build_morton(b, &t)
+                                                    : build_sah(b, &t);
     }
     topology_end(&t);
-    if (root && !list_cells(b)) {
+    if (root && !is_by_bricks(b) && !list_cells(b)) {
         topology_free(root);
         root = NULL;
     }

@@ -383,6 +383,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
     const int64_t count = mesh->cells.cell_count;
     const tally_run run = tally_choose(mesh);
     int64_t first_bad = count;
+    if (tally_axes(mesh, tally)) return count;
 #pragma omp parallel num_threads(threads) reduction(min : first_bad)
     {
         region_enter();

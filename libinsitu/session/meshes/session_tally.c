@@ -273,12 +273,46 @@ MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64
     return alike;
 }
 
+/* Room for the connectivity of some of a lattice's cells. */
+enum { ROW_CELLS = 512 };
+typedef struct lattice_row {
+    grid cells;
+    int32_t vertices[ROW_CELLS * GRID_MAX_CELL_VERTICES];
+} lattice_row;
+
+/* Cells of a lattice from this one on, of one row; their connectivity is written into the room. One that is not drawn
+ * stands alone, as do all of lattices whose cells do not follow each other along an axis. */
+static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
+{
+    const grid *g = &mesh->cells;
+    const grid_lattice *l = g->lattice;
+    lane_cells alike = {.g = g, .type = g->cell_type, .first = cell, .count = 1};
+    int along = 0;
+    while (along < 3 && l->by_cell.stride[along] != 1) along++;
+    if (along == 3 || g->vertex_count > INT32_MAX || !grid_lattice_draws(l, cell)) return alike;
+    const int64_t left = l->drawn_end[along] - grid_index_along(&l->by_cell, along, cell);
+    const int64_t count = left < end - cell ? left : end - cell, step = l->by_vertex.stride[along];
+    int64_t first = grid_lattice_first(l, cell);
+    alike.count = count < ROW_CELLS ? count : ROW_CELLS;
+    for (int64_t n = 0; n < alike.count; n++, first += step)
+        for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
+            row->vertices[n * GRID_MAX_CELL_VERTICES + i] = (int32_t)(first + l->corner[i]);
+    row->cells = *g;
+    row->cells.lattice = NULL;
+    row->cells.connectivity =
+        (grid_array){.data = (const char *)row->vertices, .stride = sizeof *row->vertices, .is_integer = true};
+    if (g->ghosts) row->cells.ghosts = g->ghosts + cell * g->ghosts_stride;
+    alike.g = &row->cells;
+    alike.first = 0;
+    return alike;
+}
+
 /* Takes the first so many of the cells, and returns how many; *alone tells how many after them are to be taken one by
  * one. */
 static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    if (alike->count < LANES || alike->g->lattice) return 0;
+    if (alike->count < LANES || alike->g->lattice) return 0; /* as a cell that stands alone */
     lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
@@ -307,7 +341,56 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
     return is_flat(least, box);
 }
 
-/* Tallies cells of a uniform or rectilinear lattice, which are boxes, or flat. */
+/* The lengths of the drawn cells along an axis. */
+typedef struct axis_lengths {
+    int64_t positive, negative; /* how many; others are 0 */
+    double sizes;               /* the sum of their cube roots */
+    double lower, upper;
+} axis_lengths;
+
+static axis_lengths lengths_along(const grid_lattice *l, int axis)
+{
+    const double *at = l->axes[axis].places + l->drawn_first[axis];
+    const int64_t count = l->drawn_end[axis] - l->drawn_first[axis];
+    axis_lengths out = {.lower = at[0], .upper = at[0]};
+    for (int64_t n = 0; n < count && l->cells[axis]; n++) {
+        const double length = at[n + 1] - at[n];
+        out.positive += length > 0;
+        out.negative += length < 0;
+        out.sizes += cbrt(fabs(length));
+        out.lower = fmin(out.lower, at[n + 1]);
+        out.upper = fmax(out.upper, at[n + 1]);
+    }
+    return out;
+}
+
+bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
+{
+    const grid *g = &mesh->cells;
+    if (!g->coordinates[0].axis || g->ghosts) return false;
+    mesh_tally t = tally_empty();
+    int64_t sized = 1, difference = 1; /* products of positive plus and minus negative */
+    t.drawn = 1;
+    t.sizes = 1;
+    for (int axis = 0; axis < 3; axis++) {
+        const axis_lengths along = lengths_along(g->lattice, axis);
+        t.drawn *= g->lattice->drawn_end[axis] - g->lattice->drawn_first[axis];
+        sized *= along.positive + along.negative;
+        difference *= along.positive - along.negative;
+        t.sizes *= along.sizes;
+        t.lower[axis] = along.lower;
+        t.upper[axis] = along.upper;
+    }
+    if (!t.drawn) t = tally_empty();
+    t.ghosts = g->cell_count - t.drawn;
+    t.flat = t.drawn - (t.drawn ? sized : 0);
+    t.inverted = t.drawn ? (sized - difference) / 2 : 0;
+    if (g->cell_type == GRID_QUAD) t.shells = t.drawn;
+    tally_merge(tally, &t);
+    return true;
+}
+
+/* Tallies some cells of a uniform or rectilinear lattice, which are boxes, or flat. */
 static int64_t run_axes(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;
@@ -342,12 +425,14 @@ MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, m
 {
     mesh_tally t = tally_empty();
     lane_cells alike = {.count = 0};
+    lattice_row row;
     double least = (double)INFINITY;
     bool is_good = true;
     int64_t cell = begin;
     while (cell < end && is_good) {
         int64_t alone;
-        if (!alike.count) alike = alike_from(mesh, cell, end, shape);
+        if (!alike.count)
+            alike = shape == FETCH_LATTICE ? row_from(mesh, cell, end, &row) : alike_from(mesh, cell, end, shape);
         const int64_t taken = run_lanes(&alike, &t, &least, &alone), first = cell + taken;
         cell = first;
         while (cell < first + alone && is_good)

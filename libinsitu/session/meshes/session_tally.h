@@ -32,6 +32,10 @@ typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t en
 
 /* The run for the mesh's layout, NULL where cells are to be taken one by one: where there may be polyhedra, or
  * coordinates that are not all float or all double. */
+/* Tallies a uniform or rectilinear lattice at once, from the lengths along its axes. Returns false, with nothing added,
+ * if the mesh is another or has ghost flags. */
+bool tally_axes(const session_mesh *mesh, mesh_tally *tally);
+
 tally_run tally_choose(const session_mesh *mesh);
 
 #endif

@@ -1,0 +1,122 @@
+/* Each row of cells lies between four rows of vertices, or two in two dimensions. Their values are united vertex by
+ * vertex, and then each cell unites those of its two ends. */
+#include "mmbvh_rows.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "mmbvh_fetch.h"
+
+/* United values of the vertices at each place along a row. */
+typedef struct row_places {
+    double low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], poison[ROWS_CELLS + 1];
+} row_places;
+
+typedef struct row_floats {
+    float low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], poison[ROWS_CELLS + 1];
+} row_floats;
+
+/* The axis along which cells have successive numbers, or -1. */
+static int row_axis(const grid_lattice *l)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (l->by_cell.stride[axis] == 1) return axis;
+    return -1;
+}
+
+bool rows_fit(const grid *g, const grid_field *field)
+{
+    return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !field->own &&
+           row_axis(g->lattice) >= 0;
+}
+
+/* poison is 0 while all are finite, then not a number. */
+#define UNITE_ROW(number, to, from, stride, count)                                                                     \
+    for (int64_t n = 0; n < (count); n++) {                                                                            \
+        const number v = *(const number *)(const void *)((from) + n * (stride));                                       \
+        (to)->low[n] = v < (to)->low[n] ? v : (to)->low[n];                                                            \
+        (to)->high[n] = v > (to)->high[n] ? v : (to)->high[n];                                                         \
+        (to)->poison[n] += v - v;                                                                                      \
+    }
+
+#define DEFINE_RANGES(name, number, places)                                                                            \
+    static void name(const char *const *rows, int row_count, int64_t stride, rows_ranges *out)                         \
+    {                                                                                                                  \
+        places of;                                                                                                     \
+        const int64_t count = out->count + 1;                                                                          \
+        for (int64_t n = 0; n < count; n++) {                                                                          \
+            of.low[n] = (number)INFINITY;                                                                              \
+            of.high[n] = -(number)INFINITY;                                                                            \
+            of.poison[n] = 0;                                                                                          \
+        }                                                                                                              \
+        for (int row = 0; row < row_count; row++) {                                                                    \
+            if (stride == (int64_t)sizeof(number)) {                                                                   \
+                UNITE_ROW(number, &of, rows[row], (int64_t)sizeof(number), count)                                      \
+            } else {                                                                                                   \
+                UNITE_ROW(number, &of, rows[row], stride, count)                                                       \
+            }                                                                                                          \
+        }                                                                                                              \
+        for (int64_t n = 0; n < out->count; n++) {                                                                     \
+            out->low[n] = (float)(of.low[n] < of.low[n + 1] ? of.low[n] : of.low[n + 1]);                              \
+            out->high[n] = (float)(of.high[n] > of.high[n + 1] ? of.high[n] : of.high[n + 1]);                         \
+            out->is_finite[n] = of.poison[n] + of.poison[n + 1] == 0;                                                  \
+        }                                                                                                              \
+    }
+DEFINE_RANGES(float_ranges, float, row_floats)
+DEFINE_RANGES(double_ranges, double, row_places)
+
+/* Finds the next drawn cell from number from on, and how many follow it in its row; returns false where there is none
+ * before end. */
+static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out)
+{
+    while (from < end) {
+        int64_t index[3], row = from;
+        bool is_inside = true;
+        for (int axis = 0; axis < 3; axis++) {
+            index[axis] = grid_index_along(&l->by_cell, axis, from);
+            if (axis == along) continue;
+            is_inside = is_inside && index[axis] >= l->drawn_first[axis] && index[axis] < l->drawn_end[axis];
+        }
+        row -= index[along];
+        const int64_t first = row + l->drawn_first[along], last = row + l->drawn_end[along];
+        if (is_inside && from < last) {
+            out->first = from > first ? from : first;
+            out->count = (last < end ? last : end) - out->first;
+            if (out->count > ROWS_CELLS) out->count = ROWS_CELLS;
+            if (out->count > 0) return true;
+        }
+        /* On to the next row: no other number along this axis belongs to a cell. */
+        const double outer = l->by_cell.outer[along];
+        if (outer == 0) return false;
+        from = row + (int64_t)outer;
+    }
+    return false;
+}
+
+bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out)
+{
+    const grid_lattice *l = g->lattice;
+    const int along = row_axis(l);
+    if (!next_cells(l, along, from, end, out)) return false;
+    const char *rows[4];
+    const char *data = field->values.data + field->component * field->component_stride;
+    const int64_t vertex = grid_lattice_first(l, out->first), stride = field->values.stride;
+    int row_count = 0;
+    for (int side = 0; side < 4; side++) {
+        const int across[2] = {(along + 1) % 3, (along + 2) % 3};
+        int64_t at = vertex;
+        bool is_there = true;
+        for (int n = 0; n < 2; n++) {
+            if (!(side >> n & 1)) continue;
+            at += l->by_vertex.stride[across[n]];
+            is_there = is_there && l->cells[across[n]];
+        }
+        if (is_there) rows[row_count++] = data + at * stride;
+    }
+    const int64_t step = stride * l->by_vertex.stride[along];
+    if (field->values.is_wide)
+        double_ranges(rows, row_count, step, out);
+    else
+        float_ranges(rows, row_count, step, out);
+    return true;
+}
