@@ -56,6 +56,7 @@ bool rows_fit(const grid *g, const grid_field *field)
                 UNITE_ROW(number, &of, rows[row], stride, count)                                                       \
             }                                                                                                          \
         }                                                                                                              \
+        memset(out->is_finite, 0, sizeof out->is_finite);                                                              \
         for (int64_t n = 0; n < out->count; n++) {                                                                     \
             out->low[n] = (float)(of.low[n] < of.low[n + 1] ? of.low[n] : of.low[n + 1]);                              \
             out->high[n] = (float)(of.high[n] > of.high[n + 1] ? of.high[n] : of.high[n + 1]);                         \

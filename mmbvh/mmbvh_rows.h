@@ -11,7 +11,7 @@ enum { ROWS_CELLS = 64 };
 typedef struct rows_ranges {
     int64_t first, count;
     float low[ROWS_CELLS], high[ROWS_CELLS]; /* rounded to float as a cast does */
-    bool is_finite[ROWS_CELLS];              /* all values of the cell */
+    unsigned char is_finite[ROWS_CELLS];     /* 1: all values of the cell are; 0 beyond count */
 } rows_ranges;
 
 /* Tells whether rows_read() serves: cells follow each other along an axis of a lattice, with floats or doubles at their

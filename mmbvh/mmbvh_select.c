@@ -234,18 +234,27 @@ static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
     return mark(s, begin, end, find_any, false);
 }
 
+/* A bit for each byte, which is 0 or 1. The product has the eight bits of a word in its last byte. */
+static uint64_t packed_bits(const unsigned char bytes[ROWS_CELLS])
+{
+    uint64_t bits = 0, eight;
+    for (int n = 0; n < ROWS_CELLS; n += 8) {
+        memcpy(&eight, bytes + n, sizeof eight);
+        bits |= (eight * UINT64_C(0x0102040810204080) >> 56) << n;
+    }
+    return bits;
+}
+
 /* A bit for each cell whose range meets an interval. */
 static uint64_t row_bits(const selector *s, const rows_ranges *r)
 {
     unsigned char meets[ROWS_CELLS] = {0};
-    uint64_t bits = 0;
     for (int i = 0; i < s->wish->interval_count; i++) {
         const mmbvh_interval of = s->wish->intervals[i];
         for (int64_t n = 0; n < r->count; n++)
             meets[n] = (unsigned char)(meets[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
     }
-    for (int64_t n = 0; n < r->count; n++) bits |= (uint64_t)meets[n] << n;
-    return bits;
+    return packed_bits(meets);
 }
 
 /* A lattice's cells, row by row. The two words that a row's bits may lie in are in one block of a thread's. */
@@ -255,8 +264,7 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
     rows_ranges r;
     int64_t unusable = 0;
     for (int64_t from = begin; rows_read(g, s->wish->field, from, end, &r); from = r.first + r.count) {
-        uint64_t meeting = row_bits(s, &r), finite = 0, drawn = 0;
-        for (int64_t n = 0; n < r.count; n++) finite |= (uint64_t)r.is_finite[n] << n;
+        uint64_t meeting = row_bits(s, &r), finite = packed_bits(r.is_finite), drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
             drawn |= (uint64_t) !((g->ghosts && g->ghosts[cell * g->ghosts_stride]) || grid_is_flat(g, cell)) << n;

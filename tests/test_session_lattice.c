@@ -293,7 +293,7 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
     make_block(&b, form, order, layers, blanking);
     forget_pictures();
     for (int lattice = 0; lattice < 2; lattice++) {
-        remove("numbers.csv");
+        if (!own_rank) remove("numbers.csv");
         insitu_session *session = open_session(MPI_COMM_WORLD, all_images());
         everywhere(lattice ? set_lattice(session, &b, blanking) : set_hexes(session, &b));
         const insitu_status status = insitu_step(session, 0, 0);
