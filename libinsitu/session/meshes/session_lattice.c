@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "memory.h"
-#include "session_mesh_input.h"
+#include "session_arrays.h"
 
 static const char axis_name[3] = {'i', 'j', 'k'};
 
@@ -319,14 +319,4 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
                                  (long long)n, axis_name[axis], places[n]);
     }
     return INSITU_OK;
-}
-
-void session_drop_axes(session_lattice *lattice)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        base_free(lattice->places[axis]);
-        lattice->places[axis] = NULL;
-        lattice->cells.axes[axis].places = NULL;
-    }
-    lattice->bytes = 0;
 }

@@ -24,6 +24,5 @@ void session_read_lattice(session_mesh *mesh, grid *g);
  * Local.
  */
 insitu_status session_make_axes(session_mesh *mesh, base_error *error);
-void session_drop_axes(session_lattice *lattice);
 
 #endif

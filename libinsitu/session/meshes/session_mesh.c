@@ -5,7 +5,6 @@
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_lattice.h"
 
 grid_array session_grid_array(const insitu_array *array)
 {
@@ -108,6 +107,16 @@ void session_drop_torn(session_torn *torn)
     session_drop_array(&torn->corners);
     for (int axis = 0; axis < 3; axis++) session_drop_array(&torn->coordinates[axis]);
     *torn = (session_torn){0};
+}
+
+void session_drop_axes(session_lattice *lattice)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        base_free(lattice->places[axis]);
+        lattice->places[axis] = NULL;
+        lattice->cells.axes[axis].places = NULL;
+    }
+    lattice->bytes = 0;
 }
 
 void session_drop_copy(session_field *field)

@@ -261,6 +261,7 @@ void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_torn(session_torn *torn);
+void session_drop_axes(session_lattice *lattice);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */

@@ -1,0 +1,97 @@
+/* What a description says of an array is checked before any of it is read. */
+#include "session_arrays.h"
+
+#include "grid.h"
+#include "session_mesh.h"
+
+static bool is_allowed(insitu_type type, int allowed)
+{
+    switch (type) {
+    case INSITU_FLOAT32:
+    case INSITU_FLOAT64: return allowed & SESSION_ALLOW_FLOATS;
+    case INSITU_INT32:
+    case INSITU_INT64: return allowed & SESSION_ALLOW_INTEGERS;
+    case INSITU_UINT8: return allowed & SESSION_ALLOW_BYTES;
+    }
+    return false;
+}
+
+static const char *allowed_words(int kind)
+{
+    switch (kind & (SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS | SESSION_ALLOW_BYTES)) {
+    case SESSION_ALLOW_FLOATS: return "float32 or float64";
+    case SESSION_ALLOW_INTEGERS: return "int32 or int64";
+    case SESSION_ALLOW_BYTES: return "uint8";
+    case SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS: return "float32, float64, int32 or int64";
+    default: return "uint8, int32 or int64";
+    }
+}
+
+/* The bytes that the memory of one process may span. No pointer is farther from another on any machine that runs this
+ * code, and the product of a place in an array with its stride stays far from overflow. */
+static const uint64_t most_bytes = (uint64_t)1 << 48;
+
+/* A stride may be negative: then the elements lie before the first one. 0 bytes: packed. */
+static insitu_status check_stride(const void *data, const char *name, int64_t count, int64_t stride, int64_t size,
+                                  insitu_status bad, base_error *error)
+{
+    if (stride % size != 0)
+        return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", name,
+                         (long long)stride, (long long)size);
+    const uint64_t step = stride < 0 ? 0 - (uint64_t)stride : (uint64_t)stride;
+    const uint64_t steps = count > 1 ? (uint64_t)count - 1 : 1; /* from the first element to the last */
+    const bool fits = count == 0 || step <= most_bytes / steps;
+    if (!fits || (stride < 0 && count && step * steps > (uintptr_t)data))
+        return base_fail(error, bad, "%s have a stride of %lld bytes: %lld of them lie outside of memory", name,
+                         (long long)stride, (long long)count);
+    return INSITU_OK;
+}
+
+static insitu_status check_place(const void *data, const char *name, int64_t size, insitu_status bad, base_error *error)
+{
+    if ((uintptr_t)data % (uintptr_t)size == 0) return INSITU_OK;
+    return base_fail(error, bad, "%s are not aligned to their %lld bytes", name, (long long)size);
+}
+
+insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
+                                  base_error *error)
+{
+    if (!array->data) {
+        if (rule->count == 0 || rule->kind & SESSION_IS_OPTIONAL) return INSITU_OK;
+        return base_fail(error, bad, "%s are not given", rule->name);
+    }
+    if (!is_allowed(array->type, rule->kind))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
+                         (int)array->type, allowed_words(rule->kind));
+    const int64_t size = session_type_size(array->type), count = rule->count + (rule->kind & SESSION_HAS_END ? 1 : 0);
+    const insitu_status status = check_place(array->data, rule->name, size, bad, error);
+    if (status) return status;
+    const int64_t stride = array->stride_bytes ? array->stride_bytes : size * rule->per_tuple;
+    return check_stride(array->data, rule->name, count, stride, size, bad, error);
+}
+
+insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, const char *name,
+                                       base_error *error)
+{
+    if (!data->data) return INSITU_OK;
+    return check_stride(data->data, name, count, stride, session_type_size(data->type), INSITU_ERROR_FIELD, error);
+}
+
+insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
+                                     base_error *error)
+{
+    const int64_t size = sizeof(void *);
+    if (!is_allowed(array->type, rule->kind))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
+                         (int)array->type, allowed_words(rule->kind));
+    const insitu_status status = check_place(array->data, rule->name, size, bad, error);
+    if (status) return status;
+    return check_stride(array->data, rule->name, rule->count, array->stride_bytes ? array->stride_bytes : size, size,
+                        bad, error);
+}
+
+bool session_is_same_array(const insitu_array *a, const insitu_array *b)
+{
+    const grid_array x = session_grid_array(a), y = session_grid_array(b);
+    return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
+}

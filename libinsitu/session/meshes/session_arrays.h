@@ -1,0 +1,42 @@
+/* Checks of the arrays that a caller describes. */
+#ifndef SESSION_ARRAYS_H
+#define SESSION_ARRAYS_H
+
+#include "error.h"
+#include "insitu/insitu.h"
+
+#include <stdbool.h>
+
+enum {
+    SESSION_ALLOW_FLOATS = 1,
+    SESSION_ALLOW_INTEGERS = 2,
+    SESSION_ALLOW_BYTES = 4,
+    SESSION_IS_OPTIONAL = 8,
+    SESSION_HAS_END = 16 /* one element more than its count, as offsets have */
+};
+
+/* What an array must be. */
+typedef struct session_array_rule {
+    const char *name; /* in the plural */
+    int64_t count;    /* of its elements */
+    int kind;         /* the bits above */
+    int per_tuple;    /* elements from one to the next if there is no stride */
+} session_array_rule;
+
+/* Checks that the array is given, has an allowed type, is aligned, and has a stride by which its elements can lie in
+ * memory. bad: the status where anything but the type is wrong. */
+insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
+                                  base_error *error);
+
+/* As above, for an array of pointers: its type is that of what they point to. It is given. */
+insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
+                                     base_error *error);
+
+/* Checks the stride from each component of data's tuples to the next. name: of the components. */
+insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, const char *name,
+                                       base_error *error);
+
+/* Tells whether both are read from the same place in the same way. */
+bool session_is_same_array(const insitu_array *a, const insitu_array *b);
+
+#endif
