@@ -61,21 +61,21 @@ static void assert_alike(caught_picture *a, caught_picture *b, double allowed)
 
 static int compare_values(const void *left, const void *right)
 {
-    const float a = *(const float *)left, b = *(const float *)right;
+    const double a = *(const double *)left, b = *(const double *)right;
     return (a > b) - (a < b);
 }
 
 typedef struct truth {
     double least, most, least_positive;
     int64_t count, positive;
-    float *middles; /* sorted */
+    double *middles; /* sorted */
 } truth;
 
 static truth find_truth(void)
 {
     test_mesh mesh;
     test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
-    truth t = {INFINITY, -INFINITY, INFINITY, mesh.cell_count, 0, malloc((size_t)mesh.cell_count * sizeof(float))};
+    truth t = {INFINITY, -INFINITY, INFINITY, mesh.cell_count, 0, malloc((size_t)mesh.cell_count * sizeof(double))};
     assert_non_null(t.middles);
     for (int64_t c = 0; c < mesh.cell_count; c++) {
         double low = INFINITY, high = -INFINITY;
@@ -86,7 +86,7 @@ static truth find_truth(void)
         t.least = fmin(t.least, low);
         t.most = fmax(t.most, high);
         if (low > 0) t.least_positive = fmin(t.least_positive, low);
-        t.middles[c] = (float)(0.5 * low + 0.5 * high);
+        t.middles[c] = 0.5 * low + 0.5 * high;
         t.positive += t.middles[c] > 0;
     }
     qsort(t.middles, (size_t)t.count, sizeof *t.middles, compare_values);
@@ -98,7 +98,7 @@ static truth find_truth(void)
 static double percentile(const truth *t, int64_t skipped, double percent)
 {
     const int64_t count = t->count - skipped, rank = (int64_t)ceil(percent / 100 * (double)count);
-    return (double)t->middles[skipped + (rank > 0 ? rank - 1 : 0)];
+    return t->middles[skipped + (rank > 0 ? rank - 1 : 0)];
 }
 
 static void check_source(const char *keys, const char *scale, double low, double high)

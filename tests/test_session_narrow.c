@@ -192,6 +192,80 @@ static void narrow_ranges_are_closed_forms(void **state)
             for (int is_given = 0; is_given < 2; is_given++) check_case(&cases[i], layer, is_given);
 }
 
+/* ---- percentiles ------------------------------------------------------------------------------------------------ */
+
+static int compare_doubles(const void *left, const void *right)
+{
+    const double a = *(const double *)left, b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
+/* The middles of all cells' values over all ranks, sorted. */
+static double *sorted_middles(const narrow_case *c, int64_t *count)
+{
+    ramp whole;
+    session_input *in = &whole.in;
+    input_create(in, TEST_TETS, SIDE, TEST_BLOCK, 0, 1);
+    *count = in->part.cell_count;
+    double *middles = test_calloc((size_t)*count, sizeof *middles);
+    for (int64_t cell = 0; cell < *count; cell++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t i = in->part.offsets[cell]; i < in->part.offsets[cell + 1]; i++) {
+            const double x = in->part.coordinates[3 * in->part.connectivity[i]];
+            const double exact = c->low + (0.5 + 0.5 * x) * (c->high - c->low);
+            const double value = c->is_single ? (double)(float)exact : exact;
+            low = fmin(low, value);
+            high = fmax(high, value);
+        }
+        middles[cell] = 0.5 * low + 0.5 * high;
+    }
+    qsort(middles, (size_t)*count, sizeof *middles, compare_doubles);
+    input_free(in);
+    return middles;
+}
+
+static caught_picture draw_range(const narrow_case *c, int layer, const char *range)
+{
+    char keys[256];
+    ramp r;
+    snprintf(keys, sizeof keys, "%srange: %s", c->scale, range);
+    ramp_create(&r, c->low, c->high, c->is_single);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
+    forget_pictures();
+    ramp_hand_over(&r, session);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    const caught_picture picture = take_caught();
+    insitu_destroy(&session);
+    ramp_free(&r);
+    return picture;
+}
+
+/* Ranges between percentiles are those found by sorting doubles: the same picture, to the bit, as by the sorted values
+ * themselves. */
+static void percentiles_are_those_of_doubles(void **state)
+{
+    (void)state;
+    static const int percents[][2] = {{0, 100}, {10, 90}, {37, 52}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        int64_t count;
+        double *middles = sorted_middles(&cases[i], &count);
+        const int *p = percents[i % 3], layer = (int)(i % 4);
+        const int64_t low = (int64_t)ceil(p[0] / 100.0 * (double)count),
+                      high = (int64_t)ceil(p[1] / 100.0 * (double)count);
+        char by_percentile[64], by_value[64];
+        snprintf(by_percentile, sizeof by_percentile, "{percentile: [%d, %d]}", p[0], p[1]);
+        snprintf(by_value, sizeof by_value, "[%.17g, %.17g]", middles[low > 0 ? low - 1 : 0], middles[high - 1]);
+        caught_picture found = draw_range(&cases[i], layer, by_percentile);
+        caught_picture truth = draw_range(&cases[i], layer, by_value);
+        const bool is_same = own_rank != 0 || memcmp(found.rgba, truth.rgba, 4 * SIZE * SIZE * sizeof *found.rgba) == 0;
+        if (!is_same) fprintf(stderr, "layer %d: %s is not %s\n", layer, by_percentile, by_value);
+        everywhere(is_same);
+        free_caught(&found);
+        free_caught(&truth);
+        test_free(middles);
+    }
+}
+
 /* ---- legends and warnings -------------------------------------------------------------------------------------- */
 
 static void constant_fields_have_one_tick(void **state)
@@ -294,8 +368,9 @@ static int run(void)
 {
     if (!enter_folder(work_folder, "narrow")) return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(constant_fields_have_one_tick),
-        cmocka_unit_test(values_too_near_are_told), cmocka_unit_test(statistics_tell_narrow_fields_apart)};
+        cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(percentiles_are_those_of_doubles),
+        cmocka_unit_test(constant_fields_have_one_tick), cmocka_unit_test(values_too_near_are_told),
+        cmocka_unit_test(statistics_tell_narrow_fields_apart)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

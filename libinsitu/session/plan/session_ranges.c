@@ -1,7 +1,7 @@
-/* Percentiles are found digit by digit. Values are taken as float32 numbers, and these as whole numbers in the same
- * order. A pass takes the values whose leading bits are those found so far, and counts them by the next 11 bits; the
- * sum of all ranks' counts tells in which bin the wanted value is. Three passes find all 32 bits, and so the value
- * itself, not an estimate, for any partition. */
+/* Percentiles are found digit by digit. Values are doubles, read as whole numbers in the same order. A pass takes the
+ * values whose leading bits are those found so far, and counts them by the next 11 bits; the sum of all ranks' counts
+ * tells in which bin the wanted value is. Six passes find all 64 bits, and so the value itself, not an estimate, for
+ * any partition. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -39,38 +39,40 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
 
 /* ---- percentiles ----------------------------------------------------------------------------------------------- */
 
-enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 3 };
+enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 6 };
+
+static const uint64_t sign_bit = UINT64_C(1) << 63;
 
 /* Maps values to whole numbers in the same order. */
-static uint32_t order_of(float value)
+static uint64_t order_of(double value)
 {
-    uint32_t bits;
+    uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
-    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+    return bits & sign_bit ? ~bits : bits | sign_bit;
 }
 
-static float value_of(uint32_t order)
+static double value_of(uint64_t order)
 {
-    const uint32_t bits = order & 0x80000000u ? order & 0x7fffffffu : ~order;
-    float value;
+    const uint64_t bits = order & sign_bit ? order & ~sign_bit : ~order;
+    double value;
     memcpy(&value, &bits, sizeof value);
     return value;
 }
 
-/* The lowest bit that a pass looks at: the last one has 10 bits left. */
+/* The lowest bit that a pass looks at: the last one has 9 bits left. */
 static int shift_of(int pass)
 {
-    return pass + 1 < PASSES ? 32 - DIGIT_BITS * (pass + 1) : 0;
+    return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
 /* The bits that a pass has found before it. */
-static uint32_t known_of(int pass)
+static uint64_t known_of(int pass)
 {
-    return pass ? ~(uint32_t)0 << shift_of(pass - 1) : 0;
+    return pass ? ~UINT64_C(0) << shift_of(pass - 1) : 0;
 }
 
 typedef struct digit_count {
-    uint32_t found[2]; /* leading bits of both ends, the rest 0 */
+    uint64_t found[2]; /* leading bits of both ends, the rest 0 */
     int pass;
     bool is_positive;
 } digit_count;
@@ -80,7 +82,7 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
 {
     const grid *g = &mesh->cells;
     const grid_field field = session_scalar_field(mesh, scalar);
-    const uint32_t known = known_of(of->pass), mask = ~known;
+    const uint64_t known = known_of(of->pass), mask = ~known;
     const int shift = shift_of(of->pass);
 #pragma omp parallel num_threads(threads)
     {
@@ -89,9 +91,9 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
         for (int64_t cell = 0; cell < g->cell_count; cell++) {
             if (!grid_is_seen(g, cell)) continue;
             const fetch_range range = fetch_any_cell_range(g, &field, cell);
-            const float middle = (float)(0.5 * range.low + 0.5 * range.high);
-            if (!range.is_finite || !isfinite(middle) || (of->is_positive && !(middle > 0))) continue;
-            const uint32_t order = order_of(middle);
+            const double middle = 0.5 * range.low + 0.5 * range.high;
+            if (!range.is_finite || (of->is_positive && !(middle > 0))) continue;
+            const uint64_t order = order_of(middle);
             for (int end = 0; end < 2; end++)
                 if ((order & known) == of->found[end]) counts[end * DIGITS + (int)((order & mask) >> shift)]++;
         }
@@ -133,11 +135,11 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
         for (int end = 0; end < 2; end++) {
             if (of.pass == 0) ranks[end] = (int64_t)fmax(ceil(percent[end] / 100 * (double)total), 1) - 1;
             const int digit = find_digit(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
-            of.found[end] |= (uint32_t)digit << shift_of(of.pass);
+            of.found[end] |= (uint64_t)digit << shift_of(of.pass);
         }
     }
-    *low = total ? (double)value_of(of.found[0]) : INFINITY;
-    *high = total ? (double)value_of(of.found[1]) : -INFINITY;
+    *low = total ? value_of(of.found[0]) : INFINITY;
+    *high = total ? value_of(of.found[1]) : -INFINITY;
     return INSITU_OK;
 }
 
