@@ -23,9 +23,9 @@ typedef struct ramp {
     bool is_single;
 } ramp;
 
-static void ramp_create(ramp *r, double low, double high, bool is_single)
+static void ramp_create(ramp *r, int side, double low, double high, bool is_single)
 {
-    input_create(&r->in, TEST_TETS, SIDE, TEST_RANDOM, own_rank, rank_count);
+    input_create(&r->in, TEST_TETS, side, TEST_RANDOM, own_rank, rank_count);
     const size_t count = (size_t)r->in.part.vertex_count;
     r->is_single = is_single;
     r->values = test_calloc(count + 1, sizeof *r->values);
@@ -167,7 +167,7 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
         snprintf(keys, sizeof keys, "%srange: [%.17g, %.17g]", c->scale, c->low, c->high);
     else
         snprintf(keys, sizeof keys, "%srange: data", c->scale);
-    ramp_create(&r, c->low, c->high, c->is_single);
+    ramp_create(&r, SIDE, c->low, c->high, c->is_single);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
     forget_pictures();
     ramp_hand_over(&r, session);
@@ -224,46 +224,63 @@ static double *sorted_middles(const narrow_case *c, int64_t *count)
     return middles;
 }
 
-static caught_picture draw_range(const narrow_case *c, int layer, const char *range)
+static caught_picture draw_range(const ramp *r, int layer, const char *scale, const char *range)
 {
     char keys[256];
-    ramp r;
-    snprintf(keys, sizeof keys, "%srange: %s", c->scale, range);
-    ramp_create(&r, c->low, c->high, c->is_single);
+    snprintf(keys, sizeof keys, "%srange: %s", scale, range);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
     forget_pictures();
-    ramp_hand_over(&r, session);
+    ramp_hand_over(r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     const caught_picture picture = take_caught();
     insitu_destroy(&session);
-    ramp_free(&r);
     return picture;
 }
 
-/* Ranges between percentiles are those found by sorting doubles: the same picture, to the bit, as by the sorted values
- * themselves. */
+/* Checks that the percentiles are these values: pictures by both ranges are the same bits. */
+static void check_percentiles(const ramp *r, int layer, const char *scale, const int percents[2], double low,
+                              double high)
+{
+    char by_percentile[64], by_value[64];
+    snprintf(by_percentile, sizeof by_percentile, "{percentile: [%d, %d]}", percents[0], percents[1]);
+    snprintf(by_value, sizeof by_value, "[%.17g, %.17g]", low, high);
+    caught_picture found = draw_range(r, layer, scale, by_percentile), truth = draw_range(r, layer, scale, by_value);
+    const bool is_same = own_rank != 0 || memcmp(found.rgba, truth.rgba, 4 * SIZE * SIZE * sizeof *found.rgba) == 0;
+    if (!is_same) fprintf(stderr, "layer %d: %s is not %s\n", layer, by_percentile, by_value);
+    everywhere(is_same);
+    free_caught(&found);
+    free_caught(&truth);
+}
+
 static void percentiles_are_those_of_doubles(void **state)
 {
     (void)state;
     static const int percents[][2] = {{0, 100}, {10, 90}, {37, 52}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const narrow_case *c = &cases[i];
+        const int *p = percents[i % 3];
         int64_t count;
-        double *middles = sorted_middles(&cases[i], &count);
-        const int *p = percents[i % 3], layer = (int)(i % 4);
-        const int64_t low = (int64_t)ceil(p[0] / 100.0 * (double)count),
-                      high = (int64_t)ceil(p[1] / 100.0 * (double)count);
-        char by_percentile[64], by_value[64];
-        snprintf(by_percentile, sizeof by_percentile, "{percentile: [%d, %d]}", p[0], p[1]);
-        snprintf(by_value, sizeof by_value, "[%.17g, %.17g]", middles[low > 0 ? low - 1 : 0], middles[high - 1]);
-        caught_picture found = draw_range(&cases[i], layer, by_percentile);
-        caught_picture truth = draw_range(&cases[i], layer, by_value);
-        const bool is_same = own_rank != 0 || memcmp(found.rgba, truth.rgba, 4 * SIZE * SIZE * sizeof *found.rgba) == 0;
-        if (!is_same) fprintf(stderr, "layer %d: %s is not %s\n", layer, by_percentile, by_value);
-        everywhere(is_same);
-        free_caught(&found);
-        free_caught(&truth);
+        double *middles = sorted_middles(c, &count);
+        const int64_t low = (int64_t)ceil(p[0] / 100.0 * (double)count);
+        const int64_t high = (int64_t)ceil(p[1] / 100.0 * (double)count);
+        ramp r;
+        ramp_create(&r, SIDE, c->low, c->high, c->is_single);
+        check_percentiles(&r, (int)(i % 4), c->scale, p, middles[low > 0 ? low - 1 : 0], middles[high - 1]);
+        ramp_free(&r);
         test_free(middles);
     }
+}
+
+/* 10,368 cells, of which two fifths and more have the one value, and as many the other. */
+static void percentiles_are_right_among_many_equal_values(void **state)
+{
+    (void)state;
+    const double low = 1e5, high = 1e5 + 1e-3;
+    ramp r;
+    ramp_create(&r, 12, low, high, false);
+    for (int64_t v = 0; v < r.in.part.vertex_count; v++) r.values[v] = r.in.part.coordinates[3 * v] < 0 ? low : high;
+    check_percentiles(&r, 1, "", (const int[2]){30, 70}, low, high);
+    ramp_free(&r);
 }
 
 /* ---- legends and warnings -------------------------------------------------------------------------------------- */
@@ -312,7 +329,7 @@ static void values_too_near_are_told(void **state)
             char keys[256];
             ramp r;
             snprintf(keys, sizeof keys, "range: %s", near[i].range);
-            ramp_create(&r, near[i].low, near[i].high, false);
+            ramp_create(&r, SIDE, near[i].low, near[i].high, false);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
             for (int cycle = 0; cycle < 2; cycle++) {
                 ramp_hand_over(&r, session);
@@ -339,7 +356,7 @@ static void statistics_tell_narrow_fields_apart(void **state)
         char scene[1200], text[MOST] = "";
         double n[16] = {0};
         ramp r;
-        ramp_create(&r, low, high, false);
+        ramp_create(&r, SIDE, low, high, false);
         if (own_rank == 0) unlink("narrow.csv");
         snprintf(scene, sizeof scene, "%sstatistics: [{field: f, path: narrow.csv, histogram: {bins: 4%s}}]\n",
                  scene_of(1, "range: data"), is_given ? ", range: [100000000, 100000000.01]" : "");
@@ -367,10 +384,12 @@ static const char *work_folder = ".";
 static int run(void)
 {
     if (!enter_folder(work_folder, "narrow")) return 1;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(percentiles_are_those_of_doubles),
-        cmocka_unit_test(constant_fields_have_one_tick), cmocka_unit_test(values_too_near_are_told),
-        cmocka_unit_test(statistics_tell_narrow_fields_apart)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(narrow_ranges_are_closed_forms),
+                                       cmocka_unit_test(percentiles_are_those_of_doubles),
+                                       cmocka_unit_test(percentiles_are_right_among_many_equal_values),
+                                       cmocka_unit_test(constant_fields_have_one_tick),
+                                       cmocka_unit_test(values_too_near_are_told),
+                                       cmocka_unit_test(statistics_tell_narrow_fields_apart)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

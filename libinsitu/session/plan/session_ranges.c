@@ -1,7 +1,7 @@
 /* Percentiles are found digit by digit. Values are doubles, read as whole numbers in the same order. A pass takes the
  * values whose leading bits are those found so far, and counts them by the next 11 bits; the sum of all ranks' counts
  * tells in which bin the wanted value is. Six passes find all 64 bits, and so the value itself, not an estimate, for
- * any partition. */
+ * any partition. From the third pass on few values are left: a pass keeps them, and the next ones read no cells. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -71,19 +71,51 @@ static uint64_t known_of(int pass)
     return pass ? ~UINT64_C(0) << shift_of(pass - 1) : 0;
 }
 
+/* A rank's values that a pass has taken, if they are that few, in any order. */
+enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
+
+typedef struct kept_values {
+    int count; /* MOST_KEPT + 1: more */
+    uint64_t orders[MOST_KEPT];
+} kept_values;
+
 typedef struct digit_count {
     uint64_t found[2]; /* leading bits of both ends, the rest 0 */
     int pass;
     bool is_positive;
+    bool is_kept; /* read the kept values, no cells */
+    kept_values kept;
 } digit_count;
 
-static void count_cells(const session_mesh *mesh, const session_scalar *scalar, int threads, const digit_count *of,
+static void keep_value(uint64_t order, kept_values *kept)
+{
+    int at;
+#pragma omp atomic read
+    at = kept->count;
+    if (at > MOST_KEPT) return;
+#pragma omp atomic capture
+    at = kept->count++;
+    if (at < MOST_KEPT) kept->orders[at] = order;
+}
+
+/* Counts the value by its next digit, for each end whose leading bits it has. Returns whether it has any. */
+static bool count_value(const digit_count *of, uint64_t order, int64_t counts[2 * DIGITS])
+{
+    const uint64_t known = known_of(of->pass);
+    bool is_counted = false;
+    for (int end = 0; end < 2; end++) {
+        if ((order & known) != of->found[end]) continue;
+        counts[end * DIGITS + (int)((order & ~known) >> shift_of(of->pass))]++;
+        is_counted = true;
+    }
+    return is_counted;
+}
+
+static void count_cells(const session_mesh *mesh, const session_scalar *scalar, int threads, digit_count *of,
                         int64_t counts[2 * DIGITS])
 {
     const grid *g = &mesh->cells;
     const grid_field field = session_scalar_field(mesh, scalar);
-    const uint64_t known = known_of(of->pass), mask = ~known;
-    const int shift = shift_of(of->pass);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
@@ -94,22 +126,31 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
             const double middle = 0.5 * range.low + 0.5 * range.high;
             if (!range.is_finite || (of->is_positive && !(middle > 0))) continue;
             const uint64_t order = order_of(middle);
-            for (int end = 0; end < 2; end++)
-                if ((order & known) == of->found[end]) counts[end * DIGITS + (int)((order & mask) >> shift)]++;
+            if (count_value(of, order, counts) && of->pass >= FIRST_KEPT) keep_value(order, &of->kept);
         }
         region_leave();
     }
 }
 
-static insitu_status count_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
-                                  const digit_count *of, int64_t counts[2 * DIGITS], base_error *error)
+static void count_own(const session_meshes *meshes, const session_team *team, const scene_field *field, digit_count *of,
+                      int64_t counts[2 * DIGITS])
 {
-    memset(counts, 0, 2 * DIGITS * sizeof *counts);
+    for (int i = 0; i < of->kept.count && of->is_kept; i++) count_value(of, of->kept.orders[i], counts);
+    if (of->is_kept) return;
+    of->kept.count = 0;
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
         const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
         if (scalar) count_cells(mesh, scalar, team->threads, of, counts);
     }
+    of->is_kept = of->pass >= FIRST_KEPT && of->kept.count <= MOST_KEPT;
+}
+
+static insitu_status count_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                                  digit_count *of, int64_t counts[2 * DIGITS], base_error *error)
+{
+    memset(counts, 0, 2 * DIGITS * sizeof *counts);
+    count_own(meshes, team, field, of, counts);
     return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, counts, 2 * DIGITS, MPI_INT64_T, MPI_SUM, team->comm),
                        "MPI_Allreduce");
 }
