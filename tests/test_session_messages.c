@@ -142,6 +142,25 @@ static void make_most(session_input *in)
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmin(in->part.values[v], 0.1);
 }
 
+static void make_ghosts(session_input *in)
+{
+    for (int64_t cell = 0; cell < in->part.cell_count; cell++) in->part.ghosts[cell] = 1;
+}
+
+/* Doubles tell places apart by 1e-4 there. */
+static void move_far(session_input *in)
+{
+    for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
+        in->part.coordinates[i] = 1e12 + 1e-2 * in->part.coordinates[i];
+}
+
+/* Half a cell is less than a millionth of the scene. */
+static void make_needles(session_input *in)
+{
+    for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
+        if (i % 3 < 2) in->part.coordinates[i] *= 1e-9;
+}
+
 /* ---- warnings ------------------------------------------------------------------------------------------------ */
 
 static const struct warning_case {
@@ -339,6 +358,13 @@ static const struct warning_case {
     {"two volumes to an error", IMAGE("[24, 16]", "", VOLUME ", " VOLUME, ERROR), TEST_HEXES, NULL, {NULL}},
     {"two volumes by samples", IMAGE("[24, 16]", "", VOLUME ", " VOLUME, SAMPLES), TEST_HEXES, NULL, {NULL}},
     {"one volume, by default", IMAGE("[24, 16]", "", VOLUME, ""), TEST_HEXES, NULL, {NULL}},
+    {"ghosts alone",
+     IMAGE("[24, 16]", "", SURFACE, ""),
+     TEST_HEXES,
+     make_ghosts,
+     {"pictures show their background alone: no mesh has cells on any rank but ghosts"}},
+    {"small cells far away", IMAGE("[24, 16]", "", SURFACE ", " VOLUME, ""), TEST_HEXES, move_far, {NULL}},
+    {"cells as thin as needles", IMAGE("[24, 16]", "", VOLUME, ""), TEST_HEXES, make_needles, {NULL}},
     {"the smallest angle", IMAGE("[24, 16]", CAMERA("angle: 1e-6"), SURFACE ", " VOLUME, ""), TEST_HEXES, NULL, {NULL}},
     {"the smallest angle, and an error that is asked for",
      IMAGE("[24, 16]", CAMERA("angle: 1e-6"), SURFACE ", " VOLUME, "    sampling: {max_error: 0.01}\n"),

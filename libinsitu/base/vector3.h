@@ -1,6 +1,8 @@
-/* Products of vectors of three numbers. */
+/* Products and lengths of vectors of three numbers. */
 #ifndef BASE_VECTOR3_H
 #define BASE_VECTOR3_H
+
+#include <math.h>
 
 static inline double vector3_dot(const double a[3], const double b[3])
 {
@@ -13,6 +15,12 @@ static inline void vector3_cross(const double a[3], const double b[3], double ou
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Right also if squares overflow. */
+static inline double vector3_length(const double v[3])
+{
+    return hypot(hypot(v[0], v[1]), v[2]);
 }
 
 #endif

@@ -49,6 +49,7 @@ typedef enum session_warning_kind {
     WARNING_PLANE,       /* a plane lies outside of the meshes that it is drawn on */
     WARNING_UNUSABLE,    /* values of cells are not finite */
     WARNING_CLIP,        /* clips leave nothing of a layer */
+    WARNING_NO_CELLS,    /* no mesh has cells to draw */
     WARNING_SHELLS,      /* a layer for cells with volume is on shells alone */
     WARNING_SAMPLES,     /* several volumes are sampled by default, to no error */
     WARNING_SCALE,       /* a field has no value that its logarithmic scale can show */

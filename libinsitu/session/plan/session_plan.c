@@ -396,6 +396,13 @@ static void take_images(const session_plan_basis *basis, session_report *report,
     }
 }
 
+static void warn_of_no_cells(const session_plan_basis *basis, bool are_images_due, session_report *report)
+{
+    session_warn(report, &(session_warning){WARNING_NO_CELLS, NULL, NULL, 0}, are_images_due && !has_anything(basis),
+                 "pictures show their background alone: %s",
+                 basis->catalogue->mesh_count ? "no mesh has cells on any rank but ghosts" : "no rank has set a mesh");
+}
+
 insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error)
 {
@@ -403,6 +410,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     const session_extent *extent = basis->extent;
     session_plan plan = {.images = base_calloc(due, sizeof *plan.images), .cell_count = extent->cell_count};
     if (plan.images) take_images(basis, report, &plan);
+    warn_of_no_cells(basis, plan.image_count > 0, report);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");

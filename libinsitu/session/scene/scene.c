@@ -63,7 +63,7 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     if (!in) in = &none;
     choose_method(in, out);
     out->step = in->step ? *in->step : 0;
-    out->step_cells = in->step_cells ? *in->step_cells : 0.5;
+    out->step_cells = in->step_cells ? *in->step_cells : SCENE_STEP_CELLS;
     out->jitter = in->jitter ? *in->jitter : true;
     out->frames = in->frames ? *in->frames : 1;
     out->is_reproducible = in->reproducible && *in->reproducible;

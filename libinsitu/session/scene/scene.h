@@ -184,6 +184,9 @@ typedef struct scene_light {
 
 /* Places on circles around the data, numbered circle by circle: view / view_count is the circle. */
 enum { SCENE_MAX_ELEVATIONS = 32 };
+
+/* The default of step_cells. */
+#define SCENE_STEP_CELLS 0.5
 typedef struct scene_orbit {
     int view_count;                          /* of a circle; 0: there is no orbit */
     double axis[3];                          /* unit length */
@@ -338,7 +341,7 @@ typedef struct scene_image {
     double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
     bool has_default_samples;     /* several volumes are sampled because the scene does not say how */
     double step;                  /* sample distance in scene units; 0: by step_cells */
-    double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
+    double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume */
     bool jitter;                  /* true by default */
     bool is_reproducible;         /* volumes to the last bit */
     int frames;                   /* accumulated; a multiple of antialias; 1 by default, 1 .. 4096 */

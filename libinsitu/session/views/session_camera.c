@@ -17,18 +17,13 @@
 /* The share of the half frame that the data fills at most. */
 static const double filled = 0.95;
 
-static double length(const double v[3])
-{
-    return hypot(hypot(v[0], v[1]), v[2]);
-}
-
 /* Chooses up, or, where that is along the view, an axis that is not. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
     const double cross[3] = {direction[1] * up[2] - direction[2] * up[1], direction[2] * up[0] - direction[0] * up[2],
                              direction[0] * up[1] - direction[1] * up[0]};
     for (int axis = 0; axis < 3; axis++) out[axis] = up[axis];
-    if (length(cross) > 1e-6 * length(direction) * length(up)) return;
+    if (vector3_length(cross) > 1e-6 * vector3_length(direction) * vector3_length(up)) return;
     int least = 0;
     for (int axis = 1; axis < 3; axis++)
         if (fabs(direction[axis]) < fabs(direction[least])) least = axis;
@@ -210,16 +205,15 @@ static void set_orthographic(const scene_image *image, double half_height, rende
     camera->half_height = half_height_of(image, half_height);
 }
 
+/* Places are from the middle of the bounds until the camera is made, so that bounds far from 0 leave all its digits. */
 static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
 {
     const scene_camera *c = &image->camera;
     const double radius = extent->half_diagonal > 0 ? extent->half_diagonal : 1;
-    double middle[3], eye[3], focal[3], up[3];
+    static const double middle[3];
+    double eye[3], focal[3], up[3];
     render_camera axes;
-    for (int a = 0; a < 3; a++) {
-        middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
-        eye[a] = middle[a] + c->direction[a] / length(c->direction) * radius;
-    }
+    for (int a = 0; a < 3; a++) eye[a] = c->direction[a] / vector3_length(c->direction) * radius;
     choose_up(c->direction, c->up, up);
     if (!render_camera_look_at(&axes, eye, middle, up, c->angle, image->width, image->height)) return false;
     const camera_fit fit = make_fit(extent, &axes, image);
@@ -234,10 +228,11 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
         place_between(reach->right - f->right * across, f->left * across - reach->left, fit.is_centred);
     const double above = place_between(reach->up - f->up * high, f->down * high - reach->down, fit.is_centred);
     for (int a = 0; a < 3; a++) {
-        focal[a] = middle[a] + (right * axes.right[a] + above * axes.up[a]);
-        eye[a] = focal[a] + c->direction[a] / length(c->direction) * back;
+        focal[a] = right * axes.right[a] + above * axes.up[a];
+        eye[a] = focal[a] + c->direction[a] / vector3_length(c->direction) * back;
     }
     if (!render_camera_look_at(out, eye, focal, up, c->angle, image->width, image->height)) return false;
+    for (int a = 0; a < 3; a++) out->eye[a] += 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
     set_orthographic(image, half_height, out);
     return true;
 }
@@ -247,7 +242,7 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
     const scene_camera *c = &image->camera;
     if (!render_camera_look_at(out, c->eye, c->focal, c->up, c->angle, image->width, image->height)) return false;
     const double between[3] = {c->eye[0] - c->focal[0], c->eye[1] - c->focal[1], c->eye[2] - c->focal[2]};
-    set_orthographic(image, out->half_height * length(between), out);
+    set_orthographic(image, out->half_height * vector3_length(between), out);
     return true;
 }
 

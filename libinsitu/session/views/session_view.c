@@ -7,11 +7,7 @@
 
 #include "session_camera.h"
 #include "session_clips.h"
-
-static double length(const double v[3])
-{
-    return hypot(hypot(v[0], v[1]), v[2]);
-}
+#include "vector3.h"
 
 static insitu_status make_camera(const session_extent *extent, const char *scene_path, const scene_image *image,
                                  render_camera *out, base_error *error)
@@ -36,12 +32,17 @@ static void make_lights(const scene_image *image, const render_camera *camera, r
     }
 }
 
+/* The finest step by default, as a share of the half diagonal: some 500,000 samples across the scene. Cells as thin as
+ * needles may be smaller. */
+static const double finest_step = 4e-6;
+
 /* Cells of no volume have no size: then a hundredth of the diagonal takes its place. */
 static double sample_distance(const session_extent *extent, const scene_image *image)
 {
     if (image->step > 0) return image->step;
     const double cell = extent->cell_size > 0 ? extent->cell_size : extent->half_diagonal / 50;
-    return cell > 0 ? image->step_cells * cell : 1;
+    const double step = cell > 0 ? image->step_cells * cell : 1;
+    return image->step_cells < SCENE_STEP_CELLS ? step : fmax(step, finest_step * extent->half_diagonal);
 }
 
 /* A tenth of the diagonal by default. If that is 0, any radius will do, as nothing is near. */
@@ -82,7 +83,7 @@ static double chord_of_bounds(const session_extent *e, const render_camera *came
         begin = fmax(begin, fmin(a, b)); /* parallel to the faces: infinities of the right signs, or NaN, passed over */
         end = fmin(end, fmax(a, b));
     }
-    return end > begin ? (end - begin) * length(direction) : 0;
+    return end > begin ? (end - begin) * vector3_length(direction) : 0;
 }
 
 /* Counts the samples of all rays on all ranks as if the bounds were full of cells and nothing hid a sample. */
@@ -124,11 +125,6 @@ typedef struct corner_bounds {
     bool is_beside;         /* all of them beyond one border */
 } corner_bounds;
 
-static double along(const double v[3], const double axis[3])
-{
-    return v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2];
-}
-
 static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
 {
     corner_bounds b = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, 0, false};
@@ -137,8 +133,8 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
     for (int corner = 0; corner < 8; corner++) {
         double offset[3];
         for (int a = 0; a < 3; a++) offset[a] = (corner >> a & 1 ? e->upper[a] : e->lower[a]) - c->eye[a];
-        const double z = along(offset, c->forward);
-        const double place[2] = {along(offset, c->right), along(offset, c->up)};
+        const double z = vector3_dot(offset, c->forward);
+        const double place[2] = {vector3_dot(offset, c->right), vector3_dot(offset, c->up)};
         b.behind += z <= 0;
         for (int a = 0; a < 2; a++) {
             const double border = half[a] * (c->is_orthographic ? 1 : z);
