@@ -20,3 +20,8 @@ add_test(NAME house_figures_are_held
   COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/house_figures.py --hold ${PROJECT_SOURCE_DIR})
 add_test(NAME house_regions_are_entered COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_regions.sh ${PROJECT_SOURCE_DIR})
 add_test(NAME house_hard_cases_are_tested COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_hard_cases.sh ${PROJECT_SOURCE_DIR})
+
+# ./test itself, with stubs of what it calls.
+add_test(NAME test_command COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/test_command.sh ${PROJECT_SOURCE_DIR}
+  ${CMAKE_CURRENT_BINARY_DIR}/test_command)
+set_tests_properties(test_command PROPERTIES TIMEOUT 60)

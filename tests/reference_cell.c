@@ -490,16 +490,18 @@ static bool solve3(const double *a, const double *b, const double *c, const doub
     return true;
 }
 
-/* The map's columns dP/dparameter and the rest point - P(parameter). */
-static void map_at(const reference_cell *cell, const double *parameter, const double *point, double columns[3][3],
-                   double left[3])
+/* The map's columns dP/dparameter and the rest point - P(parameter). Type and count are the cell's: constants where
+ * this is inlined, so that the loops are unrolled. */
+static inline __attribute__((always_inline)) void map_of(const reference_cell *cell, int type, int count,
+                                                         const double *parameter, const double *point,
+                                                         double columns[3][3], double left[3])
 {
     shape_function s[8];
-    cell_shape(cell->type, parameter, s);
+    cell_shape(type, parameter, s);
     for (int axis = 0; axis < 3; axis++) {
         left[axis] = point[axis];
         for (int k = 0; k < 3; k++) columns[k][axis] = 0;
-        for (int i = 0; i < cell->count; i++) {
+        for (int i = 0; i < count; i++) {
             left[axis] -= s[i].n * cell->position[i][axis];
             for (int k = 0; k < 3; k++) columns[k][axis] += s[i].d[k] * cell->position[i][axis];
         }
@@ -520,14 +522,15 @@ static double cell_extent(const reference_cell *cell)
     return extent;
 }
 
-static bool newton(const reference_cell *cell, const double *point, double parameter[3])
+static inline __attribute__((always_inline)) bool newton_in(const reference_cell *cell, int type, int count,
+                                                            const double *point, double parameter[3])
 {
     const double tolerance = 1e-13 * cell_extent(cell);
     for (int step = 0; step < 60; step++) {
         double columns[3][3], left[3], move[3];
-        map_at(cell, parameter, point, columns, left);
+        map_of(cell, type, count, parameter, point, columns, left);
         if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
-        const double length = length3(move), limit = length > 0.5 ? 0.5 / length : 1;
+        const double length = length3(move), limit = length > 0.5 && type != GRID_TET ? 0.5 / length : 1;
         for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
         /* The error goes as the square of the step: the next would be below 1e-16. */
         if (length3(left) <= tolerance || length < 1e-9) return isfinite(length);
@@ -535,26 +538,37 @@ static bool newton(const reference_cell *cell, const double *point, double param
     return false;
 }
 
+static bool newton(const reference_cell *cell, const double *point, double parameter[3])
+{
+    switch (cell->type) {
+    case GRID_TET: return newton_in(cell, GRID_TET, 4, point, parameter);
+    case GRID_HEX: return newton_in(cell, GRID_HEX, 8, point, parameter);
+    case GRID_WEDGE: return newton_in(cell, GRID_WEDGE, 6, point, parameter);
+    default: return newton_in(cell, GRID_PYRAMID, 5, point, parameter);
+    }
+}
+
 static double beyond_cell(const double *parameter)
 {
     return fmax(beyond_unit(parameter[0]), fmax(beyond_unit(parameter[1]), beyond_unit(parameter[2])));
 }
 
-/* Newton from the cell's centre, and from elsewhere where that fails or leads far out: of several solutions the one
- * nearest to the cell. */
+/* Newton from the last solution, which is close by if the point is the next one along a ray, then from the cell's
+ * centre, and from elsewhere if that fails or leads far out: of several solutions the one nearest to the cell. */
 static bool invert(const reference_cell *cell, const double *point, double parameter[3])
 {
-    static const double starts[9][3] = {{0.4, 0.4, 0.5},  {0.1, 0.1, 0.1},  {0.9, 0.05, 0.1},
-                                        {0.05, 0.9, 0.1}, {0.9, 0.9, 0.1},  {0.1, 0.1, 0.9},
-                                        {0.9, 0.05, 0.9}, {0.05, 0.9, 0.9}, {0.9, 0.9, 0.9}};
+    static _Thread_local double starts[10][3] = {{0.5, 0.5, 0.5},  {0.4, 0.4, 0.5}, {0.1, 0.1, 0.1}, {0.9, 0.05, 0.1},
+                                                 {0.05, 0.9, 0.1}, {0.9, 0.9, 0.1}, {0.1, 0.1, 0.9}, {0.9, 0.05, 0.9},
+                                                 {0.05, 0.9, 0.9}, {0.9, 0.9, 0.9}};
     double best = (double)INFINITY;
-    for (int i = 0; i < 9 && best > 0.1; i++) {
+    for (int i = 0; i < 10 && best > 0.1; i++) {
         double p[3];
         memcpy(p, starts[i], sizeof p);
         if (!newton(cell, point, p) || beyond_cell(p) >= best) continue;
         best = beyond_cell(p);
         memcpy(parameter, p, sizeof p);
     }
+    if (best <= 0.1) memcpy(starts[0], parameter, sizeof starts[0]);
     return isfinite(best);
 }
 
@@ -581,7 +595,7 @@ static void gradient_at(const reference_cell *cell, const double *parameter, con
     shape_function s[8];
     double columns[3][3], rows[3][3], unused[3], slope[3] = {0, 0, 0};
     cell_shape(cell->type, parameter, s);
-    map_at(cell, parameter, parameter, columns, unused);
+    map_of(cell, cell->type, cell->count, parameter, parameter, columns, unused);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < cell->count; i++) slope[k] += s[i].d[k] * values[i];
     for (int k = 0; k < 3; k++)

@@ -1,9 +1,11 @@
 # Sessions: on any ranks, right and wrong input. Pictures are caught by the fixture; test_api writes them. Daily all run on 1
 # and 3 ranks, and session, session_partition and invariance on 2 and 7 too, as compositing's own tests do; the others do so
 # in the long tests.
+add_library(test_session_fixture OBJECT test_session_fixture.c)
+target_link_libraries(test_session_fixture PUBLIC test_meshes insitu_internal PkgConfig::CMOCKA PRIVATE insitu_quick_flags)
 function(insitu_session_program target)
-  add_executable(${target} ${target}.c test_session_fixture.c)
-  target_link_libraries(${target} PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
+  add_executable(${target} ${target}.c)
+  target_link_libraries(${target} PRIVATE insitu_quick_flags test_session_fixture)
 endfunction()
 
 insitu_session_program(test_session_input)
@@ -34,23 +36,23 @@ add_executable(test_deep_file test_deep_file.cpp)
 add_dependencies(test_deep_file insitu_image)
 target_include_directories(test_deep_file SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
 target_link_libraries(test_deep_file PRIVATE
-  insitu_flags insitu ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
+  insitu_quick_flags insitu ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
 insitu_add_mpi_test(deep_file test_deep_file 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 add_executable(test_homes test_homes.c)
-target_link_libraries(test_homes PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+target_link_libraries(test_homes PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME homes COMMAND test_homes)
 
 add_executable(test_session_lanes test_session_lanes.c)
-target_link_libraries(test_session_lanes PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
+target_link_libraries(test_session_lanes PRIVATE insitu_quick_flags test_meshes insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_lanes COMMAND test_session_lanes)
 add_executable(test_cell_volumes test_cell_volumes.c)
-target_link_libraries(test_cell_volumes PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
+target_link_libraries(test_cell_volumes PRIVATE insitu_quick_flags test_meshes insitu_internal PkgConfig::CMOCKA)
 add_test(NAME cell_volumes COMMAND test_cell_volumes)
 
 # Ranks are not bound, so that all may run on all cores.
 add_executable(test_session_cores test_session_cores.c)
-target_link_libraries(test_session_cores PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA OpenMP::OpenMP_C)
+target_link_libraries(test_session_cores PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA OpenMP::OpenMP_C)
 insitu_add_mpi_test(session_cores test_session_cores 1 2 3)
 add_test(NAME session_cores_bound_by_openmp COMMAND ${CMAKE_COMMAND} -E env OMP_PROC_BIND=true
   ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 1 $<TARGET_FILE:test_session_cores>)
@@ -210,7 +212,7 @@ if(NOT CMAKE_PROJECT_INCLUDE)
 endif()
 
 add_executable(test_session_guard test_session_guard.c)
-target_link_libraries(test_session_guard PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+target_link_libraries(test_session_guard PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_guard COMMAND test_session_guard)
 
 # Memory runs out: quickly at every 97th allocation, in the long tests at each.
@@ -227,13 +229,13 @@ endforeach()
 
 # The shared library and the public header alone.
 add_executable(test_api test_api.c)
-target_link_libraries(test_api PRIVATE insitu_flags insitu PkgConfig::CMOCKA)
+target_link_libraries(test_api PRIVATE insitu_quick_flags insitu PkgConfig::CMOCKA)
 add_dependencies(test_api insitu_image)
 insitu_add_mpi_test(api test_api 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 # Each of its runs is a process of its own, without mpiexec.
 add_executable(test_writer_end test_writer_end.c)
-target_link_libraries(test_writer_end PRIVATE insitu_flags insitu)
+target_link_libraries(test_writer_end PRIVATE insitu_quick_flags insitu)
 add_dependencies(test_writer_end insitu_image)
 add_test(NAME writer_end COMMAND test_writer_end ${CMAKE_CURRENT_BINARY_DIR})
 set_tests_properties(writer_end PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120)
@@ -241,7 +243,7 @@ set_tests_properties(writer_end PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMEN
 # An empty entry of LD_LIBRARY_PATH is the working directory. Files go to a folder of their own, as other runs of test_api
 # may write theirs at the same time. By the shared library, and by a program that has its objects.
 add_library(planted_image MODULE planted_image.c)
-target_link_libraries(planted_image PRIVATE insitu_flags insitu_headers)
+target_link_libraries(planted_image PRIVATE insitu_quick_flags insitu_headers)
 set_target_properties(planted_image PROPERTIES
   PREFIX lib OUTPUT_NAME insitu_image LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
 add_test(NAME image_library_is_not_of_the_working_directory

@@ -31,7 +31,7 @@ static const double length_allowed = 1e-6;
  * reach into the next one's, or end before it, where a concave cell has several there. */
 static const double doubled_allowed = 5e-7;
 
-static int64_t rays_wanted = 1000000;
+static int64_t rays_wanted = 300000;
 
 static const chord_table *kernels(void)
 {

@@ -429,13 +429,8 @@ static void pictures_do_not_depend_on_the_partition(void **state)
     everywhere(are_well);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_do_not_depend_on_the_partition)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_do_not_depend_on_the_partition)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -450,6 +450,8 @@ static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partitio
              * segment, and if that is another rank's, the pixel is drawn twice and counts. Two volumes are mixed in all
              * pixels. */
             if (scene != VOLUME && max_error > 0) continue;
+            /* Usually each scene from every other camera. */
+            if (!test_is_whole() && max_error == 0 && ((int)scene + (int)camera + rank_count) % 2) continue;
             const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
             free_image(&drawn);
             if (overlaps)

@@ -5,6 +5,7 @@
  * others' cells as ghosts take part. */
 #include "comp.h"
 #include "memory.h"
+#include "test_effort.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -130,6 +131,13 @@ static void compare(const test_mesh *mesh, const int *owners, bool ghosts, const
     assert_true(good);
 }
 
+/* Usually each scene of each kind is drawn on one rank, and in each partition on 2 and 4 or on 3 and 7 ranks. */
+static bool is_due(test_partition_kind partition, test_mesh_kind kind, int scene)
+{
+    if (rank_count == 1) return partition == TEST_RANDOM;
+    return test_is_whole() || ((int)partition + (int)kind + scene + rank_count) % 2 == 0;
+}
+
 static void compare_partition(test_partition_kind partition)
 {
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -138,7 +146,8 @@ static void compare_partition(test_partition_kind partition)
         int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
         test_partition(&mesh, partition, SIDE, rank_count, owners);
         for (int i = 0; i < SCENE_COUNT; i++)
-            compare(&mesh, owners, false, &scenes[i], test_partition_kind_name(partition));
+            if (is_due(partition, kind, i))
+                compare(&mesh, owners, false, &scenes[i], test_partition_kind_name(partition));
         free(owners);
         test_mesh_free(&mesh);
     }

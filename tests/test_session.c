@@ -30,13 +30,6 @@ static void step_draws(insitu_session *session, int64_t cycle, int images)
     everywhere(caught_count == (own_rank == 0 ? images : 0));
 }
 
-static bool is_same_picture(const caught_picture *a, const caught_picture *b)
-{
-    const size_t pixels = (size_t)a->width * (size_t)a->height;
-    return a->width == b->width && a->height == b->height && !memcmp(a->rgba, b->rgba, pixels * 4 * sizeof(float)) &&
-           !memcmp(a->depth, b->depth, pixels * sizeof(float));
-}
-
 static int covered_pixels(const caught_picture *picture)
 {
     int count = 0;
@@ -76,19 +69,19 @@ static void unchanged_input_rebuilds_nothing(void **context)
     step_draws(session, 1, 1);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
-    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_VALUES; /* as the caller says; the values say otherwise */
     everywhere(hand_over(session, &same) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(strstr(report->left_out, "\"f\" has the values of the last picture"));
-    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_NOTHING;
     same.mesh.changed = INSITU_CHANGED_GEOMETRY;
     everywhere(hand_over(session, &same) == INSITU_OK);
     step_draws(session, 3, 1);
     everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
-    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
 }
@@ -133,7 +126,7 @@ static void moved_mesh_gives_the_moved_picture(void **context)
     everywhere(hand_over(session, &moved) == INSITU_OK);
     step_draws(session, 1, 1);
     for (int i = 0; own_rank == 0 && i < 24 * 16; i++) caught[0].depth[i] /= 64;
-    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
     test_free(coordinates);
@@ -198,7 +191,7 @@ static void plain_layouts_are_not_copied(void **context)
             first = caught[0];
             caught_count = 0;
         }
-        everywhere(own_rank != 0 || bits == 0 || is_same_picture(&first, &caught[0]));
+        everywhere(own_rank != 0 || bits == 0 || same_pictures(&first, &caught[0]));
         test_view_free(&view);
     }
     free(first.rgba);
@@ -316,7 +309,7 @@ static void cells_of_one_rank_are_seen(void **context)
             first = caught[0];
             caught_count = 0;
         }
-        everywhere(own_rank != 0 || holder == 0 || is_same_picture(&first, &caught[0]));
+        everywhere(own_rank != 0 || holder == 0 || same_pictures(&first, &caught[0]));
     }
     free(first.rgba);
     free(first.depth);
@@ -345,7 +338,7 @@ static void meshes_of_many_names_make_one_picture(void **context)
         everywhere(insitu_set_field(session, name, &in->field) == INSITU_OK);
     }
     step_draws(session, 1, 1);
-    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
     for (int half = 0; half < 2; half++) input_free(&halves[half]);
@@ -649,7 +642,7 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     for (int cycle = 0; cycle < 2; cycle++) {
         step_draws(session, cycle, 2);
         everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 100 * 70 * 16 : 0));
-        everywhere(own_rank != 0 || (!caught[0].depth && is_same_picture(&first, &caught[1])));
+        everywhere(own_rank != 0 || (!caught[0].depth && same_pictures(&first, &caught[1])));
     }
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(huge));
@@ -693,7 +686,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
                 told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
             everywhere(hand_over_both(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);
-            everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+            everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
         }
         everywhere(failures > 20);
     }
@@ -721,7 +714,21 @@ static void failing_allocation_opens_no_session(void **context)
     }
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    input_free(&input);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(images_are_drawn_when_due),
@@ -751,13 +758,5 @@ static int run(void)
         cmocka_unit_test(failing_allocation_is_an_error_and_no_more),
         cmocka_unit_test(failing_allocation_opens_no_session),
     };
-    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    input_free(&input);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -177,15 +177,10 @@ static void any_ranks_make_one_picture(void **state)
     check_on_ranks(IMAGE("    antialias: 4\n    sampling: {frames: 5}\n", SLICE VOLUME), TEST_TETS, 1e-6);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(samples_are_spread_evenly),
                                        cmocka_unit_test(edges_are_means_and_the_rest_is_as_before),
                                        cmocka_unit_test(any_ranks_make_one_picture)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -302,7 +302,7 @@ static void bounds_of_one_image_do_not_serve_another(void **context)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(partial_trees_draw_what_full_ones_do),
                                        cmocka_unit_test(trees_of_one_step_are_built_fast),
@@ -311,10 +311,5 @@ static int run(void)
                                        cmocka_unit_test(full_trees_are_built_where_most_cells_show),
                                        cmocka_unit_test(moving_vertices_are_drawn_as_by_new_trees),
                                        cmocka_unit_test(bounds_of_one_image_do_not_serve_another)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -390,16 +390,11 @@ static void what_is_wrong_is_told_to_all(void **state)
     free_moved(&spoilt);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_go_with_any_order),
         cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(the_order_may_be_set_right),
         cmocka_unit_test(what_is_wrong_is_told_to_all)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -203,7 +203,22 @@ static void values_that_change_without_a_word_are_told(void **context)
     }
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    create_input();
+    scene = write_scene(scene_text);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    input_free(&input);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spoilt_arrays_elsewhere_are_told),
@@ -212,14 +227,5 @@ static int run(void)
         cmocka_unit_test(values_elsewhere_are_drawn),
         cmocka_unit_test(values_that_change_without_a_word_are_told),
     };
-    create_input();
-    scene = write_scene(scene_text);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    input_free(&input);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -105,12 +105,6 @@ static bool is_right(const caught_picture *picture)
     return true;
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
-{
-    insitu_session *session = open_session(comm, scene);
-    return draw_once(&session, in);
-}
-
 static void compare(test_mesh_kind kind, const char *text)
 {
     session_input whole = {0}, part = {0};
@@ -122,10 +116,10 @@ static void compare(test_mesh_kind kind, const char *text)
     test_mesh_part(&whole.part, owners, own_rank, &part.part);
     test_free(owners);
     input_describe(&part);
-    caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0};
+    caught_picture ours = draw_scene(MPI_COMM_WORLD, scene, &part), alone = {0};
     bool is_well = true;
     if (own_rank == 0) {
-        alone = draw(MPI_COMM_SELF, scene, &whole);
+        alone = draw_scene(MPI_COMM_SELF, scene, &whole);
         is_well = alone.channel_count == CHANNELS && is_right(&alone) && ours.channel_count == CHANNELS &&
                   memcmp(ours.data, alone.data, CHANNELS * PIXELS * sizeof(float)) == 0;
         if (!is_well) fprintf(stderr, "%s\n", test_mesh_kind_name(kind));
@@ -149,16 +143,11 @@ static void samples_do_not_change_the_data(void **state)
     compare(TEST_HEXES, SCENE("    antialias: 4\n"));
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(data_are_those_of_the_nearest_surface),
         cmocka_unit_test(samples_do_not_change_the_data),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

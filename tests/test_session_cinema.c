@@ -326,12 +326,6 @@ static void free_pictures(picture_set *set)
     for (int i = 0; i < set->count; i++) free(set->items[i].rgba), free(set->items[i].depth);
 }
 
-static bool is_same_picture(const caught_picture *a, const caught_picture *b)
-{
-    return a->width == b->width && a->height == b->height &&
-           memcmp(a->rgba, b->rgba, (size_t)a->width * (size_t)a->height * 4 * sizeof(float)) == 0;
-}
-
 /* The scenes draw the same pictures, in their order, to the bit; and not all of them are alike. */
 static void draws_as(const char *one, const char *other, int cycle, int count)
 {
@@ -343,8 +337,8 @@ static void draws_as(const char *one, const char *other, int cycle, int count)
     run_steps(other, &in, cycle, cycle + 1);
     bool is_same = caught_count == set.count && (own_rank != 0 || set.count == count), differ = count == 1;
     for (int i = 0; i < caught_count && is_same; i++) {
-        is_same = is_same_picture(&set.items[i], &caught[i]);
-        differ = differ || !is_same_picture(&caught[0], &caught[i]);
+        is_same = same_pictures(&set.items[i], &caught[i]);
+        differ = differ || !same_pictures(&caught[0], &caught[i]);
     }
     everywhere(is_same && (differ || own_rank != 0));
     free_pictures(&set);
@@ -443,11 +437,14 @@ static void warnings_of_swept_isovalues_are_told_once(void **state)
     input_free(&in);
 }
 
-static const char *work_folder = ".";
-
-static int run(void)
+static int begin_tests(void **state)
 {
-    if (!enter_folder(work_folder, "cinema")) return 1;
+    (void)state;
+    return enter_folder("cinema") ? 0 : 1;
+}
+
+int main(int argc, char **argv)
+{
     const struct CMUnitTest tests[] = {cmocka_unit_test(tables_have_a_line_a_picture),
                                        cmocka_unit_test(tables_of_several_images_have_all_columns),
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_table),
@@ -461,11 +458,5 @@ static int run(void)
                                        cmocka_unit_test(paths_draw_what_a_camera_there_would),
                                        cmocka_unit_test(conditions_hold_for_all_pictures_of_an_image),
                                        cmocka_unit_test(warnings_of_swept_isovalues_are_told_once)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    if (argc > 1) work_folder = argv[1];
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -285,14 +285,6 @@ static const char *scene_of(const clip_case *c, const region *g, clip_place plac
     return write_scene(filled);
 }
 
-/* ---- pictures ------------------------------------------------------------------------------------------------ */
-
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
-{
-    insitu_session *session = open_session(comm, scene);
-    return draw_once(&session, in);
-}
-
 static double difference(const caught_picture *a, const caught_picture *b)
 {
     double worst = 0;
@@ -304,10 +296,10 @@ static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip
                   const session_input inputs[2])
 {
     const char *scene = scene_of(c, g, place);
-    caught_picture ours = draw(MPI_COMM_WORLD, scene, &inputs[1]), alone = {0};
+    caught_picture ours = draw_scene(MPI_COMM_WORLD, scene, &inputs[1]), alone = {0};
     bool is_well = true;
     if (own_rank == 0) {
-        alone = draw(MPI_COMM_SELF, scene, &inputs[0]);
+        alone = draw_scene(MPI_COMM_SELF, scene, &inputs[0]);
         const double off = difference(&ours, &alone);
         is_well = c->is_right(&alone, g) && off <= c->tolerance;
         if (!is_well)
@@ -355,7 +347,7 @@ static void slices_in_the_clipping_plane_are_seen(void **state)
                              "      - surface: {}\n")};
     session_input in = {0};
     input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
-    caught_picture picture = draw(MPI_COMM_WORLD, scene_of(&slice, &regions[0], OF_IMAGE), &in);
+    caught_picture picture = draw_scene(MPI_COMM_WORLD, scene_of(&slice, &regions[0], OF_IMAGE), &in);
     int hits = 0;
     bool is_well = true;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
@@ -371,16 +363,11 @@ static void slices_in_the_clipping_plane_are_seen(void **state)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layers_are_clipped),
         cmocka_unit_test(slices_in_the_clipping_plane_are_seen),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

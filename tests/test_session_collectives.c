@@ -179,14 +179,9 @@ static void schedules_change_no_bit_and_are_told(void **context)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times),
                                        cmocka_unit_test(schedules_change_no_bit_and_are_told)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -360,7 +360,26 @@ static void missing_and_broken_maps_are_told_to_all(void **state)
                strstr(insitu_error(NULL), ".json:2: RGBPoints: expected"));
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    const char *scene = write_scene("");
+    snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(scene, '/') - scene), scene);
+    snprintf(image_name, sizeof image_name, "colour_np%d", rank_count);
+    input_create(&block, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
+    input_create(&dealt, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    input_free(&block);
+    input_free(&dealt);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ranges_are_those_of_brute_force),
@@ -372,18 +391,5 @@ static int run(void)
         cmocka_unit_test(maps_from_files_are_every_ranks),
         cmocka_unit_test(missing_and_broken_maps_are_told_to_all),
     };
-    const char *scene = write_scene("");
-    snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(scene, '/') - scene), scene);
-    snprintf(image_name, sizeof image_name, "colour_np%d", rank_count);
-    input_create(&block, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
-    input_create(&dealt, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    input_free(&block);
-    input_free(&dealt);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

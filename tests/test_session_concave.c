@@ -237,15 +237,9 @@ static bool is_well(const tile tiles[TILES], const caught_picture *picture, judg
     return hits > PIXELS / 10;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 static bool are_one(const caught_picture *a, const caught_picture *b, const char *what)
 {
-    if (are_same(a, b)) return true;
+    if (same_pictures(a, b)) return true;
     for (int pixel = 0, told = 0; pixel < PIXELS && told < 5; pixel++) {
         double at[2];
         place_of(pixel, at);
@@ -336,14 +330,9 @@ static void concave_prisms_have_their_tops(void **state)
         }
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(concave_shells_are_what_they_are),
                                        cmocka_unit_test(concave_prisms_have_their_tops)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -241,19 +241,13 @@ static drawing draw(session_input *in, values *v, const form *of, bool is_double
     return out;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, PIXELS * 4 * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 static void compare(drawing *a, drawing *b, int steps)
 {
     bool same = true, differ = own_rank != 0;
     for (int step = 0; step < steps && own_rank == 0; step++)
         for (int i = 0; i < PICTURES; i++) {
-            same = same && are_same(&a->pictures[step][i], &b->pictures[step][i]);
-            differ = differ || steps == 1 || !are_same(&a->pictures[0][i], &a->pictures[step][i]);
+            same = same && same_pictures(&a->pictures[step][i], &b->pictures[step][i]);
+            differ = differ || steps == 1 || !same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
             free(b->pictures[step][i].rgba), free(b->pictures[step][i].depth);
         }
     for (int step = 0; step < steps && own_rank == 0; step++)
@@ -435,17 +429,12 @@ static void what_arrays_hold_is_told_to_all(void **state)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(torn_cells_are_those_of_doubled_vertices),
                                        cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
                                        cmocka_unit_test(joined_corners_have_their_means),
                                        cmocka_unit_test(what_is_wrong_is_told_to_all),
                                        cmocka_unit_test(what_arrays_hold_is_told_to_all)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -104,12 +104,6 @@ static bool has_depths(const caught_picture *deep, const caught_picture *flat)
     return true;
 }
 
-static bool are_the_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->first, b->first, (PIXELS + 1) * sizeof *a->first) == 0 &&
-           memcmp(a->samples, b->samples, (size_t)a->first[PIXELS] * sizeof *a->samples) == 0;
-}
-
 static bool is_the_same_flat(const caught_picture *a, const caught_picture *b)
 {
     return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof *a->rgba) == 0;
@@ -150,9 +144,9 @@ static bool judge_case(const deep_case *c, const session_input *whole, const ses
     bool is_well = is_averaged || is_the_flat_picture(&ours.deep, &ours.flat, c->name);
     is_well = is_well && (is_averaged || is_the_flat_picture(&alone.deep, &alone.flat, c->name));
     if (is_well && c->is_of_surfaces)
-        is_well = has_depths(&ours.deep, &ours.flat) && are_the_same(&ours.deep, &alone.deep);
+        is_well = has_depths(&ours.deep, &ours.flat) && same_pictures(&ours.deep, &alone.deep);
     if (is_well && c->is_reproducible)
-        is_well = is_the_same_flat(&ours.flat, &alone.flat) && are_the_same(&ours.deep, &alone.deep);
+        is_well = is_the_same_flat(&ours.flat, &alone.flat) && same_pictures(&ours.deep, &alone.deep);
     free_pictures(&ours);
     free_pictures(&alone);
     return is_well;
@@ -181,13 +175,8 @@ static void deep_pictures_are_the_flat_ones(void **state)
     judge(TEST_MIXED, TEST_RANDOM);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(deep_pictures_are_the_flat_ones)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(deep_pictures_are_the_flat_ones)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

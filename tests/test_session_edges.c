@@ -246,12 +246,6 @@ static void faces_of_many_corners_have_no_other_lines(void **state)
     }
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 static void any_ranks_draw_one_picture(void **state)
 {
     (void)state;
@@ -266,7 +260,7 @@ static void any_ranks_draw_one_picture(void **state)
         test_mesh_shuffle(&part.part, 7 + (uint64_t)own_rank);
         input_describe(&part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
-        everywhere(own_rank != 0 || are_same(&picture, &alone));
+        everywhere(own_rank != 0 || same_pictures(&picture, &alone));
         free_caught(&picture);
         free_caught(&alone);
         input_free(&part);
@@ -350,16 +344,11 @@ static void rays_through_edges_hit_one_face(void **state)
     }
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lines_are_where_edges_are), cmocka_unit_test(faces_of_many_corners_have_no_other_lines),
         cmocka_unit_test(any_ranks_draw_one_picture), cmocka_unit_test(lines_fade_on_small_faces),
         cmocka_unit_test(rays_through_edges_hit_one_face)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

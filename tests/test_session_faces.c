@@ -366,7 +366,23 @@ static void check_without_memory_is_told_and_repeated(void **context)
     everywhere(insitu_last_report(session)->cells == cells && insitu_last_report(session)->bytes_trees > 0);
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    input_create(&input, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    insitu_destroy(&session);
+    input_free(&input);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spoilt_arrays_are_told_at_once),
@@ -375,15 +391,5 @@ static int run(void)
         cmocka_unit_test(flat_polyhedra_are_counted_and_change_no_picture),
         cmocka_unit_test(check_without_memory_is_told_and_repeated),
     };
-    session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    input_create(&input, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    insitu_destroy(&session);
-    input_free(&input);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -320,25 +320,28 @@ static void folders_that_cannot_be_made_are_told(void **state)
         }
 }
 
-static const char *work_folder = ".";
-
-static int run(void)
+static int begin_tests(void **state)
 {
-    if (!enter_folder(work_folder, "files")) return 1;
+    (void)state;
+    if (!enter_folder("files")) return 1;
     forget("scene.yaml map.json own.cdb pipe victim blocked"); /* which an interrupted test leaves */
     input_create(&input, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    input_free(&input);
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_are_regular_files),       cmocka_unit_test(colour_maps_are_regular_files),
         cmocka_unit_test(plants_are_refused_or_replaced), cmocka_unit_test(linked_ranges_are_read),
         cmocka_unit_test(missing_folders_are_made),       cmocka_unit_test(folders_that_cannot_be_made_are_told),
     };
-    const int failures = cmocka_run_group_tests(tests, NULL, NULL);
-    input_free(&input);
-    return failures;
-}
-
-int main(int argc, char **argv)
-{
-    if (argc > 1) work_folder = argv[1];
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

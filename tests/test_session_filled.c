@@ -266,15 +266,10 @@ static void calls_of_a_fill_are_refused(void **state)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
                                        cmocka_unit_test(what_goes_wrong_is_told_to_all),
                                        cmocka_unit_test(calls_of_a_fill_are_refused)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 #include "test_session_fixture.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,15 +66,16 @@ void put_file(const char *path, const char *text)
     fclose(file);
 }
 
-int run_session_tests(int argc, char **argv, int (*run)(void))
+int run_session_group(int argc, char **argv, const struct CMUnitTest *tests, size_t count, CMFixtureFunction begin,
+                      CMFixtureFunction end)
 {
+    const char *const slash = strrchr(argv[0], '/'), *const name = slash ? slash + 1 : argv[0];
     MPI_Init(&argc, &argv);
     MPI_Comm_rank(MPI_COMM_WORLD, &own_rank);
     MPI_Comm_size(MPI_COMM_WORLD, &rank_count);
     if (argc > 1) folder = argv[1];
-    snprintf(scene_name, sizeof scene_name, "%s/%s_np%d.yaml", folder,
-             strrchr(argv[0], '/') ? strrchr(argv[0], '/') + 1 : argv[0], rank_count);
-    const int failed = run();
+    snprintf(scene_name, sizeof scene_name, "%s/%s_np%d.yaml", folder, name, rank_count);
+    const int failed = _cmocka_run_group_tests(name, tests, count, begin, end);
     forget_pictures();
     MPI_Finalize();
     return failed;
@@ -212,7 +214,7 @@ void all_are_told(session_input *in, const spoilt_case *cases, size_t count)
     insitu_destroy(&session);
 }
 
-bool enter_folder(const char *folder, const char *name)
+bool enter_folder(const char *name)
 {
     char path[512];
     snprintf(path, sizeof path, "%s/%s_np%d", folder, name, rank_count);
@@ -266,6 +268,37 @@ caught_picture draw_once(insitu_session **session, const session_input *in)
     const caught_picture picture = take_caught();
     insitu_destroy(session);
     return picture;
+}
+
+caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    insitu_session *session = open_session(comm, scene);
+    return draw_once(&session, in);
+}
+
+/* Either array may be missing, in both pictures. */
+static bool same_bytes(const void *a, const void *b, size_t bytes)
+{
+    return a && b ? memcmp(a, b, bytes) == 0 : a == b;
+}
+
+bool same_pictures(const caught_picture *a, const caught_picture *b)
+{
+    const size_t pixels = (size_t)a->width * (size_t)a->height;
+    if (a->width != b->width || a->height != b->height || a->channel_count != b->channel_count) return false;
+    if (!same_bytes(a->rgba, b->rgba, 4 * pixels * sizeof(float))) return false;
+    if (!same_bytes(a->depth, b->depth, pixels * sizeof(float))) return false;
+    if (!same_bytes(a->data, b->data, (size_t)a->channel_count * pixels * sizeof(float))) return false;
+    if (!same_bytes(a->first, b->first, (pixels + 1) * sizeof *a->first)) return false;
+    return same_bytes(a->samples, b->samples, a->first ? (size_t)a->first[pixels] * sizeof *a->samples : 0);
+}
+
+double colour_difference(const caught_picture *a, const caught_picture *b)
+{
+    double worst = a->width == b->width && a->height == b->height ? 0 : (double)INFINITY;
+    for (int i = 0; i < 4 * a->width * a->height && worst < (double)INFINITY; i++)
+        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    return worst;
 }
 
 bool session_writes_behind;

@@ -28,8 +28,9 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
 void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
                  const char *file, int line);
 
-/* Goes into a folder of this name and the count of ranks, within the folder: each count's files are apart. */
-bool enter_folder(const char *folder, const char *name);
+/* Goes into a folder of this name and the count of ranks, within the folder for scene files: each count's files are
+ * apart. */
+bool enter_folder(const char *name);
 
 /* Reads rank 0's file into size bytes of text, which is empty on other ranks and where there is no file. */
 void read_file(const char *path, size_t size, char *text);
@@ -37,8 +38,12 @@ void read_file(const char *path, size_t size, char *text);
 /* Rank 0 writes the file. */
 void put_file(const char *path, const char *text);
 
-/* MPI, and argv[1]: a folder for scene files. Returns what main returns. */
-int run_session_tests(int argc, char **argv, int (*run)(void));
+/* Runs the tests, an array, between MPI_Init and MPI_Finalize; argv[1] is a folder for scene files. begin and end,
+ * unless NULL, are called before and after them, with the ranks and the folder set. Returns what main returns. */
+#define run_session_tests(argc, argv, tests, begin, end)                                                               \
+    run_session_group((argc), (argv), (tests), sizeof(tests) / sizeof((tests)[0]), (begin), (end))
+int run_session_group(int argc, char **argv, const struct CMUnitTest *tests, size_t count, CMFixtureFunction begin,
+                      CMFixtureFunction end);
 
 /* Rank 0 writes a scene file, which all then know by this name. */
 const char *write_scene(const char *text);
@@ -120,6 +125,15 @@ insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input
 
 /* Hands the input over, takes a step, which is to be well, and its picture, and destroys the session. */
 caught_picture draw_once(insitu_session **session, const session_input *in);
+
+/* As above, with a session of the scene file. */
+caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input *in);
+
+/* Tells whether all that was caught has the same bits but the path. */
+bool same_pictures(const caught_picture *a, const caught_picture *b);
+
+/* The largest difference of a colour's or the opacity's; infinite if the pictures have other sizes. */
+double colour_difference(const caught_picture *a, const caught_picture *b);
 
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;

@@ -219,12 +219,6 @@ static int count_slits(const caught_picture *picture)
     return slits;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 static void check(int cuts, amr_shape shape, insitu_cell_type type)
 {
     const char *scene = write_scene(scene_text);
@@ -237,11 +231,11 @@ static void check(int cuts, amr_shape shape, insitu_cell_type type)
         bool is_well = true;
         if (own_rank == 0) {
             const int slits = count_slits(&alone), parted = count_slits(&ours);
-            is_well = slits == 0 && parted == 0 && are_same(&ours, &alone);
+            is_well = slits == 0 && parted == 0 && same_pictures(&ours, &alone);
             if (!is_well)
                 fprintf(stderr, "%d to 1, shape %d, type %d%s: %d pixels torn, %d on ranks; %s\n", cuts, (int)shape,
                         (int)type, by_level ? ", a mesh a level" : "", slits, parted,
-                        are_same(&ours, &alone) ? "the same" : "another picture");
+                        same_pictures(&ours, &alone) ? "the same" : "another picture");
         }
         everywhere(is_well);
         free_caught(&ours);
@@ -339,7 +333,7 @@ static void a_layer_makes_meshes_one(void **state)
                                      boxes, 2, rank_count);
     everywhere(own_rank != 0 || count_covered(&one) == PIXELS);
     everywhere(count_covered(&apart) == 0);
-    everywhere(own_rank != 0 || are_same(&one, &both));
+    everywhere(own_rank != 0 || same_pictures(&one, &both));
     free_caught(&one);
     free_caught(&apart);
     free_caught(&both);
@@ -355,7 +349,7 @@ static void vertices_on_a_common_wall_do_not_hang(void **state)
     caught_picture alone = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 1, 0);
     caught_picture both = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 2, rank_count);
     everywhere(own_rank != 0 || count_covered(&alone) > PIXELS / 3);
-    everywhere(own_rank != 0 || are_same(&alone, &both));
+    everywhere(own_rank != 0 || same_pictures(&alone, &both));
     free_caught(&alone);
     free_caught(&both);
 }
@@ -384,7 +378,7 @@ static void means_follow_the_other_mesh(void **state)
         if (step < 2) set_part(session, "b", &b);
         if (step == 2 && own_rank == rank_count - 1) assert_int_equal(insitu_set_mesh(session, "b", NULL), INSITU_OK);
         caught_picture picture = take_step(session);
-        everywhere(own_rank != 0 || are_same(&expected[step], &picture));
+        everywhere(own_rank != 0 || same_pictures(&expected[step], &picture));
         free_caught(&picture);
     }
     insitu_destroy(&session);
@@ -393,16 +387,11 @@ static void means_follow_the_other_mesh(void **state)
     part_free(&b);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cell_values_go_on_over_hanging_nodes), cmocka_unit_test(cell_values_go_on_over_triangles),
         cmocka_unit_test(a_layer_makes_meshes_one), cmocka_unit_test(vertices_on_a_common_wall_do_not_hang),
         cmocka_unit_test(means_follow_the_other_mesh)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

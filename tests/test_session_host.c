@@ -352,7 +352,26 @@ static void a_number_too_large_for_a_scene_is_no_trap(void **context)
     insitu_destroy(&open);
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    other_threads = atomic_load(&live_threads);
+    input_create(&input, TEST_MIXED, 7, TEST_BLOCK, own_rank, rank_count);
+    test_mesh_to_polyhedra(&input.part, 0.3);
+    input_describe(&input);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    input_free(&input);
+    free(expected.rgba);
+    free(expected.depth);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(one_thread_draws, begin_test),
@@ -366,18 +385,5 @@ static int run(void)
         cmocka_unit_test_setup(a_parallel_region_of_the_caller_gets_one_thread, begin_test),
         cmocka_unit_test_setup(a_number_too_large_for_a_scene_is_no_trap, begin_test),
     };
-    other_threads = atomic_load(&live_threads);
-    input_create(&input, TEST_MIXED, 7, TEST_BLOCK, own_rank, rank_count);
-    test_mesh_to_polyhedra(&input.part, 0.3);
-    input_describe(&input);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    input_free(&input);
-    free(expected.rgba);
-    free(expected.depth);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -178,15 +178,10 @@ static void errors_of_many_cells_are_told(void **state)
     }
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_those_from_zero),
                                        cmocka_unit_test(errors_count_from_one_too),
                                        cmocka_unit_test(errors_of_many_cells_are_told)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -160,19 +160,13 @@ static drawing draw(const session_input *in, twice *t, bool is_by_index)
     return out;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, PIXELS * 4 * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 static void compare(drawing *a, drawing *b)
 {
     bool same = true, differ = own_rank != 0;
     for (int step = 0; step < STEPS && own_rank == 0; step++)
         for (int i = 0; i < PICTURES; i++) {
-            same = same && are_same(&a->pictures[step][i], &b->pictures[step][i]);
-            differ = differ || !are_same(&a->pictures[0][i], &a->pictures[step][i]);
+            same = same && same_pictures(&a->pictures[step][i], &b->pictures[step][i]);
+            differ = differ || !same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
         }
     everywhere(same);
     everywhere(differ); /* the values of the second step are seen */
@@ -372,17 +366,12 @@ static void ranks_without_vertices_have_values(void **state)
     spoilt = NULL;
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(an_index_draws_what_values_in_order_draw),
                                        cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
                                        cmocka_unit_test(ranks_without_vertices_have_values),
                                        cmocka_unit_test(cells_are_told_too),
                                        cmocka_unit_test(what_is_wrong_is_told_to_all)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -559,7 +559,23 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
     session = before;
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    insitu_destroy(&session);
+    input_free(&input);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spoilt_input_is_told_to_all),
@@ -574,15 +590,5 @@ static int run(void)
         cmocka_unit_test(message_stays_until_the_next_step),
         cmocka_unit_test(images_that_need_nothing_wrong_are_drawn),
     };
-    session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    insitu_destroy(&session);
-    input_free(&input);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -278,7 +278,7 @@ static void cells_that_rise_from_flatness_are_drawn(void **context)
     test_mesh_free(&whole);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cells_without_a_value_of_their_own_are_not_there),
@@ -286,10 +286,5 @@ static int run(void)
         cmocka_unit_test(flat_cells_between_differing_fields_change_no_pixel),
         cmocka_unit_test(cells_that_rise_from_flatness_are_drawn),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -366,7 +366,7 @@ static void ghost_cells_cast_nothing(void **context)
     input_free(&part);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(disks_throw_ellipses),
@@ -375,10 +375,5 @@ static int run(void)
         cmocka_unit_test(lit_pictures_are_the_same_on_any_partition),
         cmocka_unit_test(ghost_cells_cast_nothing),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -122,13 +122,8 @@ static void a_step_is_linear_in_the_number_of_meshes(void **context)
     everywhere(many_first < most * few_first);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_is_linear_in_the_number_of_meshes)};
-    return cmocka_run_group_tests_name("session_many", tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_is_linear_in_the_number_of_meshes)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

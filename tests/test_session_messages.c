@@ -532,7 +532,7 @@ static void control_characters_are_escaped(void **context)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_hardly_meant_is_told_once),
@@ -541,10 +541,5 @@ static int run(void)
         cmocka_unit_test(control_characters_are_escaped),
         cmocka_unit_test(lack_of_a_font_is_told_at_once),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

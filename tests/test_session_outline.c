@@ -78,13 +78,8 @@ static void boxes_are_those_of_what_is_asked(void **state)
     input_free(&far);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(boxes_are_those_of_what_is_asked)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(boxes_are_those_of_what_is_asked)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -69,21 +69,24 @@ static void repeated_steps_are_not_told(void **state)
     insitu_destroy(&session);
 }
 
-static const char *work_folder = ".";
-
-static int run(void)
+static int begin_tests(void **state)
 {
-    if (!enter_folder(work_folder, "overwrites")) return 1;
+    (void)state;
+    if (!enter_folder("overwrites")) return 1;
     input_create(&input, TEST_HEXES, 2, TEST_RANDOM, own_rank, rank_count);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_told),
-                                       cmocka_unit_test(repeated_steps_are_not_told)};
-    const int failures = cmocka_run_group_tests(tests, NULL, NULL);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
     input_free(&input);
-    return failures;
+    return 0;
 }
 
 int main(int argc, char **argv)
 {
-    if (argc > 1) work_folder = argv[1];
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_told),
+                                       cmocka_unit_test(repeated_steps_are_not_told)};
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

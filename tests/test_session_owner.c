@@ -388,7 +388,7 @@ static void memory_that_runs_out_is_told(void **state)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(owner_and_neighbour_are_the_plain_form),
@@ -399,10 +399,5 @@ static int run(void)
         cmocka_unit_test(moved_cells_are_the_same_cells),
         cmocka_unit_test(memory_that_runs_out_is_told),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -199,13 +199,8 @@ static void what_is_wrong_is_told_to_all(void **state)
     free_owned(&spoilt);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -111,14 +111,6 @@ static double draw(MPI_Comm comm, const char *scene, const session_input *in, ca
     return size;
 }
 
-static double difference(const caught_picture *a, const caught_picture *b)
-{
-    double worst = 0;
-    for (int i = 0; i < 4 * WIDTH * HEIGHT; i++)
-        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
-    return worst;
-}
-
 static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind kind, const session_input *whole,
                            const session_input *part)
 {
@@ -126,7 +118,7 @@ static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind 
     const double size = draw(MPI_COMM_WORLD, file, part, &ours);
     if (own_rank != 0) return true;
     const double alone_size = draw(MPI_COMM_SELF, file, whole, &alone);
-    const double off = difference(&ours, &alone);
+    const double off = colour_difference(&ours, &alone);
     const bool is_one = off <= 1e-6 && size == alone_size;
     if (!is_one)
         fprintf(stderr, "%s, %s, %d ranks: off by %.3g; cells of size %.17g and %.17g\n", mesh_names[kind], scene->name,
@@ -162,7 +154,7 @@ static bool is_near(const char *layers, const session_input *in)
     snprintf(text, sizeof text, IMAGE("%s", "%s"), layers, "    sampling: {max_error: 1e-4}\n");
     draw(MPI_COMM_WORLD, write_scene(text), in, &fine);
     if (own_rank != 0) return true;
-    const double off = difference(&standard, &fine);
+    const double off = colour_difference(&standard, &fine);
     if (off > 0.01 + 1e-4) fprintf(stderr, "off by %.3g: %s", off, layers);
     free_caught(&standard);
     free_caught(&fine);
@@ -217,7 +209,7 @@ static void flat_cells_do_not_change_the_default_step(void **context)
     judge(FLAT_AMONG_HEXES);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(default_volumes_of_honeycombs_are_one_picture),
@@ -227,10 +219,5 @@ static int run(void)
         cmocka_unit_test(flat_cells_do_not_change_the_default_step),
         cmocka_unit_test(default_volumes_are_off_by_a_hundredth_at_most),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

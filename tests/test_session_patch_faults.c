@@ -304,14 +304,9 @@ static void hexes_want_vertices(void **state)
     input_free(&input);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all),
                                        cmocka_unit_test(hexes_want_vertices)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -513,7 +513,7 @@ static void linear_fields_are_exact_amid_walls(void **state)
     free_whole();
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cells_take_faces_by_vertices),
@@ -523,10 +523,5 @@ static int run(void)
         cmocka_unit_test(means_follow_values_on_the_boundary),
         cmocka_unit_test(linear_fields_are_exact_amid_walls),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -310,11 +310,6 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     return picture;
 }
 
-static bool is_same_picture(const caught_picture *a, const caught_picture *b)
-{
-    return own_rank != 0 || memcmp(a->rgba, b->rgba, 40 * 30 * 4 * sizeof(float)) == 0;
-}
-
 /* With interpolate: vertex a cell field is drawn by the means at the vertices, by default as it is. Cells without a
  * finite value of their own, which a field at vertices does not know of, are ghosts. */
 static void smooth_layers_are_those_of_the_means(void **context)
@@ -336,16 +331,32 @@ static void smooth_layers_are_those_of_the_means(void **context)
     for (int method = 0; method < 2; method++) {
         caught_picture pictures[4];
         for (int i = 0; i < 4; i++) pictures[i] = draw_smooth(scenes[method][i], &in, means);
-        everywhere(is_same_picture(&pictures[0], &pictures[1]));
-        everywhere(is_same_picture(&pictures[2], &pictures[3]));
-        everywhere(own_rank != 0 || !is_same_picture(&pictures[0], &pictures[2]));
+        everywhere(same_pictures(&pictures[0], &pictures[1]));
+        everywhere(same_pictures(&pictures[2], &pictures[3]));
+        everywhere(own_rank != 0 || !same_pictures(&pictures[0], &pictures[2]));
         for (int i = 0; i < 4; i++) free(pictures[i].rgba), free(pictures[i].depth);
     }
     part_free(&in);
     test_free(means);
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole);
+    owners = calloc((size_t)whole.cell_count, sizeof *owners);
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    free(owners);
+    test_mesh_free(&whole);
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(means_equal_a_search_over_all_cells),
@@ -356,15 +367,5 @@ static int run(void)
         cmocka_unit_test(smooth_volumes_of_dealt_cells_are_those_of_one_rank),
         cmocka_unit_test(smooth_layers_are_those_of_the_means),
     };
-    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole);
-    owners = calloc((size_t)whole.cell_count, sizeof *owners);
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    free(owners);
-    test_mesh_free(&whole);
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -245,7 +245,21 @@ static void what_no_rank_has_is_refused(void **context)
     }
 }
 
-static int run(void)
+static int begin_tests(void **state)
+{
+    (void)state;
+    regions_create();
+    return 0;
+}
+
+static int end_tests(void **state)
+{
+    (void)state;
+    regions_free();
+    return 0;
+}
+
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layers_are_on_the_meshes_that_have_the_field),
@@ -255,13 +269,5 @@ static int run(void)
         cmocka_unit_test(warning_of_grey_is_told_once),
         cmocka_unit_test(what_no_rank_has_is_refused),
     };
-    regions_create();
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    regions_free();
-    return failed;
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

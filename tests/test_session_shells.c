@@ -178,12 +178,6 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m
     return picture;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 /* ---- what is to be seen -------------------------------------------------------------------------------------- */
 
 /* Finds where the pixel's ray meets the plane 0.3 x + 0.2 y = z. */
@@ -236,7 +230,7 @@ static void sheets_are_planes_on_any_ranks(void **state)
             bool is_well = true;
             if (own_rank == 0) {
                 alone = draw(MPI_COMM_SELF, scene, &whole);
-                is_well = is_sheet(&alone) && are_same(&ours, &alone);
+                is_well = is_sheet(&alone) && same_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -283,7 +277,7 @@ static void other_layers_pass_shells_over(void **state)
             bare = draw(MPI_COMM_SELF, scene, &without);
             int hits = 0;
             for (int pixel = 0; pixel < PIXELS; pixel++) hits += bare.rgba[4 * pixel + 3] > 0;
-            is_well = hits > PIXELS / 20 && are_same(&alone, &bare);
+            is_well = hits > PIXELS / 20 && same_pictures(&alone, &bare);
             for (int k = 0; k < 4 * PIXELS; k++)
                 is_well = is_well && fabs((double)alone.rgba[k] - (double)ours.rgba[k]) <= 1e-6;
         }
@@ -329,7 +323,7 @@ static void bad_shells_are_told(void **state)
     is_told(&m, (const char *const[]){"cell 0", "unknown cell type 6"});
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sheets_are_planes_on_any_ranks),
@@ -337,10 +331,5 @@ static int run(void)
         cmocka_unit_test(other_layers_pass_shells_over),
         cmocka_unit_test(bad_shells_are_told),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -103,13 +103,6 @@ static bool is_truth(const caught_picture *picture, const plane *planes, int cou
     return hits > WIDTH * HEIGHT / 20;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    const size_t pixels = (size_t)WIDTH * HEIGHT;
-    return memcmp(a->rgba, b->rgba, 4 * pixels * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0;
-}
-
 /* ---- inputs -------------------------------------------------------------------------------------------------- */
 
 static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
@@ -147,7 +140,7 @@ static void planes_are_one_picture_of(test_mesh_kind kind)
         session_input part = {0};
         take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
-        everywhere(own_rank != 0 || are_same(&picture, &alone));
+        everywhere(own_rank != 0 || same_pictures(&picture, &alone));
         free_caught(&picture);
         input_free(&part);
     }
@@ -401,7 +394,7 @@ static void distances_go_with_the_geometry(void **state)
     input_free(&part);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(planes_are_true_and_one_picture_on_any_ranks),
@@ -412,10 +405,5 @@ static int run(void)
         cmocka_unit_test(cells_have_their_values_and_no_number_is_grey),
         cmocka_unit_test(distances_go_with_the_geometry),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -178,13 +178,6 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     return picture;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, PIXELS * 4 * sizeof *a->rgba) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof *a->depth) == 0 &&
-           memcmp(a->data, b->data, CHANNELS * PIXELS * sizeof *a->data) == 0;
-}
-
 /* ---- meshes ---------------------------------------------------------------------------------------------------- */
 
 static double swirl(const double p[3])
@@ -385,7 +378,7 @@ static void same_as_alone(const char *name, const char *scene, const session_inp
     bool is_well = true;
     if (own_rank == 0) {
         alone = draw(MPI_COMM_SELF, scene, whole, NULL);
-        is_well = are_same(&ours, &alone);
+        is_well = same_pictures(&ours, &alone);
         if (!is_well) fprintf(stderr, "%s: not the same on %d ranks\n", name, rank_count);
     }
     everywhere(is_well);
@@ -450,7 +443,7 @@ static void doubled_vertices_are_one(void **state)
     describe(&cracked);
     caught_picture one = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
     caught_picture two = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &cracked, NULL);
-    assert_true(cracked.part.vertex_count > whole.part.vertex_count && are_same(&one, &two));
+    assert_true(cracked.part.vertex_count > whole.part.vertex_count && same_pictures(&one, &two));
     free_caught(&one);
     free_caught(&two);
     for (int i = 0; i < 2; i++) test_mesh_free(&halves[i]);
@@ -478,7 +471,7 @@ static void rubbish_gives_nothing(void **state)
     input_free(&whole);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(normals_are_the_interpolated_gradients),
@@ -488,10 +481,5 @@ static int run(void)
         cmocka_unit_test(doubled_vertices_are_one),
         cmocka_unit_test(rubbish_gives_nothing),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -89,17 +89,6 @@ static void draw(const space_case *c, double scale, const double offset[3], caug
     input_free(&in);
 }
 
-/* The largest difference of a channel; not a number counts as infinite. */
-static double difference(const caught_picture *a, const caught_picture *b)
-{
-    double worst = 0;
-    for (int i = 0; i < 4 * WIDTH * HEIGHT; i++) {
-        const double off = fabs((double)a->rgba[i] - (double)b->rgba[i]);
-        worst = test_worse(worst, off);
-    }
-    return worst;
-}
-
 static int drawn_pixels(const caught_picture *p)
 {
     int count = 0;
@@ -116,7 +105,7 @@ static void pictures_are_the_same(double scale, const double offset[3])
         draw(&cases[i], 1, nowhere, &here);
         draw(&cases[i], scale, offset, &there);
         if (own_rank == 0) {
-            const double off = difference(&here, &there);
+            const double off = colour_difference(&here, &there);
             printf("%s, times %g: off by %.2g\n", cases[i].name, scale, off);
             is_same = is_same && off <= cases[i].allowed && drawn_pixels(&here) > WIDTH * HEIGHT / 4;
             free(here.rgba), free(here.depth), free(there.rgba), free(there.depth);
@@ -253,7 +242,7 @@ static void depth_is_of_the_nearest_surface(void **context)
     forget_pictures();
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(depth_is_of_the_nearest_surface),
@@ -261,10 +250,5 @@ static int run(void)
         cmocka_unit_test(scenes_a_million_times_smaller_look_the_same),
         cmocka_unit_test(scenes_a_million_times_larger_look_the_same),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -146,26 +146,12 @@ static void told_stacks_suffice(void **context)
     input_free(&in);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(steps_take_less_than_they_are_checked_for)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-static int run_small(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(small_stacks_are_told)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-static int run_told(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(told_stacks_suffice)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    const char *told = getenv("TOLD_STACKS");
-    return run_session_tests(argc, argv, told ? run_told : getenv("SMALL_STACKS") ? run_small : run);
+    const struct CMUnitTest usual[] = {cmocka_unit_test(steps_take_less_than_they_are_checked_for)};
+    const struct CMUnitTest small[] = {cmocka_unit_test(small_stacks_are_told)};
+    const struct CMUnitTest told[] = {cmocka_unit_test(told_stacks_suffice)};
+    if (getenv("TOLD_STACKS")) return run_session_tests(argc, argv, told, NULL, NULL);
+    if (getenv("SMALL_STACKS")) return run_session_tests(argc, argv, small, NULL, NULL);
+    return run_session_tests(argc, argv, usual, NULL, NULL);
 }

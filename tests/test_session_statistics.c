@@ -268,11 +268,14 @@ static void conditions_hold_images_back(void **state)
     everywhere(cycles_drawn(PICTURE("    once: true\n")) == 0x1);
 }
 
-static const char *work_folder = ".";
-
-static int run(void)
+static int begin_tests(void **state)
 {
-    if (!enter_folder(work_folder, "statistics")) return 1;
+    (void)state;
+    return enter_folder("statistics") ? 0 : 1;
+}
+
+int main(int argc, char **argv)
+{
     const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_linear_fields_are_closed_forms),
                                        cmocka_unit_test(bent_and_concave_cells_fill_their_cube),
                                        cmocka_unit_test(numbers_of_cells_are_sums),
@@ -280,11 +283,5 @@ static int run(void)
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),
                                        cmocka_unit_test(files_that_cannot_be_written_are_told),
                                        cmocka_unit_test(conditions_hold_images_back)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    if (argc > 1) work_folder = argv[1];
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -245,17 +245,12 @@ static void arrays_are_read_backwards_as_forwards(void **state)
     }
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(strides_beyond_memory_are_refused),
         cmocka_unit_test(rows_beyond_memory_are_refused),
         cmocka_unit_test(arrays_are_read_backwards_as_forwards),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

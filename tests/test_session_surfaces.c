@@ -454,7 +454,7 @@ static void rays_along_the_diagonals_of_polygons_hit(void **state)
     insitu_destroy(&session);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(outer_faces_are_the_cube_s),
@@ -464,10 +464,5 @@ static int run(void)
         cmocka_unit_test(faces_are_found_once_for_the_cells),
         cmocka_unit_test(rays_along_the_diagonals_of_polygons_hit),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

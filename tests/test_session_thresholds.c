@@ -218,14 +218,9 @@ static void bounds_may_show_all_or_nothing(void **state)
     input_free(&part);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(faces_are_those_around_the_cells_within),
                                        cmocka_unit_test(bounds_may_show_all_or_nothing)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

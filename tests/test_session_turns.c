@@ -59,17 +59,12 @@ static void many_fragments_take_few_turns(void **context)
     everywhere(totals.fragments >= LEAST_FRAGMENTS && totals.turns <= MOST_TURNS);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_volume_needs_no_turns),
         cmocka_unit_test(two_volumes_take_a_turn),
         cmocka_unit_test(many_fragments_take_few_turns),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -126,17 +126,12 @@ static void few_cells_are_not_told(void **state)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(order_that_fits_is_named),
         cmocka_unit_test(twisted_cells_are_told),
         cmocka_unit_test(few_cells_are_not_told),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

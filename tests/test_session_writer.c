@@ -289,7 +289,7 @@ static void image_library_is_loaded_before_the_first_step(void **state)
     input_free(&in);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pictures_are_those_written_in_the_step),
@@ -301,10 +301,5 @@ static int run(void)
         cmocka_unit_test(tables_follow_their_pictures),
         cmocka_unit_test(image_library_is_loaded_before_the_first_step),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

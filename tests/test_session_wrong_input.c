@@ -324,15 +324,10 @@ static void any_mistake_is_an_error_or_a_picture(void **state)
     everywhere(getenv("INSITU_TEST_CASE") || (failed > all / 4 && failed < all)); /* neither few nor all are fatal */
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_mistake_is_an_error_or_a_picture),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -107,16 +107,11 @@ static void and_for_torn_meshes(void **state)
         if (formed_has_corners(form)) check_form(form, true);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_counts_are_an_error_or_a_picture),
         cmocka_unit_test(and_for_torn_meshes),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -3,41 +3,44 @@ find_package(VTK 9.1 REQUIRED
   COMPONENTS CommonCore CommonDataModel CommonExecutionModel IOLegacy IOParallel IOXML cgns)
 
 add_executable(test_vtk_adaptor test_vtk_adaptor.cpp test_vtk_session_stub.cpp)
-target_link_libraries(test_vtk_adaptor PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_flags)
+target_link_libraries(test_vtk_adaptor PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_quick_flags)
 add_test(NAME vtk_adaptor COMMAND test_vtk_adaptor)
 set_tests_properties(vtk_adaptor PROPERTIES TIMEOUT 30)
 
 add_executable(test_vtk_amr test_vtk_amr.cpp test_vtk_session_stub.cpp)
-target_link_libraries(test_vtk_amr PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_flags)
+target_link_libraries(test_vtk_amr PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_quick_flags)
 add_test(NAME vtk_amr COMMAND test_vtk_amr)
 set_tests_properties(vtk_amr PROPERTIES TIMEOUT 30)
 
 add_executable(test_vtk_deal test_vtk_deal.cpp)
-target_link_libraries(test_vtk_deal PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA)
+target_link_libraries(test_vtk_deal PRIVATE insitu_render_files insitu_quick_flags PkgConfig::CMOCKA)
 add_test(NAME vtk_deal COMMAND test_vtk_deal)
 set_tests_properties(vtk_deal PROPERTIES TIMEOUT 60)
 
+add_library(test_vtk_run STATIC test_vtk_run.cpp)
+target_link_libraries(test_vtk_run PRIVATE insitu_quick_flags)
+
 # Files of every format, written by VTK's own writers where it has one.
-add_library(test_vtk_samples STATIC test_vtk_samples.cpp test_vtk_run.cpp)
-target_link_libraries(test_vtk_samples PUBLIC VTK::CommonDataModel PRIVATE insitu_flags VTK::IOParallel VTK::IOLegacy VTK::IOXML VTK::cgns)
+add_library(test_vtk_samples STATIC test_vtk_samples.cpp)
+target_link_libraries(test_vtk_samples PUBLIC test_vtk_run VTK::CommonDataModel PRIVATE insitu_quick_flags VTK::IOParallel VTK::IOLegacy VTK::IOXML VTK::cgns)
 
 add_executable(test_vtk_files test_vtk_files.cpp)
-target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_files insitu_flags PkgConfig::CMOCKA VTK::IOXML)
+target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_files insitu_quick_flags PkgConfig::CMOCKA VTK::IOXML)
 add_test(NAME vtk_files COMMAND test_vtk_files)
 insitu_add_long_test(vtk_files_cut_often test_vtk_files 2000)
 
 # Element types of Exodus files, and VTK's HDF files, where this VTK reads them.
 find_package(VTK 9.1 QUIET OPTIONAL_COMPONENTS exodusII hdf5)
 if(TARGET VTK::exodusII)
-  add_executable(test_vtk_exodus test_vtk_exodus.cpp test_vtk_run.cpp)
-  target_link_libraries(test_vtk_exodus PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA VTK::exodusII)
+  add_executable(test_vtk_exodus test_vtk_exodus.cpp)
+  target_link_libraries(test_vtk_exodus PRIVATE test_vtk_run insitu_render_files insitu_quick_flags PkgConfig::CMOCKA VTK::exodusII)
   add_test(NAME vtk_exodus COMMAND test_vtk_exodus)
   set_tests_properties(vtk_exodus PROPERTIES TIMEOUT 60)
 endif()
 
 if(TARGET VTK::hdf5)
-  add_executable(test_vtk_hdf test_vtk_hdf.cpp test_vtk_run.cpp)
-  target_link_libraries(test_vtk_hdf PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA VTK::hdf5)
+  add_executable(test_vtk_hdf test_vtk_hdf.cpp)
+  target_link_libraries(test_vtk_hdf PRIVATE test_vtk_run insitu_render_files insitu_quick_flags PkgConfig::CMOCKA VTK::hdf5)
   add_test(NAME vtk_hdf COMMAND test_vtk_hdf)
   set_tests_properties(vtk_hdf PROPERTIES TIMEOUT 60)
 endif()
@@ -46,7 +49,7 @@ endif()
 # library beside them.
 set(plain ${CMAKE_CURRENT_BINARY_DIR}/plain)
 add_library(plain_image MODULE plain_image.c)
-target_link_libraries(plain_image PRIVATE insitu_flags insitu_headers)
+target_link_libraries(plain_image PRIVATE insitu_quick_flags insitu_headers)
 set_target_properties(plain_image PROPERTIES PREFIX lib OUTPUT_NAME insitu_image LIBRARY_OUTPUT_DIRECTORY ${plain}/lib)
 add_custom_command(OUTPUT ${plain}/bin/insitu-render
   COMMAND ${CMAKE_COMMAND} -E copy $<TARGET_FILE:insitu-render> ${plain}/bin/insitu-render
@@ -56,7 +59,7 @@ add_custom_command(OUTPUT ${plain}/bin/insitu-render
 add_custom_target(plain_render ALL DEPENDS ${plain}/bin/insitu-render plain_image)
 
 add_executable(test_vtk_formats test_vtk_formats.cpp)
-target_link_libraries(test_vtk_formats PRIVATE test_vtk_samples insitu_flags PkgConfig::CMOCKA VTK::IOXML)
+target_link_libraries(test_vtk_formats PRIVATE test_vtk_samples insitu_quick_flags PkgConfig::CMOCKA VTK::IOXML)
 add_test(NAME vtk_formats COMMAND test_vtk_formats ${plain}/bin/insitu-render ${MPIEXEC_EXECUTABLE})
 insitu_add_long_test(vtk_formats_cut_often
   test_vtk_formats ${plain}/bin/insitu-render ${MPIEXEC_EXECUTABLE} 50 90 95 99)
@@ -64,29 +67,29 @@ insitu_add_long_test(vtk_formats_cut_often
 set_tests_properties(vtk_formats vtk_formats_cut_often PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300)
 
-add_executable(test_vtk_tool test_vtk_tool.cpp test_vtk_run.cpp)
-target_link_libraries(test_vtk_tool PRIVATE insitu_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
+add_executable(test_vtk_tool test_vtk_tool.cpp)
+target_link_libraries(test_vtk_tool PRIVATE test_vtk_run insitu_quick_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
 add_test(NAME vtk_tool COMMAND test_vtk_tool $<TARGET_FILE:insitu-render> ${plain}/bin/insitu-render
   ${MPIEXEC_EXECUTABLE})
 
-add_executable(test_vtk_images test_vtk_images.cpp test_vtk_run.cpp)
-target_link_libraries(test_vtk_images PRIVATE insitu_flags PkgConfig::CMOCKA)
+add_executable(test_vtk_images test_vtk_images.cpp)
+target_link_libraries(test_vtk_images PRIVATE test_vtk_run insitu_quick_flags PkgConfig::CMOCKA)
 insitu_add_split_test(vtk_images $<TARGET_FILE:test_vtk_images> ${plain}/bin/insitu-render ${MPIEXEC_EXECUTABLE})
 
-add_executable(test_vtk_default test_vtk_default.cpp test_vtk_run.cpp)
+add_executable(test_vtk_default test_vtk_default.cpp)
 target_include_directories(test_vtk_default SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
-target_link_libraries(test_vtk_default PRIVATE
-  insitu_flags PkgConfig::CMOCKA VTK::IOXML ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
+target_link_libraries(test_vtk_default PRIVATE test_vtk_run
+  insitu_quick_flags PkgConfig::CMOCKA VTK::IOXML ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
 add_test(NAME vtk_default COMMAND test_vtk_default $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
 
 # Real grids as the renderer's tests have their meshes. The C headers are not C++'s style, hence SYSTEM.
 add_library(test_data_mesh STATIC test_data_mesh.cpp test_vtk_session_stub.cpp)
 target_include_directories(test_data_mesh SYSTEM PRIVATE ${PROJECT_SOURCE_DIR}/libinsitu/base)
-target_link_libraries(test_data_mesh PRIVATE insitu_vtk_objects insitu_flags VTK::IOXML)
+target_link_libraries(test_data_mesh PRIVATE insitu_vtk_objects insitu_quick_flags VTK::IOXML)
 
 foreach(noun volumes polyhedra)
   add_executable(test_data_${noun} test_data_${noun}.c)
-  target_link_libraries(test_data_${noun} PRIVATE test_data_mesh test_render_support insitu_flags)
+  target_link_libraries(test_data_${noun} PRIVATE test_data_mesh test_render_support insitu_quick_flags)
   insitu_add_split_test(data_${noun} $<TARGET_FILE:test_data_${noun}>)
   set_tests_properties(data_${noun} PROPERTIES TIMEOUT 300)
   set_tests_properties(data_${noun} data_${noun}_whole PROPERTIES

@@ -50,9 +50,35 @@ static double clear_at(const kernel_piece *p, double x)
     return within(low + along * (high - low), 0, 1);
 }
 
+static double lesser(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static double greater(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static double extinction_of(double clear)
+{
+    return lesser(-log(greater(clear, 1e-300)), steepest);
+}
+
 static double extinction_at(const kernel_piece *p, double x)
 {
-    return fmin(-log(fmax(clear_at(p, x), 1e-300)), steepest);
+    return extinction_of(clear_at(p, x));
+}
+
+/* The last extinction that was needed: bins begin where the one before ended, and in many the function is constant. */
+typedef struct last_extinction {
+    double clear, extinction;
+} last_extinction;
+
+static double extinction_again(last_extinction *last, double clear)
+{
+    if (clear != last->clear) *last = (last_extinction){clear, extinction_of(clear)};
+    return last->extinction;
 }
 
 static double colour_at(const kernel_piece *p, double x, int c)
@@ -61,37 +87,42 @@ static double colour_at(const kernel_piece *p, double x, int c)
            (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_COLOUR_SLOPE + c);
 }
 
-/* Three Gauss nodes, on halves and halves of halves towards an opacity of 1. */
-static void integrate(const kernel_piece *p, double from, double to, int depth, double sum[CHANNELS])
+/* Three Gauss nodes, on halves and halves of halves towards an opacity of 1. Between equal ends clear_at() is constant.
+ */
+static void integrate(const kernel_piece *p, double from, double to, int depth, last_extinction *last,
+                      double sum[CHANNELS])
 {
     static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
     static const double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
     const double a = clear_at(p, from), b = clear_at(p, to), middle = 0.5 * (from + to);
-    if (depth < 40 && fabs(a - b) > 0.25 * fmax(a, b)) {
-        integrate(p, from, middle, depth + 1, sum);
-        integrate(p, middle, to, depth + 1, sum);
+    if (depth < 40 && fabs(a - b) > 0.25 * greater(a, b)) {
+        integrate(p, from, middle, depth + 1, last, sum);
+        integrate(p, middle, to, depth + 1, last, sum);
         return;
     }
     for (int i = 0; i < 3; i++) {
-        const double x = from + node[i] * (to - from), s = extinction_at(p, x) * weight[i] * (to - from);
+        const double x = from + node[i] * (to - from);
+        const double s = (a == b ? extinction_again(last, a) : extinction_at(p, x)) * weight[i] * (to - from);
         sum[0] += s;
         for (int c = 0; c < 3; c++) sum[1 + c] += s * colour_at(p, x, c);
     }
 }
 
-static void widen(bin_sums *bin, const kernel_piece *p, double x)
+static void widen(bin_sums *bin, const kernel_piece *p, double x, last_extinction *last)
 {
-    const double extinction = extinction_at(p, x);
-    bin->low = fmin(bin->low, extinction);
-    bin->high = fmax(bin->high, extinction);
+    const double extinction = extinction_again(last, clear_at(p, x));
+    bin->low = lesser(extinction, bin->low);
+    bin->high = greater(extinction, bin->high);
     for (int c = 0; c < 3; c++) {
-        bin->colour_low[c] = fmin(bin->colour_low[c], colour_at(p, x, c));
-        bin->colour_high[c] = fmax(bin->colour_high[c], colour_at(p, x, c));
+        const double colour = colour_at(p, x, c);
+        bin->colour_low[c] = lesser(colour, bin->colour_low[c]);
+        bin->colour_high[c] = greater(colour, bin->colour_high[c]);
     }
 }
 
 /* Integrates from begin to end. first is the piece that holds begin; returns the piece that holds end. */
-static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, bin_sums *bin)
+static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, last_extinction *last,
+                    bin_sums *bin)
 {
     *bin = (bin_sums){.low = INFINITY,
                       .high = -INFINITY,
@@ -99,11 +130,12 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
                       .colour_high = {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = first;; i++) {
         const kernel_piece *p = &pieces->pieces[i];
-        const double from = fmax(begin, entry_of(p, KERNEL_PIECE_LOW)), to = fmin(end, entry_of(p, KERNEL_PIECE_HIGH));
+        const double from = greater(begin, entry_of(p, KERNEL_PIECE_LOW)),
+                     to = lesser(end, entry_of(p, KERNEL_PIECE_HIGH));
         if (from < to) {
-            integrate(p, from, to, 0, bin->sum);
-            widen(bin, p, from);
-            widen(bin, p, to);
+            widen(bin, p, from, last);
+            integrate(p, from, to, 0, last, bin->sum);
+            widen(bin, p, to, last);
         }
         if (i + 1 == pieces->count || entry_of(p, KERNEL_PIECE_HIGH) >= end) return i;
     }
@@ -112,16 +144,17 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
 /* Before and behind all knots the function is constant; a width of it stands for what is endless. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
+    last_extinction last = {-1, 0}; /* of no clearness */
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
-        piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &bins[i]);
+        piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &last, &bins[i]);
     /* The border's rounding must not bring in a neighbour. */
     for (int end = 0; end < 2; end++) {
         const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
         bin_sums *bin = &bins[end ? count + 1 : 0];
         memset(bin->sum, 0, sizeof bin->sum);
-        integrate(p, x - 0.5 * width, x + 0.5 * width, 0, bin->sum);
+        integrate(p, x - 0.5 * width, x + 0.5 * width, 0, &last, bin->sum);
         bin->low = bin->high = extinction_at(p, x);
         for (int c = 0; c < 3; c++) bin->colour_low[c] = bin->colour_high[c] = colour_at(p, x, c);
     }
@@ -141,7 +174,7 @@ static int32_t pack_colour(const bin_sums *bin, double contrast)
 static double colour_change(const bin_sums *bin)
 {
     double change = 0;
-    for (int c = 0; c < 3; c++) change = fmax(change, bin->colour_high[c] - bin->colour_low[c]);
+    for (int c = 0; c < 3; c++) change = greater(bin->colour_high[c] - bin->colour_low[c], change);
     return change;
 }
 
