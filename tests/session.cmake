@@ -68,6 +68,9 @@ insitu_add_mpi_test(session_turns test_session_turns 1 3 WHOLE 8 ARGS ${CMAKE_CU
 insitu_session_program(test_session_smooth)
 insitu_add_mpi_test(session_smooth test_session_smooth 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_derived)
+insitu_add_mpi_test(session_derived test_session_derived 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_light)
 insitu_add_mpi_test(session_light test_session_light 1 3 WHOLE 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -162,6 +162,17 @@ static const char every_key[] =
     "  - {field: p, mesh: air, component: x, path: out/p.csv, every: 3, histogram: {bins: 8, range: [-1, 1]}}\n"
     "  - {field: q, path: q.CSV, histogram: {}}\n"
     "  - {field: r, path: r.csv}\n"
+    "fields:\n"
+    "  late: 2 * last.z - speed^2\n"
+    "  speed: {magnitude: u}\n"
+    "  last: {vorticity: [vx, u.1, late_w]}\n"
+    "  late_w: {expression: \"max(u.z, 'a b')\"}\n"
+    "  y: {field: u, component: y}\n"
+    "  g: {gradient: speed, component: magnitude}\n"
+    "  d: {divergence: u}\n"
+    "  q: {q_criterion: u}\n"
+    "  l: {lambda2: u}\n"
+    "  s: {strain_rate: u}\n"
     "writing: step\n"
     "schedule: radix\n";
 
@@ -1169,6 +1180,49 @@ static void scene_decorations_are_read(void **state)
     scene_free(&s);
 }
 
+static const scene_derived *find_derived(const scene *s, const char *name, int *at)
+{
+    for (*at = 0; *at < s->derived_count; ++*at)
+        if (strcmp(s->derived[*at].name, name) == 0) return &s->derived[*at];
+    fail_msg("no derived field %s", name);
+    return NULL;
+}
+
+static void derived_fields_are_sorted_and_read(void **state)
+{
+    (void)state;
+    scene s;
+    int late, speed, last, late_w, at;
+    parse_good(every_key, &s);
+    assert_int_equal(s.derived_count, 10);
+    const scene_derived *of = find_derived(&s, "late", &late);
+    find_derived(&s, "speed", &speed);
+    const scene_derived *curl = find_derived(&s, "last", &last);
+    find_derived(&s, "late_w", &late_w);
+    assert_true(late > last && late > speed && last > late_w);
+    assert_true(of->kind == SCENE_EXPRESSION && of->input_count == 2 && of->made_by[0] == last &&
+                of->made_by[1] == speed);
+    assert_true(of->inputs[0].component == 2 && of->inputs[1].component == SCENE_COMPONENT_ONLY);
+    int line = 1;
+    for (const char *c = every_key; c < strstr(every_key, "  late:"); c++) line += *c == '\n';
+    assert_int_equal(of->line, line);
+    assert_true(curl->kind == SCENE_VORTICITY && curl->component == SCENE_COMPONENT_DEFAULT && curl->input_count == 3);
+    assert_true(curl->made_by[0] == -1 && curl->inputs[1].component == 1 && curl->made_by[2] == late_w);
+    assert_string_equal(s.derived[late_w].inputs[1].name, "a b");
+    assert_true(s.derived[speed].inputs[0].component == SCENE_COMPONENT_MAGNITUDE);
+    assert_true(find_derived(&s, "y", &at)->inputs[0].component == 1);
+    assert_true(find_derived(&s, "g", &at)->component == SCENE_COMPONENT_MAGNITUDE);
+    assert_true(find_derived(&s, "d", &at)->kind == SCENE_DIVERGENCE &&
+                find_derived(&s, "q", &at)->kind == SCENE_Q_CRITERION);
+    assert_true(find_derived(&s, "l", &at)->kind == SCENE_LAMBDA2 &&
+                find_derived(&s, "s", &at)->kind == SCENE_STRAIN_RATE);
+    const double x[2] = {3, -1}, y[2] = {2, 0.5};
+    double stack[SCENE_STACK * SCENE_BLOCK];
+    scene_evaluate(&of->expression, (const double *const[]){x, y}, 2, stack);
+    assert_true(stack[0] == 2 && stack[1] == -2.25);
+    scene_free(&s);
+}
+
 static void schema_keys_have_help_and_defaults(void **state)
 {
     (void)state;
@@ -1202,6 +1256,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_every_failed_allocation_is_an_error_without_a_leak),
         cmocka_unit_test(scene_numbers_do_not_follow_the_locale),
         cmocka_unit_test(scene_texts_have_their_placeholders_replaced),
+        cmocka_unit_test(derived_fields_are_sorted_and_read),
         cmocka_unit_test(schema_keys_have_help_and_defaults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

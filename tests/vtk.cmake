@@ -110,3 +110,11 @@ set_tests_properties(manual_page PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONME
 add_test(NAME gallery COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/gallery.sh $<TARGET_FILE:insitu-render>
   ${PROJECT_SOURCE_DIR}/docs/gallery ${CMAKE_CURRENT_BINARY_DIR}/gallery)
 set_tests_properties(gallery PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 SKIP_RETURN_CODE 77)
+
+# Derived fields beside VTK's gradient filter.
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersGeneral)
+add_executable(test_derived_accuracy test_derived_accuracy.c test_derived_vtk.cpp)
+target_link_libraries(test_derived_accuracy PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA VTK::CommonCore
+  VTK::CommonDataModel VTK::CommonExecutionModel VTK::FiltersGeneral)
+insitu_add_split_test(derived_accuracy test_derived_accuracy)
+set_tests_properties(derived_accuracy PROPERTIES TIMEOUT 60)

@@ -11,12 +11,15 @@
 #include "session_changes.h"
 #include "session_check.h"
 #include "session_checksums.h"
+#include "session_derive.h"
+#include "session_derived.h"
 #include "session_distances.h"
 #include "session_draw.h"
 #include "session_empty_layers.h"
 #include "session_events.h"
 #include "session_filled.h"
 #include "session_guard.h"
+#include "session_indexed.h"
 #include "session_joints.h"
 #include "session_lines.h"
 #include "session_recentre.h"
@@ -45,7 +48,11 @@ static void reload_scene(insitu_session *s)
     s->catalogue.are_joined = s->catalogue.are_parts_known = false;
     session_forget_warnings(&s->report);
     session_text_add(&s->report.warnings, "the scene file was edited: its images are drawn from this step on");
-    for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
+    s->catalogue.are_derived = false;
+    for (int i = 0; i < s->meshes.count; i++) {
+        session_drop_scalars(s->meshes.items[i]);
+        session_drop_derived(s->meshes.items[i]);
+    }
 }
 
 /* Takes kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a face
@@ -66,6 +73,26 @@ static void warn_of_environment(const session_team *team, session_report *report
                      isa);
 }
 
+static session_derive_basis derive_basis(insitu_session *s)
+{
+    return (session_derive_basis){&s->scene_file.scene, &s->catalogue, &s->meshes, &s->team, &s->space.extent};
+}
+
+/* Makes the derived fields that statistics and conditions of the step want. Collective, agreed. */
+static insitu_status derive_for_events(insitu_session *s, const session_moment *moment, bool images, base_error *error)
+{
+    const scene *scene = &s->scene_file.scene;
+    const uint64_t needed = session_derived_of_events(scene, moment->cycle, images);
+    const session_derive_basis basis = derive_basis(s);
+    if (!needed) return INSITU_OK;
+    session_mark_sources(scene, needed, &s->meshes);
+    insitu_status status = session_agree(s->team.comm, error); /* the functions that fill fields may be collective */
+    if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
+    if (!error->status) session_copy_wanted(&s->meshes, s->team.threads, error);
+    if (!status) status = session_agree(s->team.comm, error);
+    return status ? status : session_derive(&basis, needed, error);
+}
+
 /* Finds the statistics that are due, and the images whose conditions hold. An error here does not keep images from
  * being drawn, and is returned afterwards. Collective. */
 static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
@@ -75,7 +102,8 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
     const bool images = session_count_due(basis->scene, moment) > 0;
     s->events.held = 0;
     if (session_has_events(basis->scene, moment->cycle, images) &&
-        session_check_event_fields(basis, images, error) == INSITU_OK)
+        session_check_event_fields(basis, images, error) == INSITU_OK &&
+        derive_for_events(s, moment, images, error) == INSITU_OK)
         session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, error);
     basis->let_images = session_let_images(&s->events, basis->scene);
 }
@@ -101,6 +129,11 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     return status;
 }
 
+static insitu_status name_derived(insitu_session *s, base_error *error)
+{
+    return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
+}
+
 /* Makes the plan; and another one without the images of fields that turn out to be wrong as their values are taken.
  * Collective. */
 static insitu_status make_plan(insitu_session *s, const session_plan_basis *basis, base_error *refused,
@@ -112,6 +145,7 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
         *error = (base_error){0};
         session_take_back(&s->meshes);
         status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, false, error);
+        if (!status) status = name_derived(s, error);
         if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
         if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
     }
@@ -148,13 +182,17 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
                                      changes->is_font_lacking};
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, refused, error);
+    if (!status) status = name_derived(s, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
+    const session_derive_basis derived = derive_basis(s);
+    if (!status) status = session_derive(&derived, session_derived_of_plan(basis.scene, &plan), error);
     if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan)))
         status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
-    if (!status) status = session_recentre(&plan, &s->meshes, team, error);
+    if (!status)
+        status = session_recentre(plan.recentrings, plan.recentring_count, plan.stale, &s->meshes, team, error);
     if (!status) status = session_smooth(&plan, &s->catalogue, &s->meshes, team, extent, error);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);

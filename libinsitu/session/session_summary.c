@@ -55,9 +55,10 @@ static void report_field(session_report *out, const session_mesh *mesh, int inde
     out->numbers.bytes_copied += copied;
     if (copied)
         session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" %s: %lld bytes", mesh->name, field->name,
-                         field->index.data   ? "by its index"
-                         : field->corner_row ? "in rows of corners"
-                                             : "at the corners of a torn mesh",
+                         mesh->fields[index].is_derived ? "derived from others"
+                         : field->index.data            ? "by its index"
+                         : field->corner_row            ? "in rows of corners"
+                                                        : "at the corners of a torn mesh",
                          (long long)copied);
     if (is_field_in_use(mesh, index))
         out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count +

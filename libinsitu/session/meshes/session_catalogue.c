@@ -38,6 +38,7 @@ static size_t append_mesh(char *text, size_t capacity, size_t at, const session_
     at = append_fault(text, capacity, at, &mesh->problem);
     for (int f = 0; f < mesh->field_count; f++) {
         const insitu_field *field = &mesh->fields[f].given;
+        if (mesh->fields[f].is_derived) continue;
         at = append_line(text, capacity, at, 'f', field->component_count, (int)field->centring, field->name);
         at = append_fault(text, capacity, at, &mesh->fields[f].problem);
     }
@@ -65,11 +66,14 @@ uint64_t session_names_hash(const session_meshes *meshes)
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
         if (!mesh->is_given) continue;
-        const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, mesh->field_count};
+        int given_count = 0;
+        for (int f = 0; f < mesh->field_count; f++) given_count += !mesh->fields[f].is_derived;
+        const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, given_count};
         session_hash_bytes(&hash, head, sizeof head);
         session_hash_text(&hash, mesh->name);
         for (int f = 0; f < mesh->field_count; f++) {
             const insitu_field *field = &mesh->fields[f].given;
+            if (mesh->fields[f].is_derived) continue;
             const int tail[] = {field->component_count, (int)field->centring};
             session_hash_bytes(&hash, tail, sizeof tail);
             session_hash_text(&hash, field->name);
@@ -202,8 +206,12 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
     if (!fields) return NULL;
     mesh->fields = fields;
     session_catalogue_field *field = &fields[mesh->field_count];
-    *field = (session_catalogue_field){
-        .name = base_strdup(name), .first_rank = -1, .last_rank = -1, .odd_rank = -1, .lacking_rank = mesh->first_rank};
+    *field = (session_catalogue_field){.name = base_strdup(name),
+                                       .first_rank = -1,
+                                       .last_rank = -1,
+                                       .odd_rank = -1,
+                                       .lacking_rank = mesh->first_rank,
+                                       .derived = -1};
     if (!field->name) return NULL;
     mesh->field_count++;
     return field;
@@ -301,6 +309,37 @@ static void sort_fields(const session_catalogue *catalogue)
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         if (mesh->field_count) qsort(mesh->fields, (size_t)mesh->field_count, sizeof *mesh->fields, by_field_name);
     }
+}
+
+session_catalogue_field *session_catalogue_add(session_catalogue_mesh *mesh, const char *name, int component_count,
+                                               insitu_centring centring, int derived)
+{
+    session_catalogue_field *field = add_field(mesh, name);
+    if (!field) return NULL;
+    field->component_count = component_count;
+    field->centring = centring;
+    field->derived = derived;
+    field->first_rank = mesh->first_rank;
+    field->lacking_rank = -1;
+    return field;
+}
+
+void session_catalogue_drop_derived(session_catalogue *catalogue)
+{
+    for (int i = 0; i < catalogue->mesh_count; i++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[i];
+        int kept = 0;
+        for (int f = 0; f < mesh->field_count; f++) {
+            if (mesh->fields[f].derived < 0) {
+                mesh->fields[kept++] = mesh->fields[f];
+                continue;
+            }
+            base_free(mesh->fields[f].name);
+            base_free(mesh->fields[f].fault);
+        }
+        mesh->field_count = kept;
+    }
+    catalogue->are_derived = false;
 }
 
 /* ---- over all ranks ------------------------------------------------------------------------------------------ */

@@ -15,6 +15,7 @@ typedef struct session_catalogue_field {
     int last_rank;     /* that has it together with cells; -1: none */
     int odd_rank;      /* -1, or one that has it with another centring or count of components */
     int lacking_rank;  /* -1, or one that has cells of the mesh but not the field */
+    int derived;       /* which of the scene's derived fields it is; -1: the caller's */
     base_error *fault; /* what is wrong with it on some rank, the lowest; NULL: nothing */
 } session_catalogue_field;
 
@@ -82,6 +83,7 @@ typedef struct session_joint {
 typedef struct session_catalogue {
     bool is_known;        /* by a step before this one */
     bool has_faults;      /* anywhere in it */
+    bool are_derived;     /* the derived fields of the present scene are in it */
     bool are_joined;      /* joints are those of the present scene */
     bool are_parts_known; /* the meshes' cells and places are the present ones */
     base_error *fault;    /* of which it is not known what is wrong with it: no image can be drawn */
@@ -117,6 +119,12 @@ void session_hanging_free(session_hanging *hanging, int count, bool with_borders
 
 /* A hash of this rank's names: equal on two ranks when their tables say the same. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);
+
+/* Adds a field that all ranks with cells of the mesh have; there is none of the name. NULL where memory ran out. */
+session_catalogue_field *session_catalogue_add(session_catalogue_mesh *mesh, const char *name, int component_count,
+                                               insitu_centring centring, int derived);
+/* Removes the derived fields. */
+void session_catalogue_drop_derived(session_catalogue *catalogue);
 
 /* NULL: no rank has the field. Local. */
 const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name);

@@ -125,6 +125,7 @@ void session_drop_copy(session_field *field)
     field->copy = NULL;
     field->copy_bytes = 0;
     field->is_copy_stale = true;
+    field->made_of = 0;
 }
 
 void session_drop_fields(session_mesh *mesh)
@@ -137,6 +138,24 @@ void session_drop_fields(session_mesh *mesh)
     base_free(mesh->fields);
     mesh->fields = NULL;
     mesh->field_count = 0;
+}
+
+void session_drop_derived(session_mesh *mesh)
+{
+    int kept = 0;
+    for (int i = 0; i < mesh->field_count; i++) {
+        session_field *field = &mesh->fields[i];
+        if (!field->is_derived) {
+            mesh->fields[kept++] = *field;
+            continue;
+        }
+        base_free((void *)(uintptr_t)field->given.name);
+        session_drop_copy(field);
+    }
+    if (kept == mesh->field_count) return;
+    mesh->field_count = kept;
+    session_drop_scalars(mesh);
+    session_drop_outers(mesh, true);
 }
 
 void session_drop_outer(session_outer *outer, bool with_faces)
@@ -218,6 +237,7 @@ void session_drop_contents(session_mesh *mesh)
 void session_refuse_mesh(session_mesh *mesh)
 {
     drop_cells(mesh);
+    session_drop_derived(mesh);
     for (int i = 0; i < mesh->field_count; i++) {
         session_field *field = &mesh->fields[i];
         const char *name = field->given.name;

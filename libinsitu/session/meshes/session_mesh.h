@@ -18,6 +18,10 @@ typedef struct session_field {
     bool is_wanted;     /* by statistics of this step; fields of images have scalars */
     bool is_filled;     /* given.fill has made the values in this step, unless it failed: */
     base_error fill_problem;
+    bool is_derived;       /* the session makes it of other fields, in copy (plan/session_derived.h) */
+    bool is_source;        /* a derived field that this step needs is made of it */
+    uint64_t made_of;      /* of derived ones: a hash of what the values were made of; 0: there are none yet */
+    int64_t version;       /* of the values: one more after each change that is known of */
     insitu_patch *patches; /* given.patches, a table of ours */
     char *copy;            /* NULL until made; packed tuples, components interleaved */
     int64_t copy_bytes;
@@ -52,6 +56,7 @@ typedef struct session_scalar {
     int component; /* as grid_field.component */
     bool is_recentred;
     uint64_t joined;    /* of recentred ones: scene_field.joined */
+    int64_t made;       /* how often their values were made */
     uint64_t of_places; /* the session_joint.places that they were made of */
     bool is_used;       /* by an image of this step */
     bool wants_ranges;  /* by an image of this step: colours need none */
@@ -264,6 +269,8 @@ void session_drop_torn(session_torn *torn);
 void session_drop_axes(session_lattice *lattice);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
+/* Removes the derived fields, and with them all scalars and thresholds, which go by the numbers of fields. */
+void session_drop_derived(session_mesh *mesh);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
 void session_drop_outer(session_outer *outer, bool with_faces);
 /* Drops all outer surfaces of a mesh; where cells are new, thresholds go too. */

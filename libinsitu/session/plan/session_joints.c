@@ -5,8 +5,20 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-static bool is_member(const session_catalogue_mesh *mesh, const scene_field *field)
+/* What meshes are joined for: a layer's field, or the gradients of a derived one. */
+typedef struct join_wish {
+    const scene_field *field; /* NULL: derived */
+    int derived;
+} join_wish;
+
+static bool is_member(const session_catalogue_mesh *mesh, const join_wish *wish)
 {
+    const scene_field *field = wish->field;
+    if (!field) {
+        for (int f = 0; f < mesh->field_count; f++)
+            if (mesh->fields[f].derived == wish->derived) return true;
+        return false;
+    }
     const session_catalogue_field *found =
         scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
     return found && session_is_recentred(field, found->centring);
@@ -38,16 +50,16 @@ static bool set_apart(session_catalogue *catalogue, session_catalogue_mesh *mesh
     return true;
 }
 
-/* Names the joint of a layer's meshes, those with ids left out, and adds it where it is new. */
-static bool join_field(session_catalogue *catalogue, scene_field *field)
+/* Names the joint of the meshes, those with ids left out, and adds it where it is new. */
+static bool join(session_catalogue *catalogue, const join_wish *wish, uint64_t *joined)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     bool is_done = true;
     int count = 0;
-    field->joined = 0;
-    for (int m = 0; m < catalogue->mesh_count && field->name && is_done; m++) {
+    *joined = 0;
+    for (int m = 0; m < catalogue->mesh_count && is_done; m++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        if (!is_member(mesh, field)) continue;
+        if (!is_member(mesh, wish)) continue;
         if (mesh->apart) {
             is_done = set_apart(catalogue, mesh);
             continue;
@@ -56,13 +68,29 @@ static bool join_field(session_catalogue *catalogue, scene_field *field)
         count++;
     }
     if (!count || !is_done) return is_done;
-    field->joined = hash | 1;
-    if (session_find_joint(catalogue, field->joined)) return true;
-    session_joint *joint = add_joint(catalogue, field->joined, count);
+    *joined = hash | 1;
+    if (session_find_joint(catalogue, *joined)) return true;
+    session_joint *joint = add_joint(catalogue, *joined, count);
     for (int m = 0; m < catalogue->mesh_count && joint; m++)
-        if (!catalogue->meshes[m].apart && is_member(&catalogue->meshes[m], field))
+        if (!catalogue->meshes[m].apart && is_member(&catalogue->meshes[m], wish))
             joint->meshes[joint->count++] = &catalogue->meshes[m];
     return joint != NULL;
+}
+
+static bool join_field(session_catalogue *catalogue, scene_field *field)
+{
+    const join_wish wish = {field, -1};
+    field->joined = 0;
+    return !field->name || join(catalogue, &wish, &field->joined);
+}
+
+static bool join_derived(session_catalogue *catalogue, scene *scene, int number)
+{
+    scene_derived *derived = &scene->derived[number];
+    const join_wish wish = {NULL, number};
+    bool is_done = join(catalogue, &wish, &derived->joined);
+    for (int k = 0; k < derived->input_count && is_done; k++) is_done = join_field(catalogue, &derived->inputs[k]);
+    return is_done;
 }
 
 /* Meshes with ids are joints of their own. */
@@ -109,6 +137,7 @@ void session_join_meshes(scene *scene, session_catalogue *catalogue, session_mes
     find_apart(catalogue, meshes);
     for (int i = 0; i < scene->image_count && is_done; i++)
         if (scene->images[i].variant.view == 0) is_done = join_image(catalogue, &scene->images[i]);
+    for (int i = 0; i < scene->derived_count && is_done; i++) is_done = join_derived(catalogue, scene, i);
     if (is_done)
         drop_other_scalars(catalogue, meshes);
     else

@@ -8,8 +8,10 @@
 
 #include "memory.h"
 #include "render.h"
+#include "scene_shorthand.h"
 #include "session_agree.h"
 #include "session_candidates.h"
+#include "session_derived.h"
 #include "session_events.h"
 #include "session_filled.h"
 #include "session_indexed.h"
@@ -59,10 +61,54 @@ static const base_error *find_hidden(const session_plan_basis *basis, const scen
     return NULL;
 }
 
+static bool is_anywhere(const session_catalogue *catalogue, const char *name)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        if (session_catalogue_find(&catalogue->meshes[m], name)) return true;
+    return false;
+}
+
+/* The field's name that was probably meant, in words; "" if none is near. */
+static void word_meant(const session_catalogue *catalogue, const char *name, char words[300])
+{
+    const char *candidates[256];
+    int count = 0;
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        for (int f = 0; f < catalogue->meshes[m].field_count && count < 256; f++)
+            candidates[count++] = catalogue->meshes[m].fields[f].name;
+    const char *meant = scene_nearest_word(name, candidates, count);
+    words[0] = '\0';
+    if (meant) snprintf(words, 300, " (did you mean %.255s?)", meant);
+}
+
+/* Refuses a derived field that is on no mesh, by what it is made of and no mesh has. */
+static insitu_status refuse_sources(const session_plan_basis *basis, const scene_field *field, base_error *error)
+{
+    char names[NAMES_SIZE], meant[300];
+    const int number = session_find_derived(basis->scene, field->name);
+    const scene_derived *derived = number < 0 ? NULL : &basis->scene->derived[number];
+    if (!derived) return INSITU_OK;
+    for (int k = 0; k < derived->input_count; k++) {
+        const scene_field *input = &derived->inputs[k];
+        if (is_anywhere(basis->catalogue, input->name)) continue;
+        if (refuse_fault(find_hidden(basis, input), error) || refuse_sources(basis, input, error)) return error->status;
+        list_fields(basis->catalogue, names);
+        word_meant(basis->catalogue, input->name, meant);
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "%s:%d: fields.%s: no mesh has the field \"%s\"%s, of which it is made; there are: %s",
+                         basis->scene_path, derived->line, derived->name, input->name, meant, names);
+    }
+    list_fields(basis->catalogue, names);
+    return base_fail(error, INSITU_ERROR_FIELD,
+                     "%s:%d: fields.%s: no mesh has all the fields that it is made of; there are: %s",
+                     basis->scene_path, derived->line, derived->name, names);
+}
+
 static insitu_status refuse_missing(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE];
     if (refuse_fault(find_hidden(basis, field), error)) return error->status;
+    if (refuse_sources(basis, field, error)) return error->status;
     list_fields(basis->catalogue, names);
     return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"; there are: %s", basis->scene_path,
                      field->line, field->name, names);
@@ -413,6 +459,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     warn_of_no_cells(basis, plan.image_count > 0, report);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
+    if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =
         basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* taking the values may be collective */

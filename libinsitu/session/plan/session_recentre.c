@@ -542,6 +542,7 @@ static void keep_means(const vertex_groups *groups, const session_joint *joint, 
         if (!scalar) continue;
         spread_means(groups, i, threads);
         scalar->are_values_stale = false;
+        scalar->made++;
         scalar->of_places = joint->places;
         scalar->is_suspect = true;
     }
@@ -577,21 +578,14 @@ static bool is_stale(const session_recentring *item, const session_meshes *meshe
     return false;
 }
 
-/* Finds the recentrings whose values are stale on some rank. Collective. */
-static insitu_status find_stale(const session_plan *plan, const session_meshes *meshes, const session_team *team,
-                                int *stale, base_error *error)
+insitu_status session_recentre(const session_recentring *items, int count, int *stale, const session_meshes *meshes,
+                               const session_team *team, base_error *error)
 {
-    const int count = plan->recentring_count;
-    for (int i = 0; i < count; i++) stale[i] = is_stale(&plan->recentrings[i], meshes);
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
-}
-
-insitu_status session_recentre(const session_plan *plan, const session_meshes *meshes, const session_team *team,
-                               base_error *error)
-{
-    if (plan->recentring_count == 0) return INSITU_OK;
-    insitu_status status = find_stale(plan, meshes, team, plan->stale, error);
-    for (int i = 0; i < plan->recentring_count && !status; i++)
-        if (plan->stale[i]) status = recentre(&plan->recentrings[i], meshes, team, error);
+    if (count == 0) return INSITU_OK;
+    for (int i = 0; i < count; i++) stale[i] = is_stale(&items[i], meshes);
+    insitu_status status =
+        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+    for (int i = 0; i < count && !status; i++)
+        if (stale[i]) status = recentre(&items[i], meshes, team, error);
     return status;
 }

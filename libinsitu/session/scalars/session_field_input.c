@@ -184,8 +184,9 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
     return status;
 }
 
-static void spoil_scalars(session_mesh *mesh, int field)
+void session_spoil_scalars(session_mesh *mesh, int field)
 {
+    mesh->fields[field].version++;
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (scalar->field != field) continue;
@@ -263,9 +264,10 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
     if (is_other) {
         /* The scalars' components may have changed their meaning. */
         session_drop_scalars(mesh);
+        field->version++;
         meshes->are_names_changed = true;
     } else if (is_stale) {
-        spoil_scalars(mesh, index);
+        session_spoil_scalars(mesh, index);
     }
     read_values(mesh, field, given, is_other, is_stale);
     field->problem = (base_error){0};
@@ -281,6 +283,11 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     }
     base_error what = {0};
     session_field *field = &mesh->fields[index];
+    if (field->is_derived) {
+        /* The caller takes the name of a derived field: session_name_derived() tells. */
+        session_drop_copy(field);
+        *field = (session_field){.given = {.name = field->given.name}};
+    }
     if (check_field(mesh, given, &what) == INSITU_OK) {
         const bool is_same = is_same_place(&field->given, given);
         if (copy_patches(field, given, &what)) {
@@ -347,6 +354,6 @@ insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_fi
     read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
-    if (filled->changed & INSITU_CHANGED_VALUES) spoil_scalars(mesh, index);
+    if (filled->changed & INSITU_CHANGED_VALUES) session_spoil_scalars(mesh, index);
     return INSITU_OK;
 }

@@ -11,6 +11,9 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, const 
  * field. Local. */
 insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
 
+/* The field's values have changed: so have those of its scalars. */
+void session_spoil_scalars(session_mesh *mesh, int field);
+
 /* Counts the entries of connectivity that are vertices of cells. The cells are no polyhedra. */
 int64_t session_corner_count(const insitu_mesh *mesh);
 /* Returns how many values the field has, or, where it has an index, how many entries the index has. For corners in rows

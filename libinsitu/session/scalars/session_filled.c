@@ -5,7 +5,7 @@
 
 static bool is_needed(const session_mesh *mesh, int index, bool of_images)
 {
-    bool is_used = !of_images && mesh->fields[index].is_wanted;
+    bool is_used = mesh->fields[index].is_source || (!of_images && mesh->fields[index].is_wanted);
     for (int i = 0; i < mesh->scalar_count && of_images; i++)
         is_used = is_used || (mesh->scalars[i].is_used && mesh->scalars[i].field == index);
     return is_used;
@@ -66,7 +66,7 @@ void session_forget_filled(const session_meshes *meshes)
     for (int m = 0; m < meshes->count; m++)
         for (int f = 0; f < meshes->items[m]->field_count; f++) {
             session_field *field = &meshes->items[m]->fields[f];
-            field->is_wanted = false;
+            field->is_wanted = field->is_source = false;
             if (field->is_problem_of_contents) field->problem = (base_error){0};
             field->is_problem_of_contents = false;
             if (!field->given.fill) continue;

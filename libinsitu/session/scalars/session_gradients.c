@@ -1,19 +1,24 @@
 /* Every corner of a cell gives the gradient of the linear function through the corner's value and those at the other
  * ends of its three edges. A pyramid's apex has four edges, and gives one for each three of them. A corner of a
  * polyhedron's face gives one by its two edges there and the line to the cell's centre, which has the mean of the
- * vertices' places and values. So a linear field has its own gradient everywhere, and vertices on a boundary get theirs
- * from the cells on one side.
+ * vertices' places and values. A corner of a shell gives one by its two edges and a normal along which nothing changes.
+ * So a linear field has its own gradient everywhere, and vertices on a boundary get theirs from the cells on one side.
  *
  * A corner's weight is its determinant over the fourth power of its edges' length l = sqrt(|a|² + |b|² + |c|²). The
  * share of the determinant in l³ tells a good shape from a sliver, which counts for nothing; 1 / l weighs small cells
  * more, whose gradients belong to nearer places. In a mesh whose cells double their size at a vertex the errors of
  * first order cancel. Weight times gradient is a sum of cross products: nothing is divided by a determinant.
  *
- * Edges are taken in the order of coordinates, and each corner's numbers are rounded to whole ones, with 87 bits below
- * the largest of all ranks, before they are summed. So the order of cells, of their vertices and of ranks does not
- * matter. 2^19 corners have room at one vertex. */
+ * Edges are taken in the order of coordinates, and each corner's numbers are rounded to whole ones before they are
+ * summed. So the order of cells, of their vertices and of ranks does not matter. The unit follows from bounds that all
+ * ranks share: with R the largest rise along an edge and l the least length of a corner, no weight is above 3^-1.5 / l,
+ * and no weighted gradient above R / l²: a cross product of two edges is at most half of their squares' sum, so that
+ * three, times rises of at most R, come to R l². The last bit is 2^-86 of the bound, so that fields that change little
+ * from vertex to vertex keep what doubles hold. Corners shorter than 2^-32 of the scene count for nothing, since a unit
+ * for them would be too coarse for all others. 2^19 corners have room at one vertex. */
 #include "session_gradients.h"
 
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,43 +26,37 @@
 #include "region.h"
 #include "vector3.h"
 
-enum { HIGH_BITS = 43 };
-#define LOW_UNIT 0x1p44 /* of low words, in a high one's last bit */
+enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
+#define LOW_UNIT 0x1p44      /* of low words, in a high one's last bit */
+#define LEAST_SQUARE 0x1p-64 /* of a corner's edges, in lengths */
+#define ROUNDING_SHIFT                                                                                                 \
+    0x1.8p52 /* added to a number below 2^51, it leaves the nearest whole number in the last bits                      \
+              */
 
 typedef struct node {
-    double at[3], value;
+    double at[3], values[SESSION_GRADIENTS];
     int64_t vertex;
 } node;
 
-/* The receiver of corners: it sums them, or without sums finds the largest. */
+/* Pairs of numbers that are rounded and summed at once. */
+typedef double number_pair __attribute__((vector_size(16)));
+typedef int64_t word_pair __attribute__((vector_size(16)));
+
+/* The receiver of corners: it sums them, or without sums finds their bounds. */
 typedef struct target {
     const session_gradient_basis *basis;
-    session_gradient_sum *sums;
-    double scale;   /* of coordinates: a power of two */
-    double unit[2]; /* of the components and of the weights, one more than the last bit of a high word */
-    double largest[2];
+    int64_t *sums;
+    unsigned char *owners; /* of each sum, the thread that adds to it; NULL: there is one thread */
+    unsigned char owner;   /* this thread's */
+    double scale;          /* of coordinates: a power of two */
+    number_pair units[MOST_NUMBERS / 2];
+    session_gradient_bounds bounds;
 } target;
 
 /* ---- whole numbers ------------------------------------------------------------------------------------------- */
 
-/* The nearest whole number of one below 2^51, without a call. */
-static inline double round_whole(double number)
-{
-    const double shift = 0x1.8p52;
-    return (number + shift) - shift;
-}
-
-static inline void add_number(int64_t words[2], double number, double unit)
-{
-    const double scaled = number * unit, high = round_whole(scaled);
-    const int64_t of_high = (int64_t)high, of_low = (int64_t)round_whole((scaled - high) * LOW_UNIT);
-#pragma omp atomic
-    words[0] += of_high;
-#pragma omp atomic
-    words[1] += of_low;
-}
-
-/* The power of two by which numbers up to largest come to HIGH_BITS bits; 0, so that all are 0, where there is none. */
+/* Returns the power of two by which numbers up to largest come to HIGH_BITS bits; 0, so that all are 0, where there is
+ * none. */
 static double unit_of(double largest)
 {
     int exponent = 0;
@@ -66,66 +65,157 @@ static double unit_of(double largest)
     return largest > 0 && isfinite(unit) ? unit : 0;
 }
 
-static void give(target *to, int64_t vertex, const double weighted[3], double weight)
+static void find_units(const session_gradient_bounds *bounds, double units[2])
 {
-    const int32_t entry = to->basis->entries[vertex];
-    if (entry < 0 || !(weight > 0) || !isfinite(weighted[0] + weighted[1] + weighted[2]) || !isfinite(weight)) return;
-    if (!to->sums) {
-        for (int a = 0; a < 3; a++)
-            if (fabs(weighted[a]) > to->largest[0]) to->largest[0] = fabs(weighted[a]);
-        if (weight > to->largest[1]) to->largest[1] = weight;
-        return;
-    }
-    int64_t *words = to->sums[entry].words;
-    for (int a = 0; a < 3; a++) add_number(words + 2 * a, weighted[a], to->unit[0]);
-    add_number(words + 6, weight, to->unit[1]);
+    units[0] = unit_of(bounds->rise * bounds->sharpness);
+    units[1] = unit_of(0.2 * sqrt(bounds->sharpness));
 }
 
-void session_mean_gradient(const session_gradient_sum *sum, float out[3])
+static inline word_pair words_of(number_pair whole_with_shift)
 {
-    double numbers[4];
-    for (int i = 0; i < 4; i++) numbers[i] = (double)sum->words[2 * i] * LOW_UNIT + (double)sum->words[2 * i + 1];
-    for (int a = 0; a < 3; a++) out[a] = numbers[3] > 0 ? (float)(numbers[a] / numbers[3]) : 0;
+    word_pair words, shift;
+    const number_pair shifts = {ROUNDING_SHIFT, ROUNDING_SHIFT};
+    memcpy(&words, &whole_with_shift, sizeof words);
+    memcpy(&shift, &shifts, sizeof shift);
+    return words - shift;
+}
+
+static void add_shared(int64_t *to, word_pair words)
+{
+    for (int i = 0; i < 2; i++) {
+#pragma omp atomic
+        to[i] += words[i];
+    }
+}
+
+/* Adds numbers, two at a time, to a sum's words. */
+static inline __attribute__((always_inline)) void add_numbers(const target *to, int32_t entry,
+                                                              const number_pair *numbers, int pairs)
+{
+    const number_pair shift = {ROUNDING_SHIFT, ROUNDING_SHIFT}, low_unit = {LOW_UNIT, LOW_UNIT};
+    int64_t *sum = to->sums + (int64_t)entry * 4 * pairs;
+    const bool is_own = !to->owners || to->owners[entry] == to->owner;
+    for (int i = 0; i < pairs; i++) {
+        const number_pair scaled = numbers[i] * to->units[i], high = scaled + shift;
+        const number_pair low = (scaled - (high - shift)) * low_unit + shift;
+        word_pair of_high = words_of(high), of_low = words_of(low);
+        if (is_own) {
+            word_pair words[2];
+            memcpy(&words[0], sum + 2 * i, sizeof of_high);
+            memcpy(&words[1], sum + 2 * (pairs + i), sizeof of_low);
+            words[0] += of_high;
+            words[1] += of_low;
+            memcpy(sum + 2 * i, &words[0], sizeof of_high);
+            memcpy(sum + 2 * (pairs + i), &words[1], sizeof of_low);
+        } else {
+            add_shared(sum + 2 * i, of_high);
+            add_shared(sum + 2 * (pairs + i), of_low);
+        }
+    }
+}
+
+void session_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds, double length,
+                            double out[][3])
+{
+    const int count = session_sum_numbers(field_count);
+    double units[2], numbers[MOST_NUMBERS];
+    find_units(bounds, units);
+    for (int i = 0; i < count; i++) numbers[i] = (double)sum[i] * LOW_UNIT + (double)sum[count + i];
+    const double weight = numbers[3 * field_count];
+    const double scale = units[0] > 0 ? units[1] / units[0] / length : 0;
+    for (int f = 0; f < field_count; f++)
+        for (int a = 0; a < 3; a++) out[f][a] = weight > 0 ? numbers[3 * f + a] / weight * scale : (double)NAN;
 }
 
 /* ---- corners ------------------------------------------------------------------------------------------------- */
 
-static bool is_before(const node *a, const node *b)
+static inline bool is_before(const node *a, const node *b)
 {
-    for (int axis = 0; axis < 3; axis++)
-        if (a->at[axis] != b->at[axis]) return a->at[axis] < b->at[axis];
-    return false;
+    if (a->at[0] != b->at[0]) return a->at[0] < b->at[0];
+    if (a->at[1] != b->at[1]) return a->at[1] < b->at[1];
+    return a->at[2] < b->at[2];
 }
 
-/* Adds a corner. Mirrored ends change the signs of both the sum and the determinant. */
-static void give_corner(target *to, const node *corner, const node *p, const node *q, const node *r)
+static inline __attribute__((always_inline)) void bound_corner(target *to, double squares,
+                                                               const double rise[3][SESSION_GRADIENTS], int field_count)
 {
-    const node *swap, *ends[3] = {p, q, r};
-    double edge[3][3], rise[3], normal[3][3], weighted[3], squares = 0;
-    if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
-    if (is_before(ends[2], ends[1])) swap = ends[1], ends[1] = ends[2], ends[2] = swap;
-    if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
-    for (int i = 0; i < 3; i++) {
-        rise[i] = ends[i]->value - corner->value;
-        for (int a = 0; a < 3; a++) {
-            edge[i][a] = (ends[i]->at[a] - corner->at[a]) * to->scale;
-            squares += edge[i][a] * edge[i][a];
-        }
+    for (int i = 0; i < 3; i++)
+        for (int f = 0; f < field_count; f++)
+            if (fabs(rise[i][f]) > to->bounds.rise) to->bounds.rise = fabs(rise[i][f]);
+    if (1 / squares > to->bounds.sharpness) to->bounds.sharpness = 1 / squares;
+}
+
+/* Adds a corner by its three edges, which are in order, and how much the fields rise along them. Mirrored ends change
+ * the signs of both the sum and the determinant. */
+static inline __attribute__((always_inline)) void give_edges(target *to, int64_t vertex, const double edge[3][3],
+                                                             const double rise[3][SESSION_GRADIENTS], int field_count)
+{
+    const int pairs = session_sum_numbers(field_count) / 2;
+    double normal[3][3], squares = 0;
+    union {
+        double numbers[MOST_NUMBERS];
+        number_pair pairs[MOST_NUMBERS / 2];
+    } out = {{0}};
+    const int32_t entry = to->basis->entries[vertex];
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) squares += edge[i][a] * edge[i][a];
+    if (entry < 0 || !(squares >= LEAST_SQUARE)) return;
+    if (!to->sums) {
+        bound_corner(to, squares, rise, field_count);
+        return;
     }
     for (int i = 0; i < 3; i++) vector3_cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal[i]);
     const double volume = (edge[0][0] * normal[0][0] + edge[0][1] * normal[0][1]) + edge[0][2] * normal[0][2];
     const double scale = (volume < 0 ? -1 : 1) / (squares * squares);
-    for (int a = 0; a < 3; a++)
-        weighted[a] = ((rise[0] * normal[0][a] + rise[1] * normal[1][a]) + rise[2] * normal[2][a]) * scale;
-    give(to, corner->vertex, weighted, volume * scale);
+    double sum = out.numbers[3 * field_count] = volume * scale;
+    for (int f = 0; f < field_count; f++)
+        for (int a = 0; a < 3; a++)
+            sum += out.numbers[3 * f + a] =
+                ((rise[0][f] * normal[0][a] + rise[1][f] * normal[1][a]) + rise[2][f] * normal[2][a]) * scale;
+    if (out.numbers[3 * field_count] > 0 && isfinite(sum)) add_numbers(to, entry, out.pairs, pairs);
 }
 
-static bool take_node(const session_gradient_basis *basis, int64_t vertex, node *out)
+static inline __attribute__((always_inline)) void give_corner(target *to, const node *corner, const node *p,
+                                                              const node *q, const node *r, int field_count)
 {
-    grid_vertex(basis->cells, vertex, out->at);
-    out->value = grid_field_value(basis->field, vertex);
+    const node *swap, *ends[3] = {p, q, r};
+    double edge[3][3], rise[3][SESSION_GRADIENTS];
+    if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
+    if (is_before(ends[2], ends[1])) swap = ends[1], ends[1] = ends[2], ends[2] = swap;
+    if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
+    for (int i = 0; i < 3; i++) {
+        for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
+        for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->at[a] - corner->at[a];
+    }
+    give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
+}
+
+/* As above, of a shell: the third edge is the normal, as long as the others. It has either sign. */
+static void give_shell_corner(target *to, const node *corner, const node *p, const node *q)
+{
+    const int field_count = to->basis->field_count;
+    const bool is_swapped = is_before(q, p);
+    const node *ends[2] = {is_swapped ? q : p, is_swapped ? p : q};
+    double edge[3][3], rise[3][SESSION_GRADIENTS] = {{0}};
+    for (int i = 0; i < 2; i++) {
+        for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
+        for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->at[a] - corner->at[a];
+    }
+    vector3_cross(edge[0], edge[1], edge[2]);
+    const double area = sqrt(vector3_dot(edge[2], edge[2])), scale = 1 / sqrt(area);
+    for (int a = 0; a < 3; a++) edge[2][a] *= scale;
+    give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
+}
+
+/* Reads a vertex, in lengths; false where a value is not finite. */
+static inline __attribute__((always_inline)) bool take_node(const session_gradient_basis *basis, int64_t vertex,
+                                                            double scale, int field_count, node *out)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) out->at[a] = grid_array_number(&basis->cells->coordinates[a], vertex) * scale;
+    for (int f = 0; f < field_count; f++) sum += out->values[f] = grid_field_value(&basis->fields[f], vertex);
     out->vertex = vertex;
-    return isfinite(out->value);
+    return isfinite(sum);
 }
 
 /* Corners of cells of a fixed number of vertices: the corner, and the ends of three edges. */
@@ -137,32 +227,48 @@ static const signed char wedge_corners[][4] = {{0, 1, 2, 3}, {1, 0, 2, 4}, {2, 0
 static const signed char pyramid_corners[][4] = {{0, 1, 3, 4}, {1, 0, 2, 4}, {2, 1, 3, 4}, {3, 0, 2, 4},
                                                  {4, 0, 1, 2}, {4, 1, 2, 3}, {4, 2, 3, 0}, {4, 3, 0, 1}};
 
-static const signed char (*corners_of(int type, int *count))[4]
+static inline __attribute__((always_inline)) void
+give_cell(target *to, int64_t cell, int type, const signed char (*corners)[4], int corner_count, int field_count)
 {
-    *count = type == GRID_TET ? 4 : type == GRID_WEDGE ? 6 : 8;
-    return type == GRID_TET     ? tet_corners
-           : type == GRID_HEX   ? hex_corners
-           : type == GRID_WEDGE ? wedge_corners
-                                : pyramid_corners;
-}
-
-static void give_cell(target *to, int64_t cell, int type)
-{
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const session_gradient_basis *basis = to->basis;
+    const int count = grid_type_vertices(type);
+    const int64_t first = basis->cells->offsets.data ? grid_array_index(&basis->cells->offsets, cell) : cell * count;
     node nodes[GRID_MAX_CELL_VERTICES];
-    int corners;
-    const signed char(*corner)[4] = corners_of(type, &corners);
-    const int count = grid_cell_vertices(to->basis->cells, cell, vertices);
     bool is_finite = true;
-    for (int i = 0; i < count; i++) is_finite = take_node(to->basis, vertices[i], &nodes[i]) && is_finite;
-    for (int i = 0; i < corners && is_finite; i++)
-        if (to->basis->entries[vertices[corner[i][0]]] >= 0)
-            give_corner(to, &nodes[corner[i][0]], &nodes[corner[i][1]], &nodes[corner[i][2]], &nodes[corner[i][3]]);
+    for (int i = 0; i < count; i++)
+        is_finite = take_node(basis, grid_array_index(&basis->cells->connectivity, first + i), to->scale, field_count,
+                              &nodes[i]) &&
+                    is_finite;
+    for (int i = 0; i < corner_count && is_finite; i++)
+        give_corner(to, &nodes[corners[i][0]], &nodes[corners[i][1]], &nodes[corners[i][2]], &nodes[corners[i][3]],
+                    field_count);
 }
 
-/* ---- polyhedra ----------------------------------------------------------------------------------------------- */
+#define GIVE(type, corners) give_cell(to, cell, type, corners, sizeof corners / sizeof *corners, field_count)
 
-/* A thread's room for the vertices of one polyhedron, in the order of coordinates. */
+static inline __attribute__((always_inline)) void give_typed(target *to, int64_t cell, int type, int field_count)
+{
+    switch (type) {
+    case GRID_TET: GIVE(GRID_TET, tet_corners); break;
+    case GRID_HEX: GIVE(GRID_HEX, hex_corners); break;
+    case GRID_WEDGE: GIVE(GRID_WEDGE, wedge_corners); break;
+    default: GIVE(GRID_PYRAMID, pyramid_corners); break;
+    }
+}
+
+/* A cell of a type with a fixed number of vertices. */
+static void give_solid(target *to, int64_t cell, int type)
+{
+    switch (to->basis->field_count) {
+    case 1: give_typed(to, cell, type, 1); break;
+    case 2: give_typed(to, cell, type, 2); break;
+    default: give_typed(to, cell, type, 3); break;
+    }
+}
+
+/* ---- polyhedra and shells ------------------------------------------------------------------------------------- */
+
+/* A thread's room for the vertices of one cell. */
 typedef struct node_list {
     node *nodes;
     int64_t count, capacity;
@@ -177,7 +283,7 @@ static int by_place(const void *a, const void *b)
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
-static bool add_node(node_list *list, const session_gradient_basis *basis, int64_t vertex)
+static bool add_node(node_list *list, target *to, int64_t vertex)
 {
     if (list->count == list->capacity) {
         const int64_t capacity = list->capacity ? 2 * list->capacity : 64;
@@ -189,30 +295,32 @@ static bool add_node(node_list *list, const session_gradient_basis *basis, int64
         list->nodes = nodes;
         list->capacity = capacity;
     }
-    return take_node(basis, vertex, &list->nodes[list->count++]);
+    return take_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
 }
 
-/* False where a value is not finite, or memory ran out. */
-static bool list_nodes(node_list *list, const session_gradient_basis *basis, int64_t cell)
+/* Lists the vertices of the cell as it has them. False where a value is not finite, or memory ran out. */
+static bool list_nodes(node_list *list, target *to, int64_t cell)
 {
-    grid_walk walk = grid_walk_cell(basis->cells, cell);
-    int64_t vertex, count = 0;
+    grid_walk walk = grid_walk_cell(to->basis->cells, cell);
+    int64_t vertex;
     list->count = 0;
     while (grid_walk_next(&walk, &vertex))
-        if (!add_node(list, basis, vertex)) return false;
+        if (!add_node(list, to, vertex)) return false;
+    return list->count > 0;
+}
+
+/* The mean of the vertices, each once, in the order of coordinates. */
+static node centre_of(node_list *list, int field_count)
+{
+    node centre = {.vertex = -1};
+    int64_t count = 0;
     qsort(list->nodes, (size_t)list->count, sizeof *list->nodes, by_place);
     for (int64_t i = 0; i < list->count; i++)
         if (count == 0 || list->nodes[i].vertex != list->nodes[count - 1].vertex) list->nodes[count++] = list->nodes[i];
     list->count = count;
-    return count > 0;
-}
-
-static node centre_of(const node_list *list)
-{
-    node centre = {{0}, 0, -1};
-    for (int64_t i = 0; i < list->count; i++) {
-        for (int a = 0; a < 3; a++) centre.at[a] += list->nodes[i].at[a] / (double)list->count;
-        centre.value += list->nodes[i].value / (double)list->count;
+    for (int64_t i = 0; i < count; i++) {
+        for (int a = 0; a < 3; a++) centre.at[a] += list->nodes[i].at[a] / (double)count;
+        for (int f = 0; f < field_count; f++) centre.values[f] += list->nodes[i].values[f] / (double)count;
     }
     return centre;
 }
@@ -222,32 +330,48 @@ static void give_polyhedron(target *to, int64_t cell, node_list *list)
     const session_gradient_basis *basis = to->basis;
     const grid *g = basis->cells;
     int64_t first, end, from, until;
-    if (!list_nodes(list, basis, cell)) return;
-    const node centre = centre_of(list);
+    if (!list_nodes(list, to, cell)) return;
+    const node centre = centre_of(list, basis->field_count);
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) {
         grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &until);
         const int64_t count = until - from;
         for (int64_t n = 0; n < count; n++) {
-            node corner, before, after;
-            take_node(basis, grid_array_index(&g->face_connectivity, from + n), &corner);
-            if (basis->entries[corner.vertex] < 0) continue;
-            take_node(basis, grid_array_index(&g->face_connectivity, from + (n + count - 1) % count), &before);
-            take_node(basis, grid_array_index(&g->face_connectivity, from + (n + 1) % count), &after);
-            give_corner(to, &corner, &before, &after, &centre);
+            node nodes[3]; /* the one before the corner, the corner, and the one behind it */
+            for (int k = 0; k < 3; k++)
+                take_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
+                          basis->field_count, &nodes[k]);
+            give_corner(to, &nodes[1], &nodes[0], &nodes[2], &centre, basis->field_count);
         }
     }
 }
 
+static void give_shell(target *to, int64_t cell, node_list *list)
+{
+    if (!list_nodes(list, to, cell)) return;
+    for (int64_t n = 0; n < list->count; n++)
+        give_shell_corner(to, &list->nodes[n], &list->nodes[(n + list->count - 1) % list->count],
+                          &list->nodes[(n + 1) % list->count]);
+}
+
 /* ---- all cells ----------------------------------------------------------------------------------------------- */
+
+static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
+{
+    for (int f = 0; f < basis->field_count; f++)
+        if (!grid_has_own_value(&basis->fields[f], cell)) return false;
+    return true;
+}
 
 static bool has_entry(const session_gradient_basis *basis, int64_t cell)
 {
-    if (!grid_is_drawn(basis->cells, cell)) return false;
+    if (basis->of_shells ? grid_is_ghost(basis->cells, cell) || !grid_is_shell(basis->cells, cell)
+                         : !grid_is_drawn(basis->cells, cell))
+        return false;
     grid_walk walk = grid_walk_cell(basis->cells, cell);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex))
-        if (basis->entries[vertex] >= 0) return grid_has_own_value(basis->field, cell);
+        if (basis->entries[vertex] >= 0) return has_own_values(basis, cell);
     return false;
 }
 
@@ -294,47 +418,88 @@ done:
     return out->cells != NULL;
 }
 
-static bool give_all(const session_gradient_basis *basis, const session_cell_list *list, const double unit[2],
-                     session_gradient_sum *sums, double largest[2])
+/* ---- all cells of a grid --------------------------------------------------------------------------------------- */
+
+static void give_any(target *to, int64_t cell, node_list *room)
 {
-    double of_gradients = 0, of_weights = 0;
+    const int type = grid_cell_type(to->basis->cells, cell);
+    if (type == GRID_POLYHEDRON)
+        give_polyhedron(to, cell, room);
+    else if (to->basis->of_shells)
+        give_shell(to, cell, room);
+    else
+        give_solid(to, cell, type);
+}
+
+enum { NO_OWNER = 254, SHARED = 255 };
+
+/* Notes that the thread adds to the sums of the cell's vertices. If no other one does, it needs no atomic additions. */
+static void own_sums(const target *to, int64_t cell)
+{
+    const session_gradient_basis *basis = to->basis;
+    grid_walk walk = grid_walk_cell(basis->cells, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        unsigned char before = NO_OWNER;
+        if (basis->entries[vertex] < 0) continue;
+        unsigned char *owner = &to->owners[basis->entries[vertex]];
+        if (__atomic_load_n(owner, __ATOMIC_RELAXED) == to->owner ||
+            __atomic_compare_exchange_n(owner, &before, to->owner, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+            continue;
+        if (before != to->owner) __atomic_store_n(owner, SHARED, __ATOMIC_RELAXED);
+    }
+}
+
+/* Both loops share out the cells to the threads in the same way. */
+static bool give_all(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
+{
+    double rise = 0, sharpness = 0;
     bool is_out_of_memory = false;
-#pragma omp parallel num_threads(basis->threads) reduction(max                                                         \
-                                                           : of_gradients, of_weights) reduction(||                    \
-                                                                                                 : is_out_of_memory)
+#pragma omp parallel num_threads(like->basis->threads) reduction(max : rise, sharpness) reduction(|| : is_out_of_memory)
     {
         region_enter();
-        target to = {basis, sums, 1 / basis->length, {unit[0], unit[1]}, {0, 0}};
+        target to = *like;
+        to.owner = (unsigned char)(omp_get_thread_num() % NO_OWNER);
         node_list nodes = {0};
+        if (to.owners && omp_get_num_threads() < NO_OWNER) {
 #pragma omp for schedule(static)
-        for (int64_t i = 0; i < list->count; i++) {
-            const int type = grid_cell_type(basis->cells, list->cells[i]);
-            if (type == GRID_POLYHEDRON)
-                give_polyhedron(&to, list->cells[i], &nodes);
-            else
-                give_cell(&to, list->cells[i], type);
+            for (int64_t i = 0; i < list->count; i++) own_sums(&to, list->cells[i]);
         }
-        of_gradients = to.largest[0];
-        of_weights = to.largest[1];
+#pragma omp for schedule(static)
+        for (int64_t i = 0; i < list->count; i++) give_any(&to, list->cells[i], &nodes);
+        rise = to.bounds.rise;
+        sharpness = to.bounds.sharpness;
         is_out_of_memory = nodes.is_out_of_memory;
         base_free(nodes.nodes);
         region_leave();
     }
-    largest[0] = of_gradients;
-    largest[1] = of_weights;
+    *bounds = (session_gradient_bounds){rise, sharpness};
     return !is_out_of_memory;
 }
 
-bool session_largest_gradients(const session_gradient_basis *basis, const session_cell_list *list, double largest[2])
+bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
+                             session_gradient_bounds *out)
 {
-    const double no_unit[2] = {0, 0};
-    return give_all(basis, list, no_unit, NULL, largest);
+    const target to = {.basis = basis, .scale = 1 / basis->length};
+    return give_all(&to, list, out);
 }
 
-bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list, const double largest[2],
-                           session_gradient_sum *sums)
+bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list,
+                           const session_gradient_bounds *bounds, int64_t entry_count, int64_t *sums)
 {
-    const double unit[2] = {unit_of(largest[0]), unit_of(largest[1])};
-    double unused[2];
-    return give_all(basis, list, unit, sums, unused);
+    target to = {.basis = basis, .sums = sums, .scale = 1 / basis->length};
+    const size_t owner_count = basis->threads > 1 ? (size_t)entry_count : 0;
+    unsigned char *owners = base_alloc(owner_count);
+    double units[2];
+    session_gradient_bounds unused;
+    if (!owners) return false;
+    /* More threads than an owner's byte can tell apart share all sums. */
+    memset(owners, basis->threads < NO_OWNER ? NO_OWNER : SHARED, owner_count);
+    if (basis->threads > 1) to.owners = owners;
+    find_units(bounds, units);
+    for (int i = 0; i < MOST_NUMBERS; i++)
+        to.units[i / 2][i % 2] = i < 3 * basis->field_count ? units[0] : i == 3 * basis->field_count ? units[1] : 0;
+    const bool is_done = give_all(&to, list, &unused);
+    base_free(owners);
+    return is_done;
 }

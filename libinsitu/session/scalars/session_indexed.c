@@ -114,7 +114,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];
-    if (!session_is_copied(mesh, field) || !field->is_copy_stale) return INSITU_OK;
+    if (!session_is_copied(mesh, field) || field->is_derived || !field->is_copy_stale) return INSITU_OK;
     const insitu_status status = copy_values(mesh, field, threads, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
@@ -128,11 +128,19 @@ insitu_status session_copy_wanted(const session_meshes *meshes, int threads, bas
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
-            if (mesh->fields[f].is_wanted && !status) status = update_copy(mesh, f, threads, error);
+            const bool is_wanted = mesh->fields[f].is_wanted || mesh->fields[f].is_source;
+            if (is_wanted && !status) status = update_copy(mesh, f, threads, error);
             mesh->fields[f].is_wanted = false;
         }
     }
     return status;
+}
+
+static void copy_used(session_mesh *mesh, int index, int threads, base_error *error)
+{
+    base_error own = {.status = INSITU_OK};
+    if (mesh->fields[index].problem.status) return;
+    if (update_copy(mesh, index, threads, &own)) session_keep_problem(&mesh->fields[index], &own, error);
 }
 
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error)
@@ -141,11 +149,10 @@ insitu_status session_copy_used(const session_meshes *meshes, int threads, base_
         session_mesh *mesh = meshes->items[m];
         for (int i = 0; i < mesh->scalar_count; i++) {
             const session_scalar *scalar = &mesh->scalars[i];
-            base_error own = {.status = INSITU_OK};
-            if (!scalar->is_used || session_is_distance(scalar) || mesh->fields[scalar->field].problem.status) continue;
-            if (update_copy(mesh, scalar->field, threads, &own))
-                session_keep_problem(&mesh->fields[scalar->field], &own, error);
+            if (scalar->is_used && !session_is_distance(scalar)) copy_used(mesh, scalar->field, threads, error);
         }
+        for (int f = 0; f < mesh->field_count; f++)
+            if (mesh->fields[f].is_source) copy_used(mesh, f, threads, error);
     }
     return error->status;
 }

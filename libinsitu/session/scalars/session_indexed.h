@@ -9,7 +9,7 @@
 void session_want_field(const session_meshes *meshes, const scene_field *field);
 
 /* Copy values by their index, if they were not copied yet or have changed since: those of wanted fields, which are then
- * no longer marked, or those of scalars in use. Must be called before the values are read. Local. */
+ * no longer marked, or those of scalars in use, and of sources. Must be called before the values are read. Local. */
 insitu_status session_copy_wanted(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error);
 

@@ -59,7 +59,7 @@ bool session_is_recentred(const scene_field *field, insitu_centring centring)
 
 bool session_is_copied(const session_mesh *mesh, const session_field *field)
 {
-    if (field->has_index) return true;
+    if (field->has_index || field->is_derived) return true;
     if (field->given.centring == INSITU_VERTEX) return mesh->torn.is_torn;
     return field->given.corner_row && field->given.corner_row != grid_type_vertices((int)mesh->given.cell_type);
 }

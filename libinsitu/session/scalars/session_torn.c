@@ -40,6 +40,9 @@ static bool is_named(const session_mesh *mesh, const scene *scene)
 {
     bool is_in = false;
     for (int i = 0; i < scene->statistics_count; i++) is_in = is_in || is_of_corners(mesh, &scene->statistics[i].field);
+    for (int i = 0; i < scene->derived_count; i++)
+        for (int k = 0; k < scene->derived[i].input_count; k++)
+            is_in = is_in || is_of_corners(mesh, &scene->derived[i].inputs[k]);
     for (int i = 0; i < scene->image_count && !is_in; i++) is_in = is_in_image(mesh, &scene->images[i]);
     return is_in;
 }

@@ -174,7 +174,8 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
     out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
     out->schedule = in->schedule ? (scene_schedule)*in->schedule : SCENE_SCHEDULE_AUTO;
     out->writing = in->writing ? (scene_writing)*in->writing : SCENE_WRITE_BEHIND;
-    insitu_status status = convert_images(d, in, out);
+    insitu_status status = scene_convert_derived(d, in, out);
+    if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
@@ -235,13 +236,6 @@ void scene_attachments_free(scene_attachments *attachments)
     attachments->count = 0;
 }
 
-static void free_field(scene_field *field)
-{
-    for (int i = 0; i < field->mesh_count; i++) base_free(field->meshes[i]);
-    base_free(field->meshes);
-    base_free(field->name);
-}
-
 static void free_colour_map(scene_colour_map *map)
 {
     base_free(map->name);
@@ -253,31 +247,31 @@ static void free_image(scene_image *image)
     if (image->variant.view > 0) return; /* nothing of it is its own */
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
-        free_field(&surface->field);
-        free_field(&surface->colour_by);
+        scene_free_field(&surface->field);
+        scene_free_field(&surface->colour_by);
         base_free(surface->values);
         base_free(surface->colours);
         free_colour_map(&surface->colour_map);
     }
     for (int i = 0; i < image->volume_count; i++) {
-        free_field(&image->volumes[i].field);
+        scene_free_field(&image->volumes[i].field);
         base_free(image->volumes[i].opacity);
         free_colour_map(&image->volumes[i].colour_map);
     }
     for (int i = 0; i < image->surface_count; i++) {
-        free_field(&image->surfaces[i].on);
-        free_field(&image->surfaces[i].colour_by);
-        free_field(&image->surfaces[i].threshold.field);
+        scene_free_field(&image->surfaces[i].on);
+        scene_free_field(&image->surfaces[i].colour_by);
+        scene_free_field(&image->surfaces[i].threshold.field);
         free_colour_map(&image->surfaces[i].colour_map);
     }
     for (int i = 0; i < image->slice_count; i++) {
-        free_field(&image->slices[i].field);
+        scene_free_field(&image->slices[i].field);
         base_free(image->slices[i].planes);
         free_colour_map(&image->slices[i].colour_map);
     }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
     scene_free_decorations(&image->decorations);
-    free_field(&image->when.field);
+    scene_free_field(&image->when.field);
     base_free(image->name);
     base_free(image->swept_field);
     base_free(image->camera.points);
@@ -295,10 +289,11 @@ void scene_free(scene *s)
     for (int i = 0; i < s->image_count; i++) free_image(&s->images[i]);
     base_free(s->images);
     for (int i = 0; i < s->statistics_count; i++) {
-        free_field(&s->statistics[i].field);
+        scene_free_field(&s->statistics[i].field);
         base_free(s->statistics[i].path);
     }
     base_free(s->statistics);
+    scene_free_derived(s);
     for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
     base_free(s->databases);
     *s = (scene){0};

@@ -8,13 +8,14 @@
 #include <stdint.h>
 
 #include "error.h"
+#include "scene_expression.h"
 
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 
 /* The scalar of a field: the magnitude, or component n. Default: component 0 if the field has one, else the magnitude.
- */
-enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
+ * Only: component 0 of a field that must have no other. */
+enum { SCENE_COMPONENT_ONLY = -3, SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 
 /* A field as a layer shows it: on some of the meshes. */
 typedef struct scene_field {
@@ -33,6 +34,34 @@ typedef struct scene_field {
 bool scene_field_is_on(const scene_field *field, const char *mesh);
 /* Tells whether name stands for the mesh. */
 bool scene_name_stands_for(const char *name, const char *mesh);
+
+/* What a derived field is. Those after the expression are made of gradients at vertices. */
+typedef enum scene_derivation {
+    SCENE_EXPRESSION,
+    SCENE_GRADIENT_OF,
+    SCENE_DIVERGENCE,
+    SCENE_VORTICITY,
+    SCENE_Q_CRITERION,
+    SCENE_LAMBDA2,
+    SCENE_STRAIN_RATE
+} scene_derivation;
+
+enum { SCENE_MAX_DERIVED = 64 };
+
+/* A field that the session makes of others. */
+typedef struct scene_derived {
+    char *name;
+    int line;
+    scene_derivation kind;
+    const char *key;             /* of the file, for messages; "" of an expression without */
+    int component;               /* of a gradient or vorticity: SCENE_COMPONENT_DEFAULT: all three */
+    scene_expression expression; /* its inputs are those below */
+    int input_count;
+    scene_field *inputs; /* of the expression's; else a vector field, its two or three components, or of a gradient a
+                            scalar */
+    int *made_by;        /* of each input: which of the scene's derived fields it is, or -1 */
+    uint64_t joined;     /* as scene_field.joined, of meshes that gradients are over; the session's */
+} scene_derived;
 
 /* The source of a range that is not fixed. All use the values on all ranks, at each drawn step. */
 typedef enum scene_range_source {
@@ -391,7 +420,9 @@ typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_wri
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 
 typedef struct scene {
-    int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
+    int derived_count;      /* 0 .. SCENE_MAX_DERIVED */
+    scene_derived *derived; /* each after those that it is made of */
+    int threads;            /* per rank; 0: the cores there are, shared by the ranks of a node */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;

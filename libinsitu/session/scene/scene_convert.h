@@ -67,6 +67,7 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,
                                         scene_decorations *out);
 void scene_free_decorations(scene_decorations *decorations);
+void scene_free_field(scene_field *field);
 /* Refuses unknown placeholders, and those that stand for something that the image does not have. key: of the text;
  * path: below the image. */
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
@@ -86,6 +87,10 @@ insitu_status scene_copy_texts(const scene_document *d, const char *path, char *
 
 /* The meshes that a layer names. layer: its path. */
 insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
+
+/* A component by its word: magnitude, x, y, z or a number. NULL: SCENE_COMPONENT_DEFAULT. path: of the mapping with the
+ * key `component`. */
+insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component);
 
 /* A field as a layer shows it. layer: the path of the layer, which says on what meshes; path: that of the mapping which
  * names the field. */
@@ -119,6 +124,10 @@ insitu_status scene_convert_slice(const scene_document *d, const char *path, con
 insitu_status scene_convert_condition(const scene_document *d, const char *image, const scene_file_condition *in,
                                       scene_condition *out);
 insitu_status scene_convert_statistics(const scene_document *d, const scene_file *in, scene *out);
+
+/* The derived fields, sorted: each after those that it is made of. */
+insitu_status scene_convert_derived(const scene_document *d, const scene_file *in, scene *out);
+void scene_free_derived(scene *s);
 
 /* Refuse two outputs that would be one file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);

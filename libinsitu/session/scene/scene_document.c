@@ -16,7 +16,7 @@
 #include "scene_syntax.h"
 #include "scene_words.h"
 
-enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, most_words = 64 };
+enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, most_words = 64, most_plain = 60 };
 
 /* Memory of the structs; what is behind it is aligned for anything. */
 struct scene_block {
@@ -187,6 +187,25 @@ static const yaml_node_pair_t *find_pair(const scene_document *d, const yaml_nod
     return NULL;
 }
 
+bool scene_is_plain_name(const char *name)
+{
+    return *name && strlen(name) <= most_plain && !name[strcspn(name, ".[")];
+}
+
+/* The entry of a list whose key `name` has this text; NULL: there is none. */
+static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t *list, const char *name, size_t length)
+{
+    for (int i = 0; i < item_count(list); i++) {
+        const yaml_node_t *entry = node_of(d, list->data.sequence.items.start[i]);
+        const yaml_node_pair_t *pair = entry->type == YAML_MAPPING_NODE ? find_pair(d, entry, "name", 4) : NULL;
+        const yaml_node_t *text = pair ? node_of(d, pair->value) : NULL;
+        if (text && text->type == YAML_SCALAR_NODE && text->data.scalar.length == length &&
+            memcmp(text->data.scalar.value, name, length) == 0)
+            return entry;
+    }
+    return NULL;
+}
+
 /* The node at a path, NULL where there is none; *line: of it, or of as much of the path as there is. */
 static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
@@ -203,6 +222,13 @@ static const yaml_node_t *find_node(const scene_document *d, const char *path, i
         } else {
             path += *path == '.';
             const size_t length = strcspn(path, ".[");
+            if (node->type == YAML_SEQUENCE_NODE) {
+                node = find_named(d, node, path, length);
+                if (!node) return NULL;
+                *line = line_of(node);
+                path += length;
+                continue;
+            }
             if (node->type != YAML_MAPPING_NODE) return NULL;
             const yaml_node_pair_t *pair = find_pair(d, node, path, length);
             if (!pair) return NULL;
@@ -462,6 +488,20 @@ static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, co
 static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key, void *to);
 
+/* The path of a list's entry: by its name if it has one. */
+static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
+                            int index, char out[path_size])
+{
+    const yaml_node_t *entry = node_of(d, list->data.sequence.items.start[index]);
+    const yaml_node_pair_t *pair =
+        key->is_named && entry->type == YAML_MAPPING_NODE ? find_pair(d, entry, "name", 4) : NULL;
+    const yaml_node_t *name = pair ? node_of(d, pair->value) : NULL;
+    if (name && name->type == YAML_SCALAR_NODE && scene_is_plain_name(text_of(name)))
+        snprintf(out, path_size, "%s.%s", path, text_of(name));
+    else
+        snprintf(out, path_size, "%s[%d]", path, index);
+}
+
 static insitu_status check_list(scene_document *d, const char *path, const yaml_node_t *node,
                                 const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
@@ -476,7 +516,7 @@ static insitu_status check_list(scene_document *d, const char *path, const yaml_
     insitu_status status = INSITU_OK;
     for (int i = 0; i < count && status == INSITU_OK; i++) {
         char item_path[path_size];
-        snprintf(item_path, sizeof item_path, "%s[%d]", path, i);
+        write_item_path(d, path, node, key, i, item_path);
         void *item = to ? (char *)to + (size_t)i * value->data_size : NULL;
         status =
             check_value(d, item_path, node_of(d, node->data.sequence.items.start[i]), value->sequence.entry, key, item);

@@ -34,8 +34,11 @@ void scene_document_close(scene_document *d);
  * error. */
 insitu_status scene_document_read(scene_document *d, scene_file **file);
 
-/* The line (from 1) of a path such as "images[0].size[1]"; of as much of it as there is. */
+/* The line (from 1) of a path such as "images[0].size[1]"; of as much of it as there is. In a list whose entries have
+ * the key `name`, one may stand as its name, as in "fields.speed", if that is plain: short, without . and [. */
 int scene_document_line(const scene_document *d, const char *path);
+
+bool scene_is_plain_name(const char *name);
 
 /* The texts at a path: of a text alone, or of a list of them; borrowed from the document. Returns how many there are;
  * at most `most` are filled in. 0: nothing stands there. */

@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-static insitu_status convert_component(const scene_document *d, const char *path, const char *text, int *component)
+insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component)
 {
     static const struct {
         const char *word;
@@ -60,7 +60,14 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
     out->name = base_strdup(name);
     if (!out->name) return scene_no_memory(d);
     const insitu_status status = scene_convert_meshes(d, layer, out);
-    return status ? status : convert_component(d, path, component, &out->component);
+    return status ? status : scene_convert_component(d, path, component, &out->component);
+}
+
+void scene_free_field(scene_field *field)
+{
+    for (int i = 0; i < field->mesh_count; i++) base_free(field->meshes[i]);
+    base_free(field->meshes);
+    base_free(field->name);
 }
 
 insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,

@@ -330,6 +330,45 @@ DEFINE_MAPPING(image, "images", IMAGE_KEYS);
 
 static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_image, image_fields)};
 
+#define OF_VELOCITY "The field has 2 or 3 components; `[u, v, w]` names 2 or 3 scalars in its place. "
+#define DERIVED_KEYS(X)                                                                                                \
+    X(TEXT("name", REQUIRED, scene_file_derived, name, 255),                                                           \
+      .help = "The name by which layers, statistics and other derived fields use it: no field of the simulation's. "   \
+              "Without `.`, `[`, `]` and quotes.")                                                                     \
+    X(TEXT("expression", OPTIONAL, scene_file_derived, expression, 1000),                                              \
+      .help = "Of numbers, fields of one component, `u.x`, `u.y`, `u.z`, `u.0` ... of others, `+ - * / ^`, brackets, " \
+              "and `sqrt abs exp log log10 sin cos tan min max pow`, `mag(u)`. A name that holds other signs than "    \
+              "letters, digits and `_` stands in quotes.",                                                             \
+      .by_default = "none")                                                                                            \
+    X(NAMES("field"), .help = "A scalar of a field, by `component`, as a layer shows it.", .by_default = "none")       \
+    X(NAMES("magnitude"), .help = "The magnitude of a field.", .by_default = "none")                                   \
+    X(NAMES("gradient"),                                                                                               \
+      .help = "The gradient of a field of one component, or of a component as `u.x`: 3 components, or by `component` " \
+              "one, or its magnitude.",                                                                                \
+      .by_default = "none")                                                                                            \
+    X(NAMES("divergence"), .help = "The divergence of a vector field. " OF_VELOCITY, .by_default = "none")             \
+    X(NAMES("vorticity"),                                                                                              \
+      .help = "The curl of a vector field: 3 components, or by `component` one, or its magnitude. " OF_VELOCITY,       \
+      .by_default = "none")                                                                                            \
+    X(NAMES("q_criterion"),                                                                                            \
+      .help =                                                                                                          \
+          "Half of the square of the rotation rate less that of the strain rate: above 0 in vortices. " OF_VELOCITY,   \
+      .by_default = "none")                                                                                            \
+    X(NAMES("lambda2"),                                                                                                \
+      .help = "The middle eigenvalue of the sum of the squares of the tensors of strain rate and rotation: below 0 "   \
+              "in vortices. " OF_VELOCITY,                                                                             \
+      .by_default = "none")                                                                                            \
+    X(NAMES("strain_rate"),                                                                                            \
+      .help = "The size of the strain rate, sqrt(2 S:S): the shear rate of a simple shear. " OF_VELOCITY,              \
+      .by_default = "none")                                                                                            \
+    X(TEXT("component", OPTIONAL, scene_file_derived, component, 16),                                                  \
+      .help = "Beside `field`, `gradient` and `vorticity`: `magnitude`, `x`, `y`, `z`, or a component's number.",      \
+      .by_default = "`0` of a `field` of one component, else `magnitude`; of a gradient or vorticity, all three")
+DEFINE_MAPPING(derived, "fields", DERIVED_KEYS);
+
+static const cyaml_schema_value_t derived = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_derived, derived_fields)};
+
 #define TOP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_INT_PTR("threads", OPTIONAL, scene_file, threads),                                                   \
       .help =                                                                                                          \
@@ -368,7 +407,11 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
           "mean of their vertices') weighted by volume; then the histogram. Ghost cells, cells of no volume and "      \
           "those with values that are not finite do not count. The same on any partition. Without any cell no "        \
           "line is written.",                                                                                          \
-      .by_default = "none", .child = &statistics_mapping)
+      .by_default = "none", .child = &statistics_mapping)                                                              \
+    X(CYAML_FIELD_SEQUENCE("fields", POINTER, scene_file, fields, &derived, 1, SCENE_MAX_DERIVED),                     \
+      .help = "Fields that are made of the simulation's, or of each other: a mapping from their names to what they "   \
+              "are, as in [Derived fields](#derived-fields).",                                                         \
+      .by_default = "none", .child = &derived_mapping, .is_named = true)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
 static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};
 

@@ -220,6 +220,11 @@ typedef struct scene_file_statistics {
     scene_file_histogram *histogram;
 } scene_file_statistics;
 
+/* The fields that it is made of are read from the document. */
+typedef struct scene_file_derived {
+    char *name, *expression, *component;
+} scene_file_derived;
+
 typedef struct scene_file_image {
     char *name;
     int *size; /* 2 */
@@ -254,6 +259,8 @@ typedef struct scene_file {
     int images_count;
     scene_file_statistics *statistics;
     int statistics_count;
+    scene_file_derived *fields;
+    int fields_count;
 } scene_file;
 
 struct scene_mapping;
@@ -265,6 +272,7 @@ typedef struct scene_key {
     double low, high;       /* of a number, or of each number in a list; both 0: any finite number */
     bool is_low_excluded;
     bool is_high_excluded;
+    bool is_named;                     /* of a list: its entries' key `name` stands for them in paths */
     const struct scene_mapping *child; /* of a mapping, or of a list of mappings */
     const struct scene_form *forms;    /* of a value that may be of several types: one of each; else NULL */
     int form_count;

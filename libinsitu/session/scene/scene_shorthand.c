@@ -193,6 +193,24 @@ static void expand_slice(rewrite *r, int *value)
     append_pair(r, *value, "planes", make_list_of(r, plane));
 }
 
+/* A mapping from names: a list of mappings with the key `name`. A text is an expression. */
+static void expand_fields(rewrite *r, int *value)
+{
+    if (node_of(r, *value)->type != YAML_MAPPING_NODE) return;
+    const int list = make_list(r), from = *value;
+    const int count = (int)(node_of(r, from)->data.mapping.pairs.top - node_of(r, from)->data.mapping.pairs.start);
+    for (int i = 0; i < count && r->has_memory; i++) {
+        const yaml_node_pair_t pair = node_of(r, from)->data.mapping.pairs.start[i];
+        const bool is_mapping = node_of(r, pair.value)->type == YAML_MAPPING_NODE;
+        r->mark = node_of(r, pair.key)->start_mark;
+        const int entry = is_mapping ? pair.value : make_mapping(r);
+        if (!is_mapping) append_pair(r, entry, "expression", pair.value);
+        append_pair(r, entry, "name", pair.key);
+        append(r, list, entry);
+    }
+    *value = list;
+}
+
 /* ---- all of a document ------------------------------------------------------------------------------------------ */
 
 static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = "true or false";
@@ -224,6 +242,7 @@ static const struct {
     {"outputs", expand_mappings, NULL},
     {"text", expand_mappings, NULL},
     {"slice", expand_slice, NULL},
+    {"fields", expand_fields, "a mapping from names to these, or to expressions"},
 };
 
 const char *scene_shorthand_words(const char *key, size_t length)
@@ -377,6 +396,13 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"off", "false"},
                                           {"0", "false"},
                                           {"step", "cycle"},
+                                          {"curl", "vorticity"},
+                                          {"div", "divergence"},
+                                          {"grad", "gradient"},
+                                          {"qcriterion", "q_criterion"},
+                                          {"q", "q_criterion"},
+                                          {"shear_rate", "strain_rate"},
+                                          {"formula", "expression"},
                                           {"frequency", "every"},
                                           {"interval", "every"}};
 

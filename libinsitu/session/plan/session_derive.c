@@ -1,0 +1,515 @@
+/* Derived fields are made one after the other, each after those that it is made of:
+ *
+ *     cells' values that it wants at vertices  ->  session_recentre()
+ *     an expression:  blocks of vertices or cells, each instruction for a whole block
+ *     a gradient, or what is made of one:  sums over the cells around each vertex and over all ranks
+ *         (session_vertex_sums.h), over all meshes that have the field as one, so that blocks show no seam
+ *
+ * The values are copies of the session's, packed, of 4 bytes if all that they are made of has 4, else of 8. A hash of
+ * the versions that they were made of tells whether they still hold; they are made anew where that differs on any rank.
+ */
+#include "session_derive.h"
+
+#include <omp.h>
+#include <string.h>
+
+#include "memory.h"
+#include "region.h"
+#include "session_agree.h"
+#include "session_derived.h"
+#include "session_field_input.h"
+#include "session_hash.h"
+#include "session_recentre.h"
+#include "session_scalars.h"
+#include "session_tensor.h"
+#include "session_vertex_sums.h"
+
+enum { SPACE = 3 };
+
+/* The work on one derived field. */
+typedef struct derive_work {
+    const session_derive_basis *basis;
+    const scene_derived *derived;
+    int number;
+    int recentring_count;
+    session_recentring *recentrings;
+    int *stale; /* of each recentring or mesh */
+} derive_work;
+
+/* ---- where it is, and what it is made of ---------------------------------------------------------------------- */
+
+/* The field on the mesh over all ranks; NULL where it is not, or is not sound. */
+static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
+{
+    for (int f = 0; f < mesh->field_count; f++)
+        if (mesh->fields[f].derived == w->number && !mesh->fields[f].fault && !mesh->fault) return &mesh->fields[f];
+    return NULL;
+}
+
+/* This rank's part of a mesh with the field, and the field's number there; NULL: there is none here. */
+static session_mesh *find_part(const derive_work *w, const session_catalogue_mesh *mesh, int *index)
+{
+    session_mesh *part = find_field(w, mesh) ? session_find_mesh(w->basis->meshes, mesh->name) : NULL;
+    if (!part || !part->is_given) return NULL;
+    *index = session_find_field(part, w->derived->name);
+    return *index < 0 ? NULL : part;
+}
+
+/* A component as grid_field.component. */
+static int component_of(const scene_field *input, int component_count)
+{
+    return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
+}
+
+/* Tells whether values of this input on the mesh are taken to vertices first. */
+static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
+{
+    const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find(mesh, input->name);
+    return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
+}
+
+/* Tells whether the one input is a vector, whose components are taken in turn. */
+static bool is_vector(const scene_derived *derived)
+{
+    return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
+}
+
+static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *input)
+{
+    return session_joint_name(mesh, input->joined);
+}
+
+/* ---- values at vertices of those of cells ---------------------------------------------------------------------- */
+
+static bool add_recentring(derive_work *w, const session_recentring *item)
+{
+    for (int i = 0; i < w->recentring_count; i++) {
+        const session_recentring *other = &w->recentrings[i];
+        if (other->joint == item->joint && strcmp(other->field, item->field) == 0 &&
+            other->component == item->component)
+            return true;
+    }
+    session_recentring *more = base_realloc(w->recentrings, (size_t)(w->recentring_count + 1) * sizeof *w->recentrings);
+    if (!more) return false;
+    w->recentrings = more;
+    more[w->recentring_count++] = *item;
+    return true;
+}
+
+/* Adds the scalar that is recentred to this rank's part of the mesh. */
+static bool add_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
+                          int component)
+{
+    session_mesh *part = session_find_mesh(w->basis->meshes, mesh->name);
+    const int index = part && part->is_given ? session_find_field(part, input->name) : -1;
+    const uint64_t joint = joint_of(mesh, input);
+    if (index < 0 || session_find_recentred(part, input->name, component, joint)) return true;
+    session_scalar *scalar = session_add_scalar(part);
+    if (!scalar) return false;
+    scalar->field = index;
+    scalar->component = component;
+    scalar->is_recentred = true;
+    scalar->joined = joint;
+    scalar->own = session_given_field(part, index, component);
+    return true;
+}
+
+static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
+{
+    if (!is_recentred(w, mesh, input)) return true;
+    const int count = session_catalogue_find(mesh, input->name)->component_count;
+    const int first = is_vector(w->derived) ? 0 : component_of(input, count);
+    const int end = is_vector(w->derived) ? count : first + 1;
+    session_joint *joint = session_find_joint(w->basis->catalogue, joint_of(mesh, input));
+    bool is_done = joint != NULL;
+    for (int c = first; c < end && is_done; c++) {
+        const session_recentring item = {joint, input->name, c};
+        is_done = add_recentring(w, &item) && add_recentred(w, mesh, input, c);
+    }
+    return is_done;
+}
+
+static bool list_recentrings(derive_work *w)
+{
+    const session_catalogue *catalogue = w->basis->catalogue;
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        for (int k = 0; k < w->derived->input_count; k++)
+            if (!recentre_input(w, &catalogue->meshes[m], &w->derived->inputs[k])) return false;
+    const int most = w->recentring_count > catalogue->mesh_count ? w->recentring_count : catalogue->mesh_count;
+    w->stale = base_calloc((size_t)most + 1, sizeof *w->stale);
+    return w->stale != NULL;
+}
+
+/* ---- what is out of date ---------------------------------------------------------------------------------------- */
+
+static session_scalar *find_recentred(const derive_work *w, const session_catalogue_mesh *mesh,
+                                      const session_mesh *part, int input, int component)
+{
+    const scene_field *of = &w->derived->inputs[input];
+    return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, joint_of(mesh, of)) : NULL;
+}
+
+/* A hash of all that the values on this rank's part are made of. */
+static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part)
+{
+    uint64_t hash = SESSION_HASH_BEGIN;
+    session_hash_bytes(&hash, &part->cells_stamp, sizeof part->cells_stamp);
+    session_hash_bytes(&hash, &mesh->has_shells_alone, sizeof mesh->has_shells_alone);
+    if (w->derived->kind != SCENE_EXPRESSION) session_hash_bytes(&hash, &part->places_stamp, sizeof part->places_stamp);
+    for (int k = 0; k < w->derived->input_count; k++) {
+        const int index = session_find_field(part, w->derived->inputs[k].name);
+        const int count = index < 0 ? 0 : part->fields[index].given.component_count;
+        if (index >= 0) session_hash_bytes(&hash, &part->fields[index].version, sizeof part->fields[index].version);
+        for (int c = -1; c < count; c++) {
+            const session_scalar *scalar = find_recentred(w, mesh, part, k, c);
+            if (scalar) session_hash_bytes(&hash, &scalar->made, sizeof scalar->made);
+        }
+    }
+    return hash | 1;
+}
+
+/* Finds the meshes on which the values are out of date on some rank. error: what failed before. Collective, agreed. */
+static insitu_status find_stale(derive_work *w, base_error *error)
+{
+    const session_catalogue *catalogue = w->basis->catalogue;
+    const int count = catalogue->mesh_count;
+    for (int m = 0; m < count; m++) {
+        int index = 0;
+        const session_mesh *part = find_part(w, &catalogue->meshes[m], &index);
+        w->stale[m] = part && part->fields[index].made_of != hash_sources(w, &catalogue->meshes[m], part);
+    }
+    w->stale[count] = error->status != INSITU_OK;
+    const MPI_Comm comm = w->basis->team->comm;
+    const insitu_status status =
+        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, w->stale, count + 1, MPI_INT, MPI_MAX, comm), "MPI_Allreduce");
+    return status || !w->stale[count] ? status : session_agree(comm, error);
+}
+
+/* ---- values of one mesh ------------------------------------------------------------------------------------------ */
+
+/* The values of an input, or of one of its components, where the derived field has its own. */
+static grid_field input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
+                               int input, int component)
+{
+    const session_scalar *scalar = find_recentred(w, mesh, part, input, component);
+    if (scalar) return session_scalar_field(part, scalar);
+    return session_given_field(part, session_find_field(part, w->derived->inputs[input].name), component);
+}
+
+static bool is_wide_input(const session_mesh *part, const scene_field *input)
+{
+    const int index = session_find_field(part, input->name);
+    return index >= 0 && part->fields[index].values.is_wide;
+}
+
+static int64_t place_count(const session_mesh *part, const session_field *field)
+{
+    return field->given.centring == INSITU_CELL ? part->cells.cell_count : session_vertex_count(part);
+}
+
+/* Makes room for the values; keeps what there is if it has the size. */
+static bool make_room(const derive_work *w, session_mesh *part, session_field *field)
+{
+    bool is_wide = false;
+    for (int k = 0; k < w->derived->input_count; k++) is_wide = is_wide || is_wide_input(part, &w->derived->inputs[k]);
+    const int64_t size = is_wide ? 8 : 4;
+    const int64_t bytes = place_count(part, field) * field->given.component_count * size;
+    if (!field->copy || field->copy_bytes != bytes) {
+        session_drop_copy(field);
+        field->copy = base_alloc((size_t)bytes);
+        if (!field->copy) return false;
+        field->copy_bytes = bytes;
+    }
+    field->values = (grid_array){field->copy, size * field->given.component_count, is_wide, false, 0};
+    field->component_stride = size;
+    return true;
+}
+
+static void store(const session_field *field, int64_t place, const double *values)
+{
+    const int count = field->given.component_count;
+    for (int c = 0; c < count; c++)
+        if (field->values.is_wide)
+            ((double *)(void *)field->copy)[place * count + c] = values[c];
+        else
+            ((float *)(void *)field->copy)[place * count + c] = (float)values[c];
+}
+
+/* Notes that the values are new, for scalars and for fields that are made of them. */
+static void note_values(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
+{
+    session_spoil_scalars(part, index);
+    part->fields[index].made_of = hash_sources(w, mesh, part);
+    part->fields[index].is_copy_stale = false;
+    for (int i = 0; i < part->scalar_count; i++)
+        if (part->scalars[i].field == index)
+            part->scalars[i].own = session_given_field(part, index, part->scalars[i].component);
+}
+
+/* ---- expressions --------------------------------------------------------------------------------------------------
+ */
+
+static void load_block(const grid_field *field, int64_t first, int count, double *restrict out)
+{
+    const char *data = field->values.data + first * field->values.stride;
+    const int64_t stride = field->values.stride;
+    if (field->component < 0 || field->values.is_integer) {
+        for (int i = 0; i < count; i++) out[i] = grid_field_value(field, first + i);
+        return;
+    }
+    data += field->component * field->component_stride;
+    if (field->values.is_wide)
+        for (int i = 0; i < count; i++) out[i] = *(const double *)(const void *)(data + i * stride);
+    else
+        for (int i = 0; i < count; i++) out[i] = (double)*(const float *)(const void *)(data + i * stride);
+}
+
+/* What a thread needs for a block. */
+typedef struct block_room {
+    const double **inputs;
+    double *values; /* of the inputs, then the stack */
+} block_room;
+
+static bool rooms_create(const scene_derived *derived, int threads, block_room **out)
+{
+    const size_t inputs = (size_t)derived->input_count, rows = inputs + (size_t)derived->expression.depth;
+    block_room *rooms = *out = base_calloc((size_t)threads, sizeof *rooms);
+    for (int t = 0; t < threads && rooms; t++) {
+        rooms[t].inputs = base_alloc(inputs * sizeof *rooms[t].inputs);
+        rooms[t].values = base_alloc(rows * SCENE_BLOCK * sizeof *rooms[t].values);
+        if (!rooms[t].inputs || !rooms[t].values) return false;
+        for (size_t k = 0; k < inputs; k++) rooms[t].inputs[k] = rooms[t].values + k * SCENE_BLOCK;
+    }
+    return rooms != NULL;
+}
+
+static void rooms_free(block_room *rooms, int threads)
+{
+    for (int t = 0; t < threads && rooms; t++) {
+        base_free(rooms[t].inputs);
+        base_free(rooms[t].values);
+    }
+    base_free(rooms);
+}
+
+static void evaluate(const scene_derived *derived, const grid_field *inputs, const block_room *rooms,
+                     const session_field *field, int64_t count, int threads)
+{
+    const int64_t blocks = (count + SCENE_BLOCK - 1) / SCENE_BLOCK;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+        const block_room *room = &rooms[omp_get_thread_num()];
+        double *stack = room->values + (int64_t)derived->input_count * SCENE_BLOCK;
+#pragma omp for schedule(dynamic, REGION_ITEMS / SCENE_BLOCK) nowait
+        for (int64_t block = 0; block < blocks; block++) {
+            const int64_t first = block * SCENE_BLOCK;
+            const int size = count - first < SCENE_BLOCK ? (int)(count - first) : SCENE_BLOCK;
+            for (int k = 0; k < derived->input_count; k++)
+                load_block(&inputs[k], first, size, room->values + k * SCENE_BLOCK);
+            scene_evaluate(&derived->expression, room->inputs, size, stack);
+            for (int i = 0; i < size; i++) store(field, first + i, stack + i);
+        }
+        region_leave();
+    }
+}
+
+static bool make_expression(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
+{
+    const int threads = w->basis->team->threads;
+    session_field *field = &part->fields[index];
+    block_room *rooms = NULL;
+    grid_field *inputs = base_alloc((size_t)w->derived->input_count * sizeof *inputs);
+    const bool is_done = inputs && rooms_create(w->derived, threads, &rooms) && make_room(w, part, field);
+    for (int k = 0; k < w->derived->input_count && is_done; k++) {
+        const scene_field *input = &w->derived->inputs[k];
+        const int count = part->fields[session_find_field(part, input->name)].given.component_count;
+        inputs[k] = input_values(w, mesh, part, k, component_of(input, count));
+    }
+    if (is_done) evaluate(w->derived, inputs, rooms, field, place_count(part, field), threads);
+    rooms_free(rooms, threads);
+    base_free(inputs);
+    if (is_done) note_values(w, mesh, part, index);
+    return is_done;
+}
+
+static void make_expressions(const derive_work *w, base_error *error)
+{
+    const session_catalogue *catalogue = w->basis->catalogue;
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        int index = 0;
+        session_mesh *part = w->stale[m] ? find_part(w, &catalogue->meshes[m], &index) : NULL;
+        if (part && !error->status && !make_expression(w, &catalogue->meshes[m], part, index))
+            session_no_memory(error, place_count(part, &part->fields[index]) * 8, "a derived field");
+    }
+}
+
+/* ---- gradients -----------------------------------------------------------------------------------------------------
+ */
+
+static int keep_component(int component, const double vector[3], double *out)
+{
+    if (component == SCENE_COMPONENT_MAGNITUDE)
+        out[0] = sqrt((vector[0] * vector[0] + vector[1] * vector[1]) + vector[2] * vector[2]);
+    else if (component >= 0)
+        out[0] = vector[component];
+    else
+        memcpy(out, vector, SPACE * sizeof *out);
+    return component == SCENE_COMPONENT_DEFAULT ? SPACE : 1;
+}
+
+/* Makes the values at a vertex of the gradient of each component. */
+static void make_values(const scene_derived *derived, const double gradient[SPACE][SPACE], double out[SPACE])
+{
+    double curl[SPACE];
+    switch (derived->kind) {
+    case SCENE_DIVERGENCE: out[0] = session_divergence(gradient); break;
+    case SCENE_Q_CRITERION: out[0] = session_q_criterion(gradient); break;
+    case SCENE_LAMBDA2: out[0] = session_lambda2(gradient); break;
+    case SCENE_STRAIN_RATE: out[0] = session_strain_rate(gradient); break;
+    case SCENE_VORTICITY:
+        session_curl(gradient, curl);
+        keep_component(derived->component, curl, out);
+        break;
+    default: keep_component(derived->component, gradient[0], out); break;
+    }
+}
+
+static void store_gradients(const derive_work *w, const session_vertex_sums *sums, const session_sum_part *part,
+                            const session_field *field)
+{
+    const int words = session_sum_words(sums->field_count);
+#pragma omp parallel num_threads(w->basis->team->threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic, REGION_ITEMS) nowait
+        for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
+            double gradient[SPACE][SPACE] = {{0}}, values[SPACE] = {(double)NAN, (double)NAN, (double)NAN};
+            if (part->entries[v] >= 0) {
+                session_mean_gradients(sums->sums + (int64_t)part->entries[v] * words, sums->field_count, &sums->bounds,
+                                       sums->length, gradient);
+                make_values(w->derived, (const double(*)[SPACE])gradient, values);
+            }
+            store(field, v, values);
+        }
+        region_leave();
+    }
+}
+
+/* The scalars whose gradients are taken. A vector of two components has none along z. */
+static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
+                        grid_field out[SESSION_GRADIENTS])
+{
+    const scene_derived *derived = w->derived;
+    const int first = session_find_field(part, derived->inputs[0].name);
+    const int count = is_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
+    for (int c = 0; c < count; c++)
+        out[c] = input_values(w, mesh, part, is_vector(derived) ? 0 : c,
+                              is_vector(derived) ? c : component_of(&derived->inputs[c], 1));
+    return count;
+}
+
+/* The first of the joint's meshes on which the field is sound. All such have a vector of as many components. */
+static const session_catalogue_mesh *first_sound(const derive_work *w, const session_joint *joint)
+{
+    int i = 0;
+    while (i < joint->count && !find_field(w, joint->meshes[i])) i++;
+    return i < joint->count ? joint->meshes[i] : NULL;
+}
+
+/* A number that ranks without a part of a mesh have to know, too. */
+static int count_scalars(const derive_work *w, const session_joint *joint)
+{
+    if (!is_vector(w->derived)) return w->derived->input_count;
+    return session_catalogue_find(first_sound(w, joint), w->derived->inputs[0].name)->component_count;
+}
+
+static insitu_status begin_sums(const derive_work *w, const session_joint *joint, session_vertex_sums *sums,
+                                base_error *error)
+{
+    sums->parts = base_calloc((size_t)joint->count, sizeof *sums->parts);
+    if (!sums->parts) return session_no_memory(error, joint->count * 100LL, "gradients at vertices");
+    sums->part_count = joint->count;
+    for (int i = 0; i < joint->count; i++) {
+        int index = 0;
+        session_sum_part *part = &sums->parts[i];
+        part->mesh = find_part(w, joint->meshes[i], &index);
+        part->of_shells = joint->meshes[i]->has_shells_alone;
+        if (part->mesh) list_scalars(w, joint->meshes[i], part->mesh, part->fields);
+        if (part->mesh && !make_room(w, part->mesh, &part->mesh->fields[index]))
+            return session_no_memory(error, part->mesh->cells.vertex_count * 8, "a derived field");
+    }
+    return session_key_all_vertices(sums, error);
+}
+
+/* Takes the gradients over the meshes of a joint. Collective; what fails at the very end is in *error alone. */
+static insitu_status derive_joint(const derive_work *w, const session_joint *joint, base_error *error)
+{
+    session_vertex_sums sums = {.by_id = joint->by_id, .field_count = count_scalars(w, joint)};
+    if (!error->status) begin_sums(w, joint, &sums, error);
+    const insitu_status status = session_find_sums(joint->homes, w->basis->team, w->basis->extent, &sums, error);
+    for (int i = 0; i < sums.part_count && !status && !error->status; i++) {
+        int index = 0;
+        if (!find_part(w, joint->meshes[i], &index)) continue;
+        session_mesh *mesh = sums.parts[i].mesh;
+        store_gradients(w, &sums, &sums.parts[i], &mesh->fields[index]);
+        note_values(w, joint->meshes[i], mesh, index);
+    }
+    session_vertex_sums_free(&sums);
+    return status;
+}
+
+static bool is_joint_stale(const derive_work *w, const session_joint *joint)
+{
+    const session_catalogue *catalogue = w->basis->catalogue;
+    bool is_stale = false;
+    for (int i = 0; i < joint->count; i++) is_stale = is_stale || w->stale[joint->meshes[i] - catalogue->meshes];
+    return is_stale;
+}
+
+/* Goes through the joints of the meshes with the field, each once. */
+static insitu_status derive_joints(const derive_work *w, base_error *error)
+{
+    const session_catalogue *catalogue = w->basis->catalogue;
+    insitu_status status = INSITU_OK;
+    for (int m = 0; m < catalogue->mesh_count && !status; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        const session_joint *joint =
+            find_field(w, mesh) ? session_find_joint(catalogue, session_joint_name(mesh, w->derived->joined)) : NULL;
+        if (joint && first_sound(w, joint) == mesh && is_joint_stale(w, joint)) status = derive_joint(w, joint, error);
+    }
+    return status;
+}
+
+/* ---- one derived field ---------------------------------------------------------------------------------------------
+ */
+
+static insitu_status derive(derive_work *w, base_error *error)
+{
+    const session_derive_basis *b = w->basis;
+    const bool is_expression = w->derived->kind == SCENE_EXPRESSION;
+    if (!list_recentrings(w)) session_no_memory(error, 1000, "the plan of derived fields");
+    insitu_status status = session_agree(b->team->comm, error);
+    if (!status && (!is_expression || w->recentring_count))
+        status = session_update_homes(b->catalogue, b->meshes, b->extent->half_diagonal, b->team, error);
+    if (!status) status = session_recentre(w->recentrings, w->recentring_count, w->stale, b->meshes, b->team, error);
+    if (!status) status = find_stale(w, error);
+    if (!status && is_expression)
+        make_expressions(w, error);
+    else if (!status)
+        status = derive_joints(w, error);
+    return status ? status : session_agree(b->team->comm, error);
+}
+
+insitu_status session_derive(const session_derive_basis *basis, uint64_t needed, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < basis->scene->derived_count && !status; i++) {
+        if (!(needed >> i & 1)) continue;
+        derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .number = i};
+        status = derive(&work, error);
+        base_free(work.recentrings);
+        base_free(work.stale);
+    }
+    return status;
+}

@@ -1,0 +1,22 @@
+/* The values of derived fields. */
+#ifndef SESSION_DERIVE_H
+#define SESSION_DERIVE_H
+
+#include "scene.h"
+#include "session_catalogue.h"
+#include "session_space.h"
+
+/* Input of the values; the same on every rank but for its own meshes. */
+typedef struct session_derive_basis {
+    const scene *scene;
+    session_catalogue *catalogue;
+    session_meshes *meshes;
+    const session_team *team;
+    const session_extent *extent;
+} session_derive_basis;
+
+/* Makes the values of the needed derived fields, a bit each, that are out of date on any rank; what they are made of
+ * has been filled and copied. needed: with their sources. Collective, agreed. */
+insitu_status session_derive(const session_derive_basis *basis, uint64_t needed, base_error *error);
+
+#endif

@@ -1,0 +1,265 @@
+#include "session_derived.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_events.h"
+
+int session_find_derived(const scene *scene, const char *name)
+{
+    for (int i = 0; i < scene->derived_count && name; i++)
+        if (strcmp(scene->derived[i].name, name) == 0) return i;
+    return -1;
+}
+
+/* ---- what is needed ------------------------------------------------------------------------------------------- */
+
+static uint64_t bit_of(const scene *scene, const scene_field *field)
+{
+    const int derived = session_find_derived(scene, field->name);
+    return derived < 0 ? 0 : (uint64_t)1 << derived;
+}
+
+/* Adds those that the fields are made of, which come before them. */
+static uint64_t with_sources(const scene *scene, uint64_t needed)
+{
+    for (int i = scene->derived_count - 1; i >= 0; i--)
+        for (int k = 0; k < scene->derived[i].input_count && needed >> i & 1; k++)
+            if (scene->derived[i].made_by[k] >= 0) needed |= (uint64_t)1 << scene->derived[i].made_by[k];
+    return needed;
+}
+
+static uint64_t bits_of_image(const scene *scene, const scene_image *image)
+{
+    uint64_t bits = 0;
+    for (int i = 0; i < image->isosurface_count; i++)
+        bits |= bit_of(scene, &image->isosurfaces[i].field) | bit_of(scene, &image->isosurfaces[i].colour_by);
+    for (int i = 0; i < image->volume_count; i++) bits |= bit_of(scene, &image->volumes[i].field);
+    for (int i = 0; i < image->slice_count; i++) bits |= bit_of(scene, &image->slices[i].field);
+    for (int i = 0; i < image->surface_count; i++)
+        bits |= bit_of(scene, &image->surfaces[i].colour_by) | bit_of(scene, &image->surfaces[i].threshold.field);
+    return bits;
+}
+
+uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan)
+{
+    uint64_t bits = 0;
+    for (int i = 0; i < plan->image_count && scene->derived_count; i++)
+        if (plan->images[i]->variant.view == 0) bits |= bits_of_image(scene, plan->images[i]);
+    return with_sources(scene, bits);
+}
+
+uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images)
+{
+    uint64_t bits = 0;
+    for (int i = 0; i < scene->statistics_count; i++)
+        if (session_is_statistics_due(&scene->statistics[i], cycle)) bits |= bit_of(scene, &scene->statistics[i].field);
+    for (int i = 0; i < scene->image_count && images; i++)
+        if (scene->images[i].when.is_given) bits |= bit_of(scene, &scene->images[i].when.field);
+    return with_sources(scene, bits);
+}
+
+void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes)
+{
+    for (int m = 0; m < meshes->count; m++) {
+        session_mesh *mesh = meshes->items[m];
+        for (int f = 0; f < mesh->field_count; f++) mesh->fields[f].is_source = false;
+        for (int i = 0; i < scene->derived_count; i++) {
+            if (!(needed >> i & 1) || session_find_field(mesh, scene->derived[i].name) < 0) continue;
+            for (int k = 0; k < scene->derived[i].input_count; k++) {
+                const int source = session_find_field(mesh, scene->derived[i].inputs[k].name);
+                if (source >= 0) mesh->fields[source].is_source = true;
+            }
+        }
+    }
+}
+
+/* ---- what is wrong with one on a mesh ------------------------------------------------------------------------- */
+
+typedef struct derived_place {
+    const char *scene_path;
+    const scene_derived *derived;
+    const session_catalogue_mesh *mesh, *first_mesh; /* first_mesh: of the catalogue */
+} derived_place;
+
+/* Begins a message: "scene.yaml:3: fields.q.vorticity". */
+#define AT "%s:%d: fields.%.200s%s%s: "
+#define OF(place)                                                                                                      \
+    (place)->scene_path, (place)->derived->line, (place)->derived->name, *(place)->derived->key ? "." : "",            \
+        (place)->derived->key
+
+static insitu_status refuse_components(const derived_place *at, const scene_field *input,
+                                       const session_catalogue_field *found, base_error *error)
+{
+    const char *name = input->name;
+    if (at->derived->kind == SCENE_EXPRESSION)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         AT "field \"%s\" has %d components on mesh \"%s\", expected one of them, as %s.x, or mag(%s)",
+                         OF(at), name, found->component_count, at->mesh->name, name, name);
+    return base_fail(error, INSITU_ERROR_FIELD,
+                     AT "field \"%s\" has %d components on mesh \"%s\", expected a scalar, as %s.x, or a derived field "
+                        "that is mag(%s)",
+                     OF(at), name, found->component_count, at->mesh->name, name, name);
+}
+
+static bool is_vector(const scene_derived *derived)
+{
+    return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
+}
+
+/* Vectors on meshes that are taken as one have as many components. */
+static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
+                                        const session_catalogue_field *found, base_error *error)
+{
+    for (const session_catalogue_mesh *other = at->first_mesh; other < at->mesh; other++) {
+        const session_catalogue_field *there = session_catalogue_find(other, input->name);
+        if (!there || there->fault || there->component_count == found->component_count) continue;
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         AT "field \"%s\" has %d components on mesh \"%s\" and %d on mesh \"%s\", expected as many",
+                         OF(at), input->name, there->component_count, other->name, found->component_count,
+                         at->mesh->name);
+    }
+    return INSITU_OK;
+}
+
+static insitu_status check_components(const derived_place *at, const scene_field *input,
+                                      const session_catalogue_field *found, base_error *error)
+{
+    const int count = found->component_count;
+    if (is_vector(at->derived)) {
+        if (count == 2 || count == 3) return check_other_meshes(at, input, found, error);
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         AT "field \"%s\" has %d component%s on mesh \"%s\", expected a vector of 2 or 3, or a list of "
+                            "2 or 3 scalars, as [u, v, w]",
+                         OF(at), input->name, count, count == 1 ? "" : "s", at->mesh->name);
+    }
+    if (input->component == SCENE_COMPONENT_ONLY && count > 1) return refuse_components(at, input, found, error);
+    if (input->component < count) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_FIELD,
+                     AT "component %d of field \"%s\" is asked for; on mesh \"%s\" it has %d, expected 0 to %d", OF(at),
+                     input->component, input->name, at->mesh->name, count, count - 1);
+}
+
+static insitu_status check_input(const derived_place *at, const scene_field *input,
+                                 const session_catalogue_field *found, base_error *error)
+{
+    if (found->fault) {
+        *error = *found->fault;
+        return error->status;
+    }
+    if (found->odd_rank >= 0)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         AT "rank %d: mesh \"%s\": field \"%s\" has another centring or number of components than on "
+                            "rank %d",
+                         OF(at), found->odd_rank, at->mesh->name, input->name, found->first_rank);
+    if (found->lacking_rank >= 0)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         AT "rank %d: mesh \"%s\": field \"%s\" is not set, other ranks have it", OF(at),
+                         found->lacking_rank, at->mesh->name, input->name);
+    return check_components(at, input, found, error);
+}
+
+/* ---- names in the catalogue ------------------------------------------------------------------------------------ */
+
+static bool keep_fault(session_catalogue_field *field, const base_error *error)
+{
+    if (field->fault) return true;
+    field->fault = base_calloc(1, sizeof *field->fault);
+    if (field->fault) *field->fault = *error;
+    return field->fault != NULL;
+}
+
+static bool add_to_mesh(const char *scene_path, const scene *scene, int number, const session_catalogue *catalogue,
+                        session_catalogue_mesh *mesh)
+{
+    const scene_derived *derived = &scene->derived[number];
+    const derived_place at = {scene_path, derived, mesh, catalogue->meshes};
+    bool is_of_cells = derived->kind == SCENE_EXPRESSION;
+    base_error error = {.status = INSITU_OK};
+    for (int k = 0; k < derived->input_count; k++) {
+        const session_catalogue_field *found = session_catalogue_find(mesh, derived->inputs[k].name);
+        if (!found) return true;
+        is_of_cells = is_of_cells && found->centring == INSITU_CELL;
+        if (!error.status) check_input(&at, &derived->inputs[k], found, &error);
+    }
+    session_catalogue_field *field = NULL;
+    for (int f = 0; f < mesh->field_count; f++)
+        if (strcmp(mesh->fields[f].name, derived->name) == 0) field = &mesh->fields[f];
+    if (field)
+        base_fail(&error, INSITU_ERROR_FIELD,
+                  AT "mesh \"%s\" has a field of this name already, expected another name for the derived one", OF(&at),
+                  mesh->name);
+    const bool is_vector = (derived->kind == SCENE_GRADIENT_OF || derived->kind == SCENE_VORTICITY) &&
+                           derived->component == SCENE_COMPONENT_DEFAULT;
+    if (!field)
+        field = session_catalogue_add(mesh, derived->name, is_vector ? 3 : 1, is_of_cells ? INSITU_CELL : INSITU_VERTEX,
+                                      number);
+    return field && (!error.status || keep_fault(field, &error));
+}
+
+static bool name_in_catalogue(const scene *scene, const char *scene_path, session_catalogue *catalogue)
+{
+    session_catalogue_drop_derived(catalogue);
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        for (int i = 0; i < scene->derived_count; i++)
+            if (!add_to_mesh(scene_path, scene, i, catalogue, &catalogue->meshes[m])) return false;
+    return true;
+}
+
+/* ---- fields of this rank's meshes ------------------------------------------------------------------------------ */
+
+static bool is_sound(const session_catalogue_field *field)
+{
+    return field->derived >= 0 && !field->fault;
+}
+
+static bool are_fields_named(const session_catalogue_mesh *all, const session_mesh *mesh)
+{
+    int expected = 0, found = 0;
+    for (int f = 0; f < mesh->field_count; f++) found += mesh->fields[f].is_derived;
+    for (int f = 0; f < all->field_count; f++) {
+        const session_catalogue_field *field = &all->fields[f];
+        if (!is_sound(field)) continue;
+        const int at = session_find_field(mesh, field->name);
+        if (at < 0 || !mesh->fields[at].is_derived || mesh->fields[at].given.centring != field->centring ||
+            mesh->fields[at].given.component_count != field->component_count)
+            return false;
+        expected++;
+    }
+    return found == expected;
+}
+
+static bool name_on_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
+{
+    if (are_fields_named(all, mesh)) return true;
+    session_drop_derived(mesh);
+    for (int f = 0; f < all->field_count; f++) {
+        const session_catalogue_field *field = &all->fields[f];
+        if (!is_sound(field)) continue;
+        session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
+        char *name = fields ? base_strdup(field->name) : NULL;
+        if (fields) mesh->fields = fields;
+        if (!name) return false;
+        fields[mesh->field_count++] = (session_field){
+            .given = {.name = name, .component_count = field->component_count, .centring = field->centring},
+            .is_derived = true};
+    }
+    return true;
+}
+
+insitu_status session_name_derived(const scene *scene, const char *scene_path, session_catalogue *catalogue,
+                                   session_meshes *meshes, const session_team *team, base_error *error)
+{
+    if (catalogue->are_derived) return INSITU_OK;
+    bool is_done = name_in_catalogue(scene, scene_path, catalogue);
+    for (int m = 0; m < catalogue->mesh_count && is_done; m++) {
+        session_mesh *mesh = session_find_mesh(meshes, catalogue->meshes[m].name);
+        if (mesh && mesh->is_given) is_done = name_on_mesh(&catalogue->meshes[m], mesh);
+    }
+    catalogue->are_joined = catalogue->are_joined && scene->derived_count == 0;
+    if (!is_done) session_no_memory(error, scene->derived_count * 100LL, "the names of derived fields");
+    const insitu_status status = scene->derived_count ? session_agree(team->comm, error) : INSITU_OK;
+    catalogue->are_derived = !status;
+    return status;
+}

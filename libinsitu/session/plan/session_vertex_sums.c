@@ -1,0 +1,341 @@
+/* A rank knows the vertices that it needs, but may not have all cells around them: it asks the ranks whose boxes hold
+ * such a vertex for their share of its sum.
+ *
+ *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
+ *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
+ *     shared: <--(sums)--, in whole numbers, which add up in any order
+ *
+ * If a mesh is cut into blocks, few vertices lie in other ranks' boxes; if each rank has cells everywhere, each asks
+ * all others. */
+#include "session_vertex_sums.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "region.h"
+#include "session_agree.h"
+#include "session_neighbours.h"
+
+enum { KEY_WORDS = 3 };
+
+/* ---- keys of all vertices ------------------------------------------------------------------------------------- */
+
+/* Marks the vertices of cells that are no ghosts with 0, the others with -1. */
+static void mark_vertices(session_sum_part *part)
+{
+    const grid *g = &part->mesh->cells;
+    for (int64_t v = 0; v < g->vertex_count; v++) part->entries[v] = -1;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (grid_is_ghost(g, cell)) continue;
+        grid_walk walk = grid_walk_cell(g, cell);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) part->entries[vertex] = 0;
+    }
+}
+
+static bool key_all_vertices(session_vertex_sums *sums)
+{
+    int64_t most = 0;
+    for (int i = 0; i < sums->part_count; i++) {
+        session_sum_part *part = &sums->parts[i];
+        const int64_t count = part->mesh ? part->mesh->cells.vertex_count : 0;
+        part->entries = base_alloc((size_t)count * sizeof *part->entries);
+        if (!part->entries) return false;
+        most += count;
+    }
+    if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;
+    for (int i = 0; i < sums->part_count; i++) {
+        session_sum_part *part = &sums->parts[i];
+        if (!part->mesh) continue;
+        mark_vertices(part);
+        for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
+            if (part->entries[v] < 0) continue;
+            const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
+            part->entries[v] = (int32_t)session_keys_add(&sums->keys, &key);
+        }
+    }
+    sums->own_count = sums->keys.count;
+    return true;
+}
+
+static int64_t vertex_count(const session_vertex_sums *sums)
+{
+    int64_t count = 0;
+    for (int i = 0; i < sums->part_count; i++)
+        count += sums->parts[i].mesh ? sums->parts[i].mesh->cells.vertex_count : 0;
+    return count;
+}
+
+insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error)
+{
+    sums->are_all = true;
+    if (key_all_vertices(sums)) return INSITU_OK;
+    return session_no_memory(error, vertex_count(sums) * 60, "gradients at vertices");
+}
+
+/* ---- what ranks ask of each other ---------------------------------------------------------------------------- */
+
+/* The letters of an exchange. */
+typedef struct sums_mail {
+    double (*places)[3];
+    session_mail questions, asked, answers, answered;
+    int64_t *own_numbers, *asked_numbers;
+} sums_mail;
+
+static void mail_free(sums_mail *mail)
+{
+    base_free(mail->places);
+    session_mail_free(&mail->questions);
+    session_mail_free(&mail->asked);
+    session_mail_free(&mail->answers);
+    session_mail_free(&mail->answered);
+    base_free(mail->own_numbers);
+    base_free(mail->asked_numbers);
+}
+
+/* Finds a vertex for each of this rank's keys. */
+static bool find_places(const session_vertex_sums *sums, double (**out)[3])
+{
+    *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
+    if (!*out) return false;
+    for (int i = 0; i < sums->part_count; i++) {
+        const session_sum_part *part = &sums->parts[i];
+        for (int64_t v = 0; part->mesh && v < part->mesh->cells.vertex_count; v++) {
+            if (part->entries[v] < 0) continue;
+            int64_t number = part->entries[v];
+            if (!sums->are_all) {
+                const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
+                number = session_keys_find(&sums->keys, &key);
+            }
+            grid_vertex(&part->mesh->cells, v, (*out)[number]);
+        }
+    }
+    return true;
+}
+
+/* Writes to each rank the keys in its box. numbers gets the keys' numbers, in the order of the mail. */
+static bool write_questions(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
+                            const double (*places)[3], session_mail *out, int64_t **numbers)
+{
+    int64_t total = 0, at = 0;
+    out->counts = base_calloc((size_t)team->ranks, sizeof *out->counts);
+    if (!out->counts) return false;
+    for (int n = 0; n < homes->near_count; n++)
+        for (int64_t i = 0; i < sums->own_count && homes->near[n] != team->rank; i++)
+            out->counts[homes->near[n]] += session_is_in_box(&homes->boxes[n], places[i]);
+    for (int rank = 0; rank < team->ranks; rank++) total += out->counts[rank];
+    out->words = base_alloc((size_t)(total ? total : 1) * KEY_WORDS * sizeof *out->words);
+    *numbers = base_alloc((size_t)(total ? total : 1) * sizeof **numbers);
+    if (!out->words || !*numbers) return false;
+    for (int n = 0; n < homes->near_count; n++) {
+        const int rank = homes->near[n];
+        for (int64_t i = 0; i < sums->own_count && out->counts[rank]; i++) {
+            if (!session_is_in_box(&homes->boxes[n], places[i])) continue;
+            memcpy(out->words + at * KEY_WORDS, sums->keys.keys[i].words, KEY_WORDS * sizeof *out->words);
+            (*numbers)[at++] = i;
+        }
+        out->counts[rank] *= KEY_WORDS;
+    }
+    out->total = total * KEY_WORDS;
+    return true;
+}
+
+/* Makes room for the keys of the questions behind this rank's own. */
+static bool extend_keys(session_vertex_sums *sums, int64_t more)
+{
+    session_key_table all;
+    if (!session_keys_create(&all, sums->own_count + more)) return false;
+    for (int64_t i = 0; i < sums->own_count; i++) session_keys_add(&all, &sums->keys.keys[i]);
+    session_keys_free(&sums->keys);
+    sums->keys = all;
+    return true;
+}
+
+/* Adds the keys of the questions, or, where all vertices have keys, looks them up. numbers are theirs, in the order of
+ * the mail; -1: this rank has nothing there. */
+static bool read_questions(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
+{
+    const int64_t count = in->total / KEY_WORDS;
+    *numbers = base_alloc((size_t)(count ? count : 1) * sizeof **numbers);
+    if (!*numbers || (!sums->are_all && !extend_keys(sums, count))) return false;
+    for (int64_t i = 0; i < count; i++) {
+        session_key key;
+        memcpy(key.words, in->words + i * KEY_WORDS, sizeof key.words);
+        (*numbers)[i] = sums->are_all ? session_keys_find(&sums->keys, &key) : session_keys_add(&sums->keys, &key);
+    }
+    return sums->keys.count <= INT32_MAX;
+}
+
+static insitu_status ask(const session_homes *homes, const session_team *team, session_vertex_sums *sums,
+                         sums_mail *mail, base_error *error)
+{
+    if (!error->status &&
+        (!find_places(sums, &mail->places) ||
+         !write_questions(sums, team, homes, (const double(*)[3])mail->places, &mail->questions, &mail->own_numbers)))
+        session_no_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
+    const insitu_status status =
+        session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->questions, &mail->asked, error);
+    if (!status && !error->status && !read_questions(&mail->asked, sums, &mail->asked_numbers))
+        session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
+    return status;
+}
+
+static bool write_answers(const session_vertex_sums *sums, const sums_mail *mail, int ranks, session_mail *out)
+{
+    const session_mail *questions = &mail->asked;
+    const int64_t count = questions->total / KEY_WORDS, words = session_sum_words(sums->field_count);
+    out->counts = base_calloc((size_t)ranks, sizeof *out->counts);
+    out->words = base_calloc((size_t)(count ? count : 1), (size_t)words * sizeof *out->words);
+    if (!out->counts || !out->words) return false;
+    for (int rank = 0; rank < ranks; rank++) out->counts[rank] = questions->counts[rank] / KEY_WORDS * words;
+    for (int64_t i = 0; i < count; i++)
+        if (mail->asked_numbers[i] >= 0)
+            memcpy(out->words + i * words, sums->sums + mail->asked_numbers[i] * words,
+                   (size_t)words * sizeof *out->words);
+    out->total = count * words;
+    return true;
+}
+
+static void add_answers(const sums_mail *mail, session_vertex_sums *sums)
+{
+    const int64_t words = session_sum_words(sums->field_count);
+    for (int64_t i = 0; i < mail->answered.total / words; i++) {
+        int64_t *sum = sums->sums + mail->own_numbers[i] * words;
+        for (int64_t k = 0; k < words; k++) {
+            int64_t share;
+            memcpy(&share, &mail->answered.words[i * words + k], sizeof share);
+            sum[k] += share;
+        }
+    }
+}
+
+static insitu_status answer(const session_team *team, session_vertex_sums *sums, sums_mail *mail, base_error *error)
+{
+    if (!error->status && !write_answers(sums, mail, team->ranks, &mail->answers))
+        session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
+    const insitu_status status =
+        session_mail_deliver(team->comm, SESSION_MAIL_BACK, &mail->answers, &mail->answered, error);
+    if (!status && !error->status) add_answers(mail, sums);
+    return status;
+}
+
+/* ---- sums ---------------------------------------------------------------------------------------------------- */
+
+/* A few bits of each key, so that most vertices need no look into the table. */
+typedef struct key_filter {
+    uint64_t *bits;
+    uint64_t mask;
+} key_filter;
+
+static bool filter_create(const session_key_table *keys, key_filter *out)
+{
+    uint64_t size = 1024;
+    while (size < 16 * (uint64_t)keys->count) size *= 2;
+    *out = (key_filter){base_calloc((size_t)(size / 64), sizeof *out->bits), size - 1};
+    for (int64_t i = 0; out->bits && i < keys->count; i++) {
+        const uint64_t bit = session_key_hash(&keys->keys[i]) >> 32 & out->mask;
+        out->bits[bit / 64] |= (uint64_t)1 << bit % 64;
+    }
+    return out->bits != NULL;
+}
+
+/* Finds all vertices with one of the keys: this rank's own, which a crack may double, and those asked for. */
+static bool find_entries(const session_vertex_sums *sums, const session_sum_part *part, int threads)
+{
+    key_filter filter;
+    if (!filter_create(&sums->keys, &filter)) return false;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
+            const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
+            const uint64_t bit = session_key_hash(&key) >> 32 & filter.mask;
+            const bool may_be = filter.bits[bit / 64] >> bit % 64 & 1;
+            part->entries[v] = may_be ? (int32_t)session_keys_find(&sums->keys, &key) : -1;
+        }
+        region_leave();
+    }
+    base_free(filter.bits);
+    return true;
+}
+
+static session_gradient_basis basis_of(const session_vertex_sums *sums, const session_sum_part *part, int threads)
+{
+    return (session_gradient_basis){&part->mesh->cells, part->fields, sums->field_count, part->of_shells, part->entries,
+                                    sums->length,       threads};
+}
+
+/* Lists the cells of each part, and finds this rank's bounds of what they give. */
+static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
+{
+    const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
+    sums->sums = base_calloc(count, (size_t)session_sum_words(sums->field_count) * sizeof *sums->sums);
+    if (!sums->sums) return false;
+    for (int i = 0; i < sums->part_count && sums->keys.count; i++) {
+        session_gradient_bounds own;
+        const session_sum_part *part = &sums->parts[i];
+        if (!part->mesh) continue;
+        if (!sums->are_all && !find_entries(sums, part, threads)) return false;
+        const session_gradient_basis basis = basis_of(sums, part, threads);
+        if (!session_list_cells(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own)) return false;
+        sums->bounds.rise = fmax(sums->bounds.rise, own.rise);
+        sums->bounds.sharpness = fmax(sums->bounds.sharpness, own.sharpness);
+    }
+    return true;
+}
+
+static bool add_sums(const session_vertex_sums *sums, const session_cell_list *lists, int threads)
+{
+    for (int i = 0; i < sums->part_count; i++) {
+        if (!lists[i].count) continue;
+        const session_gradient_basis basis = basis_of(sums, &sums->parts[i], threads);
+        if (!session_add_gradients(&basis, &lists[i], &sums->bounds, sums->keys.count, sums->sums)) return false;
+    }
+    return true;
+}
+
+/* The bounds are those of all ranks. If a rank has failed before, all return its error; what fails behind the reduction
+ * is in *error alone. Collective. */
+static insitu_status make_sums(const session_team *team, session_vertex_sums *sums, session_cell_list *lists,
+                               base_error *error)
+{
+    const int64_t bytes = sums->keys.count * session_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
+    if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
+        session_no_memory(error, bytes, "gradients at vertices");
+    /* The last one tells whether a rank has failed. */
+    double largest[3] = {sums->bounds.rise, sums->bounds.sharpness, error->status != INSITU_OK};
+    insitu_status status =
+        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");
+    sums->bounds = (session_gradient_bounds){largest[0], largest[1]};
+    if (!status && largest[2] > 0) status = session_agree(team->comm, error);
+    if (!status && !add_sums(sums, lists, team->threads)) session_no_memory(error, bytes, "gradients at vertices");
+    return status;
+}
+
+insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
+                                session_vertex_sums *sums, base_error *error)
+{
+    int exponent = 0;
+    sums_mail mail = {0};
+    insitu_status status = INSITU_OK;
+    session_cell_list *lists = base_calloc((size_t)sums->part_count, sizeof *lists);
+    frexp(extent->half_diagonal, &exponent);
+    sums->length = ldexp(1, exponent);
+    if (team->ranks > 1) status = ask(homes, team, sums, &mail, error);
+    if (!status) status = make_sums(team, sums, lists, error);
+    if (!status && team->ranks > 1) status = answer(team, sums, &mail, error);
+    for (int i = 0; i < sums->part_count && lists; i++) base_free(lists[i].cells);
+    base_free(lists);
+    mail_free(&mail);
+    return status;
+}
+
+void session_vertex_sums_free(session_vertex_sums *sums)
+{
+    for (int i = 0; i < sums->part_count && sums->parts; i++) base_free(sums->parts[i].entries);
+    base_free(sums->parts);
+    base_free(sums->sums);
+    session_keys_free(&sums->keys);
+}

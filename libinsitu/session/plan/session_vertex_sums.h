@@ -1,0 +1,43 @@
+/* Sums of gradients at vertices over all ranks (scalars/session_gradients.h). */
+#ifndef SESSION_VERTEX_SUMS_H
+#define SESSION_VERTEX_SUMS_H
+
+#include "session_catalogue.h"
+#include "session_exchange.h"
+#include "session_gradients.h"
+#include "session_space.h"
+
+/* This rank's part of one mesh. */
+typedef struct session_sum_part {
+    session_mesh *mesh; /* NULL: nothing of it is here */
+    bool of_shells;
+    grid_field fields[SESSION_GRADIENTS];
+    int32_t *entries; /* of each vertex, its key, or -1 */
+} session_sum_part;
+
+/* This rank's work on the sums of the same scalars of one mesh or several. */
+typedef struct session_vertex_sums {
+    int part_count;
+    session_sum_part *parts;
+    int field_count;
+    bool by_id;   /* vertices are the same by global ids, else by coordinates */
+    bool are_all; /* every vertex of each part has a key: all ranks have all their cells' sums */
+    session_key_table keys;
+    int64_t own_count; /* of keys: those behind are others' questions */
+    session_gradient_bounds bounds;
+    double length;
+    int64_t *sums; /* session_sum_words() a key */
+} session_vertex_sums;
+
+/* Gives every vertex of a cell that is not a ghost a key. The parts' meshes are known. Local. */
+insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
+
+/* Find the sums of this rank's keys, over all ranks. Keys and entries have been made. A rank that has failed before
+ * calls with its error in *error. What fails at the very end is in *error alone. Collective, else agreed. */
+insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
+                                session_vertex_sums *sums, base_error *error);
+
+/* Frees all but the parts' meshes. */
+void session_vertex_sums_free(session_vertex_sums *sums);
+
+#endif

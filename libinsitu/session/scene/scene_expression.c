@@ -1,0 +1,440 @@
+/* The parser descends by the strength of operators:
+ *
+ *     sum     = product { (+ | -) product }
+ *     product = sign { (* | /) sign }
+ *     sign    = { + | - } power
+ *     power   = primary [ ^ sign ]                 so that -x^2 is -(x^2), and x^-1 is allowed
+ *     primary = number | ( sum ) | function ( sum [, sum] ) | mag ( field ) | field [. component]
+ *
+ * and writes instructions as it meets their operators. */
+#include "scene_expression.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene.h"
+#include "scene_shorthand.h"
+
+enum { NAME_SIZE = 256, MOST_NESTED = 64, MOST_WHOLE_POWER = 16 };
+
+static const struct {
+    const char *name;
+    scene_operation operation;
+    int operands;
+} functions[] = {{"sqrt", SCENE_OP_SQRT, 1}, {"abs", SCENE_OP_ABS, 1},     {"exp", SCENE_OP_EXP, 1},
+                 {"log", SCENE_OP_LOG, 1},   {"log10", SCENE_OP_LOG10, 1}, {"sin", SCENE_OP_SIN, 1},
+                 {"cos", SCENE_OP_COS, 1},   {"tan", SCENE_OP_TAN, 1},     {"min", SCENE_OP_MIN, 2},
+                 {"max", SCENE_OP_MAX, 2},   {"pow", SCENE_OP_POWER, 2}};
+enum { FUNCTIONS = sizeof functions / sizeof *functions };
+
+#define FUNCTION_WORDS "sqrt, abs, exp, log, log10, sin, cos, tan, min, max, pow or mag"
+
+typedef struct parser {
+    const char *text, *at;
+    scene_expression *out;
+    int nested; /* levels of brackets and signs that are open */
+    int used;   /* entries of the stack */
+    scene_parse_result result;
+    char *fault;
+} parser;
+
+static bool parse_sum(parser *p);
+
+__attribute__((format(printf, 2, 3))) static bool fail(parser *p, const char *format, ...)
+{
+    va_list arguments;
+    if (p->result != SCENE_PARSED) return false;
+    p->result = SCENE_FAULTY;
+    va_start(arguments, format);
+    vsnprintf(p->fault, SCENE_FAULT_SIZE, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+static bool fail_for_memory(parser *p)
+{
+    if (p->result == SCENE_PARSED) p->result = SCENE_NO_MEMORY;
+    return false;
+}
+
+/* ---- words ------------------------------------------------------------------------------------------------------ */
+
+static bool is_blank(char c)
+{
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+static bool is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+/* Bytes of UTF-8 beyond ASCII count as letters. */
+static bool is_letter(char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (unsigned char)c >= 0x80;
+}
+
+static char peek(parser *p)
+{
+    while (is_blank(*p->at)) p->at++;
+    return *p->at;
+}
+
+static bool take(parser *p, char c)
+{
+    if (peek(p) != c) return false;
+    p->at++;
+    return true;
+}
+
+/* The next word for a message: a name, a number or a sign. */
+static int word_length(const char *at)
+{
+    int length = 0;
+    while (is_letter(at[length]) || is_digit(at[length])) length++;
+    return length ? length : *at != '\0';
+}
+
+static bool fail_at(parser *p, const char *expected)
+{
+    if (peek(p) == '\0') return fail(p, "\"%.60s\" ends too early, expected %s", p->text, expected);
+    const int before = (int)(p->at - p->text);
+    return fail(p, "\"%.*s\" stands behind \"%.*s\", expected %s", word_length(p->at), p->at, before > 40 ? 40 : before,
+                before > 40 ? p->at - 40 : p->text, expected);
+}
+
+/* ---- instructions ----------------------------------------------------------------------------------------------- */
+
+static bool add(parser *p, scene_operation operation, int input, double number)
+{
+    scene_expression *out = p->out;
+    if (out->count % 16 == 0) {
+        scene_instruction *more =
+            base_realloc(out->instructions, (size_t)(out->count + 16) * sizeof *out->instructions);
+        if (!more) return fail_for_memory(p);
+        out->instructions = more;
+    }
+    out->instructions[out->count++] = (scene_instruction){operation, input, number};
+    return true;
+}
+
+static bool push(parser *p, scene_operation operation, int input, double number)
+{
+    if (++p->used > SCENE_STACK)
+        return fail(p, "more than %d intermediate values are open at once, expected fewer brackets", SCENE_STACK);
+    if (p->used > p->out->depth) p->out->depth = p->used;
+    return add(p, operation, input, number);
+}
+
+static bool add_binary(parser *p, scene_operation operation)
+{
+    p->used--;
+    return add(p, operation, 0, 0);
+}
+
+/* An exponent that is a small whole number needs no logarithm. */
+static bool add_power(parser *p)
+{
+    const scene_instruction *last = &p->out->instructions[p->out->count - 1];
+    const double exponent = last->number;
+    if (last->operation != SCENE_OP_PUSH_NUMBER || exponent != floor(exponent) || fabs(exponent) > MOST_WHOLE_POWER)
+        return add_binary(p, SCENE_OP_POWER);
+    p->out->count--;
+    p->used--;
+    return add(p, SCENE_OP_WHOLE_POWER, 0, exponent);
+}
+
+/* ---- fields ----------------------------------------------------------------------------------------------------- */
+
+static bool push_input(parser *p, const char *name, int component)
+{
+    scene_expression *out = p->out;
+    for (int i = 0; i < out->input_count; i++)
+        if (strcmp(out->inputs[i].name, name) == 0 && out->inputs[i].component == component)
+            return push(p, SCENE_OP_PUSH_INPUT, i, 0);
+    scene_reference *inputs = base_realloc(out->inputs, (size_t)(out->input_count + 1) * sizeof *inputs);
+    if (!inputs) return fail_for_memory(p);
+    out->inputs = inputs;
+    inputs[out->input_count] = (scene_reference){base_strdup(name), component};
+    if (!inputs[out->input_count].name) return fail_for_memory(p);
+    return push(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
+}
+
+/* Reads a component behind its point. */
+static bool parse_component(parser *p, const char *name, int *component)
+{
+    const char *word = p->at;
+    const int length = word_length(word), digits = (int)strspn(word, "0123456789");
+    p->at += length;
+    if (length == 1 && *word >= 'x' && *word <= 'z') {
+        *component = *word - 'x';
+        return true;
+    }
+    if (digits && digits == length && digits <= 3) {
+        *component = (int)strtol(word, NULL, 10);
+        return true;
+    }
+    return fail(p, "\"%.60s.%.*s\" names no component, expected .x, .y, .z or a number from .0 to .999", name,
+                length > 20 ? 20 : length, word);
+}
+
+/* Reads a name, in quotes or not, which p->at is the begin of. */
+static bool parse_name(parser *p, char name[NAME_SIZE])
+{
+    const char quote = *p->at == '"' || *p->at == '\'' ? *p->at : '\0';
+    const char *begin = p->at + (quote != '\0'), *end = begin;
+    while (quote ? *end && *end != quote : is_letter(*end) || is_digit(*end)) end++;
+    if (quote && !*end) return fail(p, "the name %.40s has no end, expected %c behind it", p->at, quote);
+    if (end == begin || end - begin >= NAME_SIZE)
+        return fail(p, "a name of %d bytes stands there, expected 1 to %d", (int)(end - begin), NAME_SIZE - 1);
+    memcpy(name, begin, (size_t)(end - begin));
+    name[end - begin] = '\0';
+    p->at = end + (quote != '\0');
+    return true;
+}
+
+static bool is_name(char c)
+{
+    return is_letter(c) || c == '"' || c == '\'';
+}
+
+static bool parse_magnitude(parser *p)
+{
+    char name[NAME_SIZE];
+    if (!is_name(peek(p))) return fail_at(p, "the name of a field, as in mag(velocity)");
+    if (!parse_name(p, name)) return false;
+    if (!take(p, ')')) return fail_at(p, ") behind the field's name: mag takes a field alone");
+    return push_input(p, name, SCENE_COMPONENT_MAGNITUDE);
+}
+
+static bool parse_operands(parser *p, int function)
+{
+    const int expected = functions[function].operands;
+    int found = 0;
+    do {
+        if (!parse_sum(p)) return false;
+        found++;
+    } while (take(p, ','));
+    if (!take(p, ')')) return fail_at(p, "an operator, a comma or )");
+    if (found != expected) return fail(p, "%s has %d operands, expected %d", functions[function].name, found, expected);
+    if (functions[function].operation == SCENE_OP_POWER) return add_power(p);
+    return expected == 2 ? add_binary(p, functions[function].operation) : add(p, functions[function].operation, 0, 0);
+}
+
+static bool fail_for_function(parser *p, const char *name)
+{
+    const char *names[FUNCTIONS + 1] = {"mag"};
+    for (int i = 0; i < FUNCTIONS; i++) names[i + 1] = functions[i].name;
+    const char *meant = scene_nearest_word(name, names, FUNCTIONS + 1);
+    if (strcmp(name, "magnitude") == 0) meant = "mag";
+    return fail(p, "\"%.60s\" is no function%s%s%s, expected " FUNCTION_WORDS, name, meant ? " (did you mean " : "",
+                meant ? meant : "", meant ? "?)" : "");
+}
+
+static bool parse_function(parser *p, const char *name)
+{
+    int function = 0;
+    while (function < FUNCTIONS && strcmp(functions[function].name, name) != 0) function++;
+    if (strcmp(name, "mag") == 0) return parse_magnitude(p);
+    if (function == FUNCTIONS) return fail_for_function(p, name);
+    return parse_operands(p, function);
+}
+
+static bool parse_field(parser *p)
+{
+    char name[NAME_SIZE];
+    const bool is_quoted = !is_letter(*p->at);
+    int component = SCENE_COMPONENT_ONLY;
+    if (!parse_name(p, name)) return false;
+    if (!is_quoted && take(p, '(')) return parse_function(p, name);
+    if (*p->at == '.') {
+        p->at++;
+        if (!parse_component(p, name, &component)) return false;
+    }
+    return push_input(p, name, component);
+}
+
+/* ---- the grammar ------------------------------------------------------------------------------------------------ */
+
+static bool parse_number(parser *p)
+{
+    char digits[64];
+    const char *end = p->at;
+    while (is_digit(*end)) end++;
+    if (*end == '.') end++;
+    while (is_digit(*end)) end++;
+    if ((*end == 'e' || *end == 'E') && (is_digit(end[1]) || ((end[1] == '-' || end[1] == '+') && is_digit(end[2])))) {
+        end += 2;
+        while (is_digit(*end)) end++;
+    }
+    const size_t length = (size_t)(end - p->at);
+    if (length >= sizeof digits) return fail(p, "the number %.40s... is too long, expected at most 63 digits", p->at);
+    memcpy(digits, p->at, length);
+    digits[length] = '\0';
+    const double number = strtod(digits, NULL);
+    if (!isfinite(number)) return fail(p, "the number %s is too large, expected one below 1.8e308", digits);
+    p->at = end;
+    return push(p, SCENE_OP_PUSH_NUMBER, 0, number);
+}
+
+static bool parse_primary(parser *p)
+{
+    const char c = peek(p);
+    if (is_digit(c) || (c == '.' && is_digit(p->at[1]))) return parse_number(p);
+    if (is_name(c)) return parse_field(p);
+    if (!take(p, '(')) return fail_at(p, "a number, a field or (");
+    if (!parse_sum(p)) return false;
+    return take(p, ')') || fail_at(p, "an operator or )");
+}
+
+static bool parse_sign(parser *p);
+
+static bool parse_power(parser *p)
+{
+    if (!parse_primary(p)) return false;
+    if (p->at[0] == '*' && p->at[1] == '*')
+        return fail(p, "** is no operator (did you mean ^?), expected + - * / or ^");
+    if (!take(p, '^')) return true;
+    const int before = p->out->count;
+    if (!parse_sign(p)) return false;
+    const scene_instruction *last = &p->out->instructions[p->out->count - 1];
+    const bool is_negative = last->operation == SCENE_OP_NEGATE && p->out->count == before + 2;
+    if (is_negative && p->out->instructions[before].operation == SCENE_OP_PUSH_NUMBER) {
+        p->out->count--;
+        p->out->instructions[before].number *= -1;
+    }
+    return add_power(p);
+}
+
+static bool parse_sign(parser *p)
+{
+    bool is_negative = false;
+    for (; peek(p) == '-' || *p->at == '+'; p->at++) is_negative = is_negative != (*p->at == '-');
+    if (++p->nested > MOST_NESTED) return fail(p, "more than %d brackets are open, expected fewer", MOST_NESTED);
+    if (!parse_power(p)) return false;
+    p->nested--;
+    return !is_negative || add(p, SCENE_OP_NEGATE, 0, 0);
+}
+
+static bool parse_product(parser *p)
+{
+    if (!parse_sign(p)) return false;
+    while (peek(p) == '*' || *p->at == '/') {
+        const scene_operation operation = *p->at++ == '*' ? SCENE_OP_MULTIPLY : SCENE_OP_DIVIDE;
+        if (!parse_sign(p) || !add_binary(p, operation)) return false;
+    }
+    return true;
+}
+
+static bool parse_sum(parser *p)
+{
+    if (!parse_product(p)) return false;
+    while (peek(p) == '+' || *p->at == '-') {
+        const scene_operation operation = *p->at++ == '+' ? SCENE_OP_ADD : SCENE_OP_SUBTRACT;
+        if (!parse_product(p) || !add_binary(p, operation)) return false;
+    }
+    return true;
+}
+
+scene_parse_result scene_parse_expression(const char *text, scene_expression *out, char fault[SCENE_FAULT_SIZE])
+{
+    parser p = {.text = text, .at = text, .out = out, .fault = fault};
+    *out = (scene_expression){0};
+    if (strlen(text) > SCENE_EXPRESSION_BYTES)
+        fail(&p, "an expression of %zu bytes stands there, expected at most %d", strlen(text), SCENE_EXPRESSION_BYTES);
+    else if (parse_sum(&p) && peek(&p) != '\0')
+        fail_at(&p, "an operator (+ - * / ^) or the end");
+    if (p.result != SCENE_PARSED) scene_expression_free(out);
+    return p.result;
+}
+
+void scene_expression_free(scene_expression *expression)
+{
+    for (int i = 0; i < expression->input_count; i++) base_free(expression->inputs[i].name);
+    base_free(expression->inputs);
+    base_free(expression->instructions);
+    *expression = (scene_expression){0};
+}
+
+/* ---- evaluation ------------------------------------------------------------------------------------------------- */
+
+#define FOR_EACH(...)                                                                                                  \
+    for (int i = 0; i < count; i++) __VA_ARGS__
+
+static double whole_power(double base, int exponent)
+{
+    double power = 1;
+    for (int left = abs(exponent); left; left >>= 1, base *= base)
+        if (left & 1) power *= base;
+    return exponent < 0 ? 1 / power : power;
+}
+
+static void raise_whole(double *restrict a, int exponent, int count)
+{
+    if (exponent == 2)
+        FOR_EACH(a[i] *= a[i]);
+    else
+        FOR_EACH(a[i] = whole_power(a[i], exponent));
+}
+
+static void apply_function(scene_operation operation, double *restrict a, int count)
+{
+    switch (operation) {
+    case SCENE_OP_NEGATE: FOR_EACH(a[i] = -a[i]); break;
+    case SCENE_OP_SQRT: FOR_EACH(a[i] = sqrt(a[i])); break;
+    case SCENE_OP_ABS: FOR_EACH(a[i] = fabs(a[i])); break;
+    case SCENE_OP_EXP: FOR_EACH(a[i] = exp(a[i])); break;
+    case SCENE_OP_LOG: FOR_EACH(a[i] = log(a[i])); break;
+    case SCENE_OP_LOG10: FOR_EACH(a[i] = log10(a[i])); break;
+    case SCENE_OP_SIN: FOR_EACH(a[i] = sin(a[i])); break;
+    case SCENE_OP_COS: FOR_EACH(a[i] = cos(a[i])); break;
+    default: FOR_EACH(a[i] = tan(a[i])); break;
+    }
+}
+
+/* A minimum or maximum of something that is not a number is not a number either. */
+static void apply_operator(scene_operation operation, double *restrict a, const double *restrict b, int count)
+{
+    switch (operation) {
+    case SCENE_OP_ADD: FOR_EACH(a[i] += b[i]); break;
+    case SCENE_OP_SUBTRACT: FOR_EACH(a[i] -= b[i]); break;
+    case SCENE_OP_MULTIPLY: FOR_EACH(a[i] *= b[i]); break;
+    case SCENE_OP_DIVIDE: FOR_EACH(a[i] /= b[i]); break;
+    case SCENE_OP_POWER: FOR_EACH(a[i] = pow(a[i], b[i])); break;
+    case SCENE_OP_MIN: FOR_EACH(a[i] = b[i] < a[i] || b[i] != b[i] ? b[i] : a[i]); break;
+    default: FOR_EACH(a[i] = b[i] > a[i] || b[i] != b[i] ? b[i] : a[i]); break;
+    }
+}
+
+static bool is_operator(scene_operation operation)
+{
+    return (operation >= SCENE_OP_ADD && operation <= SCENE_OP_POWER) || operation == SCENE_OP_MIN ||
+           operation == SCENE_OP_MAX;
+}
+
+void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack)
+{
+    double *top = stack - SCENE_BLOCK; /* the last entry */
+    for (int k = 0; k < expression->count; k++) {
+        const scene_instruction *at = &expression->instructions[k];
+        if (at->operation == SCENE_OP_PUSH_NUMBER) {
+            top += SCENE_BLOCK;
+            FOR_EACH(top[i] = at->number);
+        } else if (at->operation == SCENE_OP_PUSH_INPUT) {
+            top += SCENE_BLOCK;
+            memcpy(top, inputs[at->input], (size_t)count * sizeof *top);
+        } else if (at->operation == SCENE_OP_WHOLE_POWER) {
+            raise_whole(top, (int)at->number, count);
+        } else if (is_operator(at->operation)) {
+            top -= SCENE_BLOCK;
+            apply_operator(at->operation, top, top + SCENE_BLOCK, count);
+        } else {
+            apply_function(at->operation, top, count);
+        }
+    }
+}

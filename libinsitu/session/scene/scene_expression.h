@@ -1,0 +1,70 @@
+/* Expressions of fields, as "sqrt(u.x^2 + u.y^2) / a": a text becomes a program for a stack of numbers, which is run
+ * for a block of places at a time. */
+#ifndef SCENE_SCENE_EXPRESSION_H
+#define SCENE_SCENE_EXPRESSION_H
+
+#include <stdbool.h>
+
+enum {
+    SCENE_EXPRESSION_BYTES = 1000,
+    SCENE_BLOCK = 256, /* places that a program runs for at most */
+    SCENE_STACK = 32,  /* of a program at most */
+    SCENE_FAULT_SIZE = 400
+};
+
+/* A function of one or two numbers, an operator, or what puts a number on the stack. */
+typedef enum scene_operation {
+    SCENE_OP_PUSH_NUMBER,
+    SCENE_OP_PUSH_INPUT,
+    SCENE_OP_NEGATE,
+    SCENE_OP_ADD,
+    SCENE_OP_SUBTRACT,
+    SCENE_OP_MULTIPLY,
+    SCENE_OP_DIVIDE,
+    SCENE_OP_POWER,
+    SCENE_OP_WHOLE_POWER, /* `number` is the exponent */
+    SCENE_OP_SQRT,
+    SCENE_OP_ABS,
+    SCENE_OP_EXP,
+    SCENE_OP_LOG,
+    SCENE_OP_LOG10,
+    SCENE_OP_SIN,
+    SCENE_OP_COS,
+    SCENE_OP_TAN,
+    SCENE_OP_MIN,
+    SCENE_OP_MAX
+} scene_operation;
+
+typedef struct scene_instruction {
+    scene_operation operation;
+    int input;     /* of SCENE_OP_PUSH_INPUT */
+    double number; /* of SCENE_OP_PUSH_NUMBER and SCENE_OP_WHOLE_POWER */
+} scene_instruction;
+
+/* A scalar of a field by name. component: as scene_field.component. */
+typedef struct scene_reference {
+    char *name;
+    int component;
+} scene_reference;
+
+typedef struct scene_expression {
+    int count;
+    scene_instruction *instructions; /* operands come before their operator */
+    int depth;                       /* of the stack, 1 .. SCENE_STACK */
+    int input_count;
+    scene_reference *inputs; /* each once */
+} scene_expression;
+
+typedef enum scene_parse_result { SCENE_PARSED, SCENE_FAULTY, SCENE_NO_MEMORY } scene_parse_result;
+
+/* Parses a text in the locale C, in which numbers have a decimal point. What is wrong with a faulty one is in fault:
+ * what was found, and what was expected. *out is to be freed after SCENE_PARSED alone. */
+scene_parse_result scene_parse_expression(const char *text, scene_expression *out, char fault[SCENE_FAULT_SIZE]);
+
+void scene_expression_free(scene_expression *expression);
+
+/* Runs the program for count places, at most SCENE_BLOCK. inputs: count values of each input. stack: room for depth ×
+ * SCENE_BLOCK numbers; the results are its first ones. */
+void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack);
+
+#endif

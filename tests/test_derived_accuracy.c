@@ -1,0 +1,205 @@
+/* What is made of gradients of an ABC flow, away from the border, beside the closed form and VTK's gradient filter: on
+ * hexes and tets, plain and jittered. Q is interpolated as a slice would show it. INSITU_TEST_WHOLE: the finest grids
+ * too, and how long it takes. */
+#include <math.h>
+#include <mpi.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+#include "insitu/insitu.h"
+#include "session.h"
+#include "session_scalars.h"
+#include "test_derived_vtk.h"
+#include "test_effort.h"
+#include "test_meshes.h"
+
+static const double a = 1.7320508075688772, b = 1.4142135623730951, c = 1, k = 3.14159265358979324;
+
+static void flow(const double p[3], double u[3])
+{
+    u[0] = a * sin(k * p[2]) + c * cos(k * p[1]);
+    u[1] = b * sin(k * p[0]) + a * cos(k * p[2]);
+    u[2] = c * sin(k * p[1]) + b * cos(k * p[0]);
+}
+
+static double true_q(const double p[3])
+{
+    const double xy = -k * c * sin(k * p[1]), xz = k * a * cos(k * p[2]), yx = k * b * cos(k * p[0]);
+    const double yz = -k * a * sin(k * p[2]), zx = -k * b * sin(k * p[0]), zy = k * c * cos(k * p[1]);
+    return -(xy * yx + xz * zx + yz * zy);
+}
+
+typedef struct sample_sums {
+    double ours, vtks, square, curl, divergence, of_curl;
+    int64_t count;
+} sample_sums;
+
+/* The flow is its own curl, times k. */
+static void add_sample(const double p[3], const double values[6], sample_sums *sums)
+{
+    double u[3];
+    const double q = true_q(p);
+    flow(p, u);
+    sums->ours += (values[0] - q) * (values[0] - q);
+    sums->vtks += (values[1] - q) * (values[1] - q);
+    sums->square += q * q;
+    sums->divergence += values[5] * values[5];
+    for (int i = 0; i < 3; i++) {
+        sums->curl += (values[2 + i] - k * u[i]) * (values[2 + i] - k * u[i]);
+        sums->of_curl += k * k * u[i] * u[i];
+    }
+    sums->count++;
+}
+
+/* Weights of a hex's or tet's corners at eight places inside. */
+static void find_weights(int corners, int place, double weights[8])
+{
+    static const int bits[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+    double sum = 0;
+    for (int i = 0; i < corners; i++) {
+        weights[i] = 1;
+        if (corners == 4) weights[i] = 0.1 + test_uniform((uint64_t)(4 * place + i), 7);
+        for (int axis = 0; axis < 3 && corners == 8; axis++)
+            weights[i] *= (bits[i] >> axis & 1) == (place >> axis & 1) ? 0.8 : 0.2;
+        sum += weights[i];
+    }
+    for (int i = 0; i < corners; i++) weights[i] /= sum;
+}
+
+/* nodes: 6 numbers of each vertex. */
+static sample_sums compare(const test_mesh *mesh, const double (*nodes)[6])
+{
+    sample_sums sums = {0};
+    for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
+        const int64_t *vertices = mesh->connectivity + mesh->offsets[cell];
+        const int corners = (int)(mesh->offsets[cell + 1] - mesh->offsets[cell]);
+        for (int place = 0; place < 8; place++) {
+            double weights[8], p[3] = {0}, values[6] = {0};
+            find_weights(corners, place, weights);
+            for (int i = 0; i < corners; i++) {
+                for (int axis = 0; axis < 3; axis++) p[axis] += weights[i] * mesh->coordinates[3 * vertices[i] + axis];
+                for (int n = 0; n < 6; n++) values[n] += weights[i] * nodes[vertices[i]][n];
+            }
+            if (fabs(p[0]) < 0.5 && fabs(p[1]) < 0.5 && fabs(p[2]) < 0.5) add_sample(p, values, &sums);
+        }
+    }
+    return sums;
+}
+
+static const session_mesh *mesh_of(const insitu_session *session)
+{
+    return session_find_mesh(&session->meshes, "m");
+}
+
+static double node_value(const insitu_session *session, const char *name, int component, int64_t vertex)
+{
+    const grid_field values =
+        session_given_field(mesh_of(session), session_find_field(mesh_of(session), name), component);
+    return grid_field_value(&values, vertex);
+}
+
+static insitu_session *begin(const test_mesh *mesh, const float *velocity)
+{
+    static const char scene[] = "threads: 1\nfields: {q: {q_criterion: u}, w: {vorticity: u}, d: {divergence: u}, all: "
+                                "q + w.x + d}\nimages: [{name: a, once: true, when: {field: all, above: 1e30}, layers: "
+                                "[{slice: {field: q}}]}]\n";
+    insitu_session *session = NULL;
+    insitu_mesh given;
+    insitu_field u;
+    assert_int_equal(insitu_create_from_text(MPI_COMM_SELF, scene, &session), INSITU_OK);
+    insitu_mesh_defaults(&given);
+    given.vertex_count = mesh->vertex_count;
+    insitu_mesh_interleaved(&given, mesh->coordinates, INSITU_FLOAT64);
+    given.cell_count = mesh->cell_count;
+    given.cell_type = (insitu_cell_type)mesh->types[0];
+    given.connectivity_count = mesh->connectivity_count;
+    given.connectivity = (insitu_array){mesh->connectivity, INSITU_INT64, 0};
+    insitu_field_defaults(&u);
+    u.name = "u";
+    u.component_count = 3;
+    u.count = mesh->vertex_count;
+    u.values = (insitu_array){velocity, INSITU_FLOAT32, 0};
+    assert_int_equal(insitu_set_mesh(session, "m", &given), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "m", &u), INSITU_OK);
+    assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
+    return session;
+}
+
+static float *make_velocity(const test_mesh *mesh)
+{
+    float *velocity = calloc((size_t)mesh->vertex_count * 3, sizeof *velocity);
+    assert_non_null(velocity);
+    for (int64_t v = 0; v < mesh->vertex_count; v++) {
+        double u[3];
+        flow(mesh->coordinates + 3 * v, u);
+        for (int i = 0; i < 3; i++) velocity[3 * v + i] = (float)u[i];
+    }
+    return velocity;
+}
+
+/* Errors over the sizes: of Q, and VTK's; of vorticity; and the divergence over the vorticity's size. */
+typedef struct grid_errors {
+    double ours, vtks, curl, divergence;
+} grid_errors;
+
+static grid_errors errors_on(test_mesh_kind kind, int n, double jitter)
+{
+    test_mesh mesh;
+    test_mesh_lattice(kind, n, jitter, test_linear, &mesh);
+    float *velocity = make_velocity(&mesh);
+    double *q = calloc((size_t)mesh.vertex_count, sizeof *q),
+           (*nodes)[6] = calloc((size_t)mesh.vertex_count, sizeof *nodes);
+    assert_true(q && nodes);
+    test_vtk_q(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity, velocity, 1, q);
+    insitu_session *session = begin(&mesh, velocity);
+    for (int64_t v = 0; v < mesh.vertex_count; v++) {
+        nodes[v][0] = node_value(session, "q", 0, v);
+        nodes[v][1] = q[v];
+        for (int i = 0; i < 3; i++) nodes[v][2 + i] = node_value(session, "w", i, v);
+        nodes[v][5] = node_value(session, "d", 0, v);
+    }
+    const sample_sums sums = compare(&mesh, (const double(*)[6])nodes);
+    insitu_destroy(&session);
+    free(velocity);
+    free(q);
+    free(nodes);
+    test_mesh_free(&mesh);
+    return (grid_errors){sqrt(sums.ours / sums.square), sqrt(sums.vtks / sums.square), sqrt(sums.curl / sums.of_curl),
+                         sqrt(sums.divergence / sums.of_curl)};
+}
+
+static void q_is_as_near_as_vtks(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++)
+        for (int jittered = 0; jittered < 2; jittered++) {
+            double before = 0;
+            for (int n = 8; n <= test_effort(16, 32); n *= 2) {
+                const grid_errors e = errors_on(kind, n, jittered ? 0.2 : 0);
+                fprintf(
+                    stderr,
+                    "%s%s, n = %2d: Q %.4f, VTK's %.4f, ratio %.3f, of order %.2f; vorticity %.4f, divergence %.4f\n",
+                    test_mesh_kind_name(kind), jittered ? ", jittered" : "", n, e.ours, e.vtks, e.ours / e.vtks,
+                    before > 0 ? log2(before / e.ours) : 0, e.curl, e.divergence);
+                before = e.ours;
+                assert_true(e.ours <= 1.02 * e.vtks);
+            }
+        }
+}
+
+int main(int argc, char **argv)
+{
+    MPI_Init(&argc, &argv);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(q_is_as_near_as_vtks),
+    };
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    MPI_Finalize();
+    return failed;
+}

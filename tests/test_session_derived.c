@@ -1,0 +1,377 @@
+/* Derived fields: gradients of linear functions are exact on every cell type; expressions are compared with C; values
+ * of curved functions converge by the square of the cells' size; any partition gives the same bits; what does not
+ * change is not made anew; and what is wrong is told to all ranks. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "session_scalars.h"
+#include "test_effort.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, MOST_TEXT = 1 << 14 };
+
+/* Statistics that need the fields, and an image that is never drawn. */
+#define SCENE(fields, name)                                                                                            \
+    "fields: {" fields "}\nimages:\n  - name: a\n    size: [8, 6]\n    when: {field: " name ", above: 1e30}\n"         \
+    "    layers: [{isosurface: {field: " name ", values: [0.1]}}]\n    outputs: [{path: a.png}]\n"
+
+/* ---- input ----------------------------------------------------------------------------------------------------- */
+
+typedef void vector_function(const double position[3], double out[3]);
+
+/* A field of 3 components, with one number between tuples, of either width; its arrays are the test's own. */
+typedef struct vector_field {
+    void *values;
+    insitu_field field;
+} vector_field;
+
+static void place_of(const test_mesh *mesh, insitu_centring centring, int64_t at, double place[3])
+{
+    if (centring == INSITU_VERTEX) {
+        memcpy(place, mesh->coordinates + 3 * at, 3 * sizeof *place);
+        return;
+    }
+    int64_t count = 0;
+    place[0] = place[1] = place[2] = 0;
+    for (int64_t i = mesh->offsets[at]; i < mesh->offsets[at + 1]; i++, count++)
+        for (int a = 0; a < 3; a++) place[a] += mesh->coordinates[3 * mesh->connectivity[i] + a];
+    for (int a = 0; a < 3; a++) place[a] /= (double)count;
+}
+
+static void make_vector(const test_mesh *mesh, vector_function *f, insitu_centring centring, bool is_wide,
+                        const char *name, vector_field *out)
+{
+    const int64_t count = centring == INSITU_VERTEX ? mesh->vertex_count : mesh->cell_count;
+    const int64_t size = is_wide ? 8 : 4;
+    out->values = calloc((size_t)(4 * count + 1), (size_t)size);
+    assert_non_null(out->values);
+    for (int64_t i = 0; i < count; i++) {
+        double place[3], value[3];
+        place_of(mesh, centring, i, place);
+        f(place, value);
+        for (int a = 0; a < 3; a++)
+            if (is_wide)
+                ((double *)out->values)[4 * i + a] = value[a];
+            else
+                ((float *)out->values)[4 * i + a] = (float)value[a];
+    }
+    insitu_field_defaults(&out->field);
+    out->field.name = name;
+    out->field.count = count;
+    out->field.component_count = 3;
+    out->field.centring = centring;
+    out->field.values = (insitu_array){out->values, is_wide ? INSITU_FLOAT64 : INSITU_FLOAT32, 4 * size};
+    out->field.component_stride_bytes = size;
+}
+
+static insitu_session *begin(MPI_Comm comm, const char *scene, const session_input *in, const vector_field *u)
+{
+    insitu_session *session = NULL;
+    insitu_status status = insitu_create_from_text(comm, scene, &session);
+    if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
+    assert_int_equal(status, INSITU_OK);
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    if (u) assert_int_equal(insitu_set_field(session, "m", &u->field), INSITU_OK);
+    return session;
+}
+
+static insitu_session *open_stepped(MPI_Comm comm, const char *scene, const session_input *in, const vector_field *u)
+{
+    insitu_session *session = begin(comm, scene, in, u);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    return session;
+}
+
+static const session_field *derived_field(const insitu_session *session, const char *mesh_name, const char *name)
+{
+    const session_mesh *mesh = session_find_mesh(&session->meshes, mesh_name);
+    const int index = session_find_field(mesh, name);
+    assert_true(index >= 0 && mesh->fields[index].is_derived && mesh->fields[index].copy);
+    return &mesh->fields[index];
+}
+
+static double value_of(const insitu_session *session, const char *name, int component, int64_t at)
+{
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    derived_field(session, "m", name);
+    const grid_field values = session_given_field(mesh, session_find_field(mesh, name), component);
+    return grid_field_value(&values, at);
+}
+
+/* ---- linear functions ------------------------------------------------------------------------------------------- */
+
+static const double slopes[3][3] = {{0.3, -1.1, 0.7}, {0.9, 0.2, -0.4}, {-0.6, 0.5, 1.3}};
+
+static void linear(const double p[3], double out[3])
+{
+    for (int c = 0; c < 3; c++) out[c] = slopes[c][0] * p[0] + slopes[c][1] * p[1] + slopes[c][2] * p[2] + 2 - c;
+}
+
+/* The middle root of det(M - x) by bisection between the extremes of its derivative. */
+static double determinant_less(const double m[3][3], double x)
+{
+    const double a = m[0][0] - x, b = m[1][1] - x, c = m[2][2] - x;
+    return a * (b * c - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * c - m[1][2] * m[2][0]) +
+           m[0][2] * (m[1][0] * m[2][1] - b * m[2][0]);
+}
+
+static double middle_root(const double m[3][3])
+{
+    const double trace = m[0][0] + m[1][1] + m[2][2];
+    const double second = m[0][0] * m[1][1] + m[0][0] * m[2][2] + m[1][1] * m[2][2] - m[0][1] * m[1][0] -
+                          m[0][2] * m[2][0] - m[1][2] * m[2][1];
+    const double half = sqrt(trace * trace / 9 - second / 3);
+    double low = trace / 3 - half, high = trace / 3 + half; /* the determinant rises between */
+    for (int i = 0; i < 200; i++) {
+        const double middle = 0.5 * (low + high);
+        if (determinant_less(m, middle) < 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+typedef struct expected_value {
+    const char *name;
+    int component;
+    double value;
+} expected_value;
+
+/* By the tensors S and W themselves. */
+static void find_tensors(double *q, double *lambda2, double *strain)
+{
+    double s[3][3], w[3][3], m[3][3] = {{0}}, of_s = 0, of_w = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            s[i][k] = (slopes[i][k] + slopes[k][i]) / 2;
+            w[i][k] = (slopes[i][k] - slopes[k][i]) / 2;
+            of_s += s[i][k] * s[i][k];
+            of_w += w[i][k] * w[i][k];
+        }
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            for (int j = 0; j < 3; j++) m[i][k] += s[i][j] * s[j][k] + w[i][j] * w[j][k];
+    *q = (of_w - of_s) / 2;
+    *strain = sqrt(2 * of_s);
+    *lambda2 = middle_root((const double(*)[3])m);
+}
+
+#define ALL_KINDS                                                                                                      \
+    "g: {gradient: u.y}, gm: {gradient: u.y, component: magnitude}, gz: {gradient: u.y, component: z}, d: "            \
+    "{divergence: u}, w: {vorticity: u}, wm: {vorticity: u, component: magnitude}, wx: {vorticity: u, component: 0}, " \
+    "q: {q_criterion: u}, l: {lambda2: u}, s: {strain_rate: [u.x, u.y, u.z]}, all: \"g.x + mag(g) + gm + gz + d + "    \
+    "w.x + wm + wx + q + l + s\""
+
+static double worst_of_linear(const insitu_session *session, const test_mesh *mesh)
+{
+    double q, lambda2, strain, worst = 0;
+    find_tensors(&q, &lambda2, &strain);
+    const double w[3] = {slopes[2][1] - slopes[1][2], slopes[0][2] - slopes[2][0], slopes[1][0] - slopes[0][1]};
+    const double wm = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), *g = slopes[1];
+    const double gm = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]), d = slopes[0][0] + slopes[1][1] + slopes[2][2];
+    const expected_value expected[] = {
+        {"g", 0, g[0]},
+        {"g", 1, g[1]},
+        {"g", 2, g[2]},
+        {"gm", 0, gm},
+        {"gz", 0, g[2]},
+        {"d", 0, d},
+        {"w", 0, w[0]},
+        {"w", 1, w[1]},
+        {"w", 2, w[2]},
+        {"wm", 0, wm},
+        {"wx", 0, w[0]},
+        {"q", 0, q},
+        {"l", 0, lambda2},
+        {"s", 0, strain},
+        {"all", 0, g[0] + 2 * gm + g[2] + d + 2 * w[0] + wm + q + lambda2 + strain},
+    };
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
+        for (int64_t v = 0; v < mesh->vertex_count; v++) {
+            const double found = value_of(session, expected[i].name, expected[i].component, v);
+            worst = test_worse(worst, fabs(found - expected[i].value));
+        }
+    return worst;
+}
+
+/* Doubles: what is left is rounding, 1e-15 over the shortest edge, and a sliver's at most 1e-10; results of floats are
+ * off by the float's last bit of a value near 1 over an edge of 0.2: 6e-8 * 2 / 0.2. */
+static void linear_velocities_are_exact(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 2 * TEST_KIND_COUNT; kind++) {
+        session_input in = {0};
+        if (kind == TEST_KIND_COUNT + TEST_POLYHEDRA) continue; /* they are some */
+        test_mesh_lattice((test_mesh_kind)(kind % TEST_KIND_COUNT), SIDE, 0.2, test_wave, &in.part);
+        if (kind >= TEST_KIND_COUNT) test_mesh_to_polyhedra(&in.part, kind == TEST_KIND_COUNT + TEST_MIXED ? 0.5 : 1);
+        input_describe(&in);
+        in.mesh.keep_polyhedra = 1;
+        for (int is_wide = 0; is_wide < 2; is_wide++) {
+            vector_field u;
+            make_vector(&in.part, linear, INSITU_VERTEX, is_wide, "u", &u);
+            insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE(ALL_KINDS, "all"), &in, &u);
+            const double worst = worst_of_linear(session, &in.part);
+            if (!(worst < (is_wide ? 1e-9 : 1e-5)))
+                fprintf(stderr, "%s%s, %d bytes: %g\n", test_mesh_kind_name((test_mesh_kind)(kind % TEST_KIND_COUNT)),
+                        kind >= TEST_KIND_COUNT ? " as polyhedra" : "", is_wide ? 8 : 4, worst);
+            everywhere(worst < (is_wide ? 1e-9 : 1e-5));
+            insitu_destroy(&session);
+            free(u.values);
+        }
+        input_free(&in);
+    }
+}
+
+/* ---- expressions ------------------------------------------------------------------------------------------------ */
+
+static void swirl(const double p[3], double out[3])
+{
+    out[0] = sin(3 * p[2]) + cos(2 * p[1]) + 0.2;
+    out[1] = sin(2 * p[0]) + 1.5 * cos(3 * p[2]);
+    out[2] = sin(2 * p[1]) + cos(1.3 * p[0]) - 0.4;
+}
+
+#define EXPRESSIONS                                                                                                    \
+    "a: \"sqrt(u.x^2 + u.y^2) / (2 + abs(u.z))\", b: \"-u.x^2 + -2 * (u.y - 3e-1) ^ -1 + mag(u)\", "                   \
+    "c: \"min(u.x, u.2) + max(u.y, 0.5) * exp(-u.z) - pow(2, u.x)\", "                                                 \
+    "d: \"log(3 + u.x) + log10(3 + u.y) + sin(u.z) * cos(u.x) + tan(u.y / 4) + 2^3^0.5 + 7 - 2 - 1\", "                \
+    "e: {magnitude: u}, h: {field: u, component: y}, all: a + b + c + d + e + h"
+
+static void find_expressions(const double u[3], double out[6])
+{
+    const double length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    out[0] = sqrt(u[0] * u[0] + u[1] * u[1]) / (2 + fabs(u[2]));
+    out[1] = -(u[0] * u[0]) - 2 / (u[1] - 0.3) + length;
+    out[2] = fmin(u[0], u[2]) + fmax(u[1], 0.5) * exp(-u[2]) - pow(2, u[0]);
+    out[3] = log(3 + u[0]) + log10(3 + u[1]) + sin(u[2]) * cos(u[0]) + tan(u[1] / 4) + pow(2, pow(3, 0.5)) + 4;
+    out[4] = length;
+    out[5] = u[1];
+}
+
+static void expressions_are_those_of_c(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"a", "b", "c", "d", "e", "h", "all"};
+    session_input in = {0};
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);
+    for (insitu_centring centring = INSITU_VERTEX; centring <= INSITU_CELL; centring++) {
+        vector_field u;
+        make_vector(&in.part, swirl, centring, true, "u", &u);
+        insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE(EXPRESSIONS, "all"), &in, &u);
+        double worst = 0;
+        for (int64_t i = 0; i < u.field.count; i++) {
+            double expected[7] = {0};
+            find_expressions((const double *)u.values + 4 * i, expected);
+            for (int k = 0; k < 6; k++) expected[6] += expected[k];
+            for (int k = 0; k < 7; k++)
+                worst = test_worse(worst,
+                                   fabs(value_of(session, names[k], 0, i) - expected[k]) / fmax(1, fabs(expected[k])));
+        }
+        everywhere(worst < 1e-13);
+        assert_int_equal(derived_field(session, "m", "all")->given.centring, centring);
+        insitu_destroy(&session);
+        free(u.values);
+    }
+    input_free(&in);
+}
+
+/* ---- partitions -------------------------------------------------------------------------------------------------- */
+
+static int64_t find_vertex(const test_mesh *whole, const double place[3])
+{
+    for (int64_t v = 0; v < whole->vertex_count; v++)
+        if (memcmp(whole->coordinates + 3 * v, place, 3 * sizeof *place) == 0) return v;
+    return -1;
+}
+
+/* Marks the vertices of cells that are no ghosts; others need no values. */
+static bool *find_used(const insitu_session *session)
+{
+    const grid *g = &session_find_mesh(&session->meshes, "m")->cells;
+    bool *used = calloc((size_t)g->vertex_count + 1, sizeof *used);
+    assert_non_null(used);
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        grid_walk walk = grid_walk_cell(g, cell);
+        int64_t vertex;
+        while (!grid_is_ghost(g, cell) && grid_walk_next(&walk, &vertex)) used[vertex] = true;
+    }
+    return used;
+}
+
+static bool has_same_bits(const insitu_session *parts, const insitu_session *alone, const test_mesh *part,
+                          const test_mesh *whole, const char *name)
+{
+    const session_field *a = derived_field(parts, "m", name), *b = derived_field(alone, "m", name);
+    const int64_t size = a->values.stride;
+    bool *used = find_used(parts), is_same = a->values.stride == b->values.stride;
+    for (int64_t v = 0; v < part->vertex_count && is_same; v++) {
+        if (!used[v]) continue;
+        const int64_t there = find_vertex(whole, part->coordinates + 3 * v);
+        is_same = there >= 0 && memcmp(a->copy + v * size, b->copy + there * size, (size_t)size) == 0;
+    }
+    free(used);
+    if (!is_same) fprintf(stderr, "rank %d of %d: %s differs\n", own_rank, rank_count, name);
+    return is_same;
+}
+
+/* Rank by rank, other numbers of vertices and cells, turned cells, and ghosts do not matter. */
+static void partitions_do_not_show(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"q", "w", "l", "mixed"};
+    const char *const scene =
+        SCENE("q: {q_criterion: u}, w: {vorticity: u}, l: {lambda2: u}, mixed: q + w.z + l + c.x", "mixed");
+    for (int kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
+            session_input whole = {0}, in = {0};
+            vector_field u, c, whole_u, whole_c;
+            test_mesh_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave, &whole.part);
+            input_describe(&whole);
+            take_own_cells(&whole.part, dealt, SIDE, kind == TEST_HEXES, &in.part);
+            if (kind != TEST_POLYHEDRA) test_mesh_turn(&in.part, (uint64_t)own_rank + 3);
+            input_describe(&in);
+            make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
+            make_vector(&whole.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
+            /* Cells' values are of places that only they know, whose sums' order does not matter: constants. */
+            make_vector(&in.part, linear, INSITU_VERTEX, true, "c", &c);
+            make_vector(&whole.part, linear, INSITU_VERTEX, true, "c", &whole_c);
+            insitu_session *parts = begin(MPI_COMM_WORLD, scene, &in, &u);
+            assert_int_equal(insitu_set_field(parts, "m", &c.field), INSITU_OK);
+            insitu_session *alone = begin(MPI_COMM_SELF, scene, &whole, &whole_u);
+            assert_int_equal(insitu_set_field(alone, "m", &whole_c.field), INSITU_OK);
+            everywhere(insitu_step(parts, 0, 0) == INSITU_OK);
+            everywhere(insitu_step(alone, 0, 0) == INSITU_OK);
+            for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+                everywhere(has_same_bits(parts, alone, &in.part, &whole.part, names[i]));
+            insitu_destroy(&parts);
+            insitu_destroy(&alone);
+            free(u.values);
+            free(c.values);
+            free(whole_u.values);
+            free(whole_c.values);
+            input_free(&in);
+            input_free(&whole);
+        }
+}
+
+int run_all(void);
+int run_all(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(linear_velocities_are_exact),
+        cmocka_unit_test(expressions_are_those_of_c),
+        cmocka_unit_test(partitions_do_not_show),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run_all);
+}
