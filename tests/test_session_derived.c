@@ -360,18 +360,10 @@ static void partitions_do_not_show(void **state)
         }
 }
 
-int run_all(void);
-int run_all(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_velocities_are_exact),
-        cmocka_unit_test(expressions_are_those_of_c),
-        cmocka_unit_test(partitions_do_not_show),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run_all);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(linear_velocities_are_exact),
+                                       cmocka_unit_test(expressions_are_those_of_c),
+                                       cmocka_unit_test(partitions_do_not_show)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }

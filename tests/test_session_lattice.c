@@ -333,13 +333,8 @@ static void lattices_are_their_hexes(void **state)
                 compare((place_form)form, (array_order)order, (form + order) % 2, (form + order) % 3 == 0, count);
 }
 
-static int run(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
 int main(int argc, char **argv)
 {
-    return run_session_tests(argc, argv, run);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }
