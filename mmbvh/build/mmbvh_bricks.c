@@ -1,0 +1,151 @@
+/* A lattice's order of cells is a good one already: a box of indices is a compact body wherever the lattice is not
+ * folded. Each node is halved along the axis on which its cells reach farthest, by the mean length of their edges. */
+#include "mmbvh_bricks.h"
+
+#include <math.h>
+#include <omp.h>
+
+#include "region.h"
+
+/* A box of cells, by their indices. */
+typedef struct brick {
+    int64_t first[3], count[3];
+} brick;
+
+typedef struct bricks {
+    topology_build *build;
+    const grid_lattice *lattice;
+    double edge[3]; /* mean lengths of the cells' edges along the axes */
+    uint32_t *cells;
+} bricks;
+
+static int64_t cells_of(const brick *b)
+{
+    return b->count[0] * b->count[1] * b->count[2];
+}
+
+static brick whole_of(const grid_lattice *l)
+{
+    brick out;
+    for (int axis = 0; axis < 3; axis++) {
+        out.first[axis] = l->drawn_first[axis];
+        out.count[axis] = l->drawn_end[axis] - l->drawn_first[axis];
+    }
+    return out;
+}
+
+int64_t bricks_count(const grid_lattice *lattice)
+{
+    const brick all = whole_of(lattice);
+    return cells_of(&all);
+}
+
+/* The first of a cell's edges along an axis. */
+static double edge_length(const grid *g, int64_t vertex, int axis)
+{
+    double from[3], to[3], sum = 0;
+    grid_vertex(g, vertex, from);
+    grid_vertex(g, vertex + g->lattice->by_vertex.stride[axis], to);
+    for (int a = 0; a < 3; a++) sum += (to[a] - from[a]) * (to[a] - from[a]);
+    return sqrt(sum);
+}
+
+/* Computes the mean lengths over some cells all over the lattice. */
+static void measure_edges(const grid *g, double out[3])
+{
+    enum { SAMPLES = 5 };
+    const brick all = whole_of(g->lattice);
+    for (int axis = 0; axis < 3; axis++) {
+        out[axis] = 0;
+        for (int sample = 0; sample < SAMPLES * SAMPLES * SAMPLES; sample++) {
+            const int part[3] = {sample % SAMPLES, sample / SAMPLES % SAMPLES, sample / SAMPLES / SAMPLES};
+            int64_t vertex = 0;
+            for (int a = 0; a < 3; a++)
+                vertex += (all.first[a] + all.count[a] * part[a] / SAMPLES) * g->lattice->by_vertex.stride[a];
+            out[axis] += edge_length(g, vertex, axis);
+        }
+    }
+}
+
+/* Halves a brick of two cells or more. */
+static void halve(const bricks *s, const brick *b, brick halves[2])
+{
+    int along = -1;
+    for (int axis = 0; axis < 3; axis++)
+        if (b->count[axis] > 1 &&
+            (along < 0 || (double)b->count[axis] * s->edge[axis] > (double)b->count[along] * s->edge[along]))
+            along = axis;
+    halves[0] = halves[1] = *b;
+    halves[0].count[along] = b->count[along] / 2;
+    halves[1].first[along] += halves[0].count[along];
+    halves[1].count[along] -= halves[0].count[along];
+}
+
+static void list_cells(const grid_lattice *l, const brick *b, uint32_t *out)
+{
+    const int64_t *stride = l->by_cell.stride;
+    for (int64_t k = b->first[2]; k < b->first[2] + b->count[2]; k++)
+        for (int64_t j = b->first[1]; j < b->first[1] + b->count[1]; j++)
+            for (int64_t i = b->first[0]; i < b->first[0] + b->count[0]; i++)
+                *out++ = (uint32_t)(i * stride[0] + j * stride[1] + k * stride[2]);
+}
+
+/* cells: those of the subtree; first: of the brick's among them. */
+static topology_link build_subtree(const bricks *s, topology_scratch *scratch, const brick *b, uint32_t *cells,
+                                   int64_t first)
+{
+    const int64_t count = cells_of(b);
+    if (count <= MMBVH_MAX_LEAF) {
+        list_cells(s->lattice, b, cells + first);
+        return topology_leaf(first, count);
+    }
+    brick halves[2];
+    halve(s, b, halves);
+    const int64_t pair = topology_new_pair(scratch);
+    const topology_link left = build_subtree(s, scratch, &halves[0], cells, first);
+    const topology_link right = build_subtree(s, scratch, &halves[1], cells, first + cells_of(&halves[0]));
+    scratch->links[pair] = left;
+    scratch->links[pair + 1] = right;
+    return topology_inner(pair);
+}
+
+static void grow(const bricks *s, topology *t, const brick b)
+{
+    if (atomic_load(&s->build->failed)) return;
+    if (t->count <= TOPOLOGY_SUBTREE_CELLS) {
+        topology_scratch *scratch = &s->build->scratch[omp_get_thread_num()];
+        scratch->count = 0;
+        const topology_link root = build_subtree(s, scratch, &b, s->cells + t->first, 0);
+        topology_keep(s->build, t, scratch, root);
+        return;
+    }
+    brick halves[2];
+    halve(s, &b, halves);
+    for (int side = 0; side < 2; side++) {
+        const int64_t begin = side ? cells_of(&halves[0]) : 0;
+        topology *child = t->children[side] = topology_new(s->build, t->first + begin, cells_of(&halves[side]));
+        const brick half = halves[side];
+        if (!child) return;
+#pragma omp task default(none) firstprivate(s, child, half)
+        grow(s, child, half);
+    }
+}
+
+topology *bricks_build(topology_build *build, const grid *g, uint32_t *cells)
+{
+    bricks s = {.build = build, .lattice = g->lattice, .cells = cells};
+    const brick all = whole_of(g->lattice);
+    topology *root = topology_new(build, 0, cells_of(&all));
+    if (!root) return NULL;
+    measure_edges(g, s.edge);
+#pragma omp parallel num_threads(build->threads)
+    {
+        region_enter();
+#pragma omp single
+        grow(&s, root, all);
+        region_leave();
+    }
+    if (!atomic_load(&build->failed)) return root;
+    topology_free(root);
+    return NULL;
+}
