@@ -220,7 +220,8 @@ static bool make_room(const derive_work *w, session_mesh *part, session_field *f
         if (!field->copy) return false;
         field->copy_bytes = bytes;
     }
-    field->values = (grid_array){field->copy, size * field->given.component_count, is_wide, false, 0};
+    field->values =
+        (grid_array){.data = field->copy, .stride = size * field->given.component_count, .is_wide = is_wide};
     field->component_stride = size;
     return true;
 }
