@@ -232,13 +232,12 @@ give_cell(target *to, int64_t cell, int type, const signed char (*corners)[4], i
 {
     const session_gradient_basis *basis = to->basis;
     const int count = grid_type_vertices(type);
-    const int64_t first = basis->cells->offsets.data ? grid_array_index(&basis->cells->offsets, cell) : cell * count;
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
     node nodes[GRID_MAX_CELL_VERTICES];
     bool is_finite = true;
+    grid_cell_vertices(basis->cells, cell, vertices);
     for (int i = 0; i < count; i++)
-        is_finite = take_node(basis, grid_array_index(&basis->cells->connectivity, first + i), to->scale, field_count,
-                              &nodes[i]) &&
-                    is_finite;
+        is_finite = take_node(basis, vertices[i], to->scale, field_count, &nodes[i]) && is_finite;
     for (int i = 0; i < corner_count && is_finite; i++)
         give_corner(to, &nodes[corners[i][0]], &nodes[corners[i][1]], &nodes[corners[i][2]], &nodes[corners[i][3]],
                     field_count);
