@@ -39,11 +39,12 @@ insitu_decorations plain()
 
 std::vector<float> draw(const std::vector<float> &rgba, const insitu_decorations &d)
 {
-    std::string warning;
     const insitu_image image{width, height, rgba.data(), nullptr, &d, 0, nullptr, nullptr};
     std::vector<float> out = rgba;
-    decorate(image, out, warning);
-    assert_string_equal(warning.c_str(), "");
+    decorate(image, out);
+    insitu_word_faults faults;
+    check_words(image, faults);
+    for (const char *fault : {faults.font, faults.letters, faults.room}) assert_string_equal(fault, "");
     return out;
 }
 

@@ -8,8 +8,12 @@
 #include <cstdarg>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 #include "decorate.h"
@@ -58,7 +62,10 @@ std::vector<float> draw(const char *text, std::string &warning)
     std::vector<float> rgba(static_cast<std::size_t>(4 * width * height));
     const insitu_image image{width, height, rgba.data(), nullptr, &what, 0, nullptr, nullptr};
     std::vector<float> out = rgba;
-    decorate(image, out, warning);
+    insitu_word_faults faults;
+    decorate(image, out);
+    check_words(image, faults);
+    warning = faults.letters;
     std::vector<float> red;
     for (std::size_t i = 0; i < out.size(); i += 4) red.push_back(out[i]);
     return red;
@@ -166,12 +173,44 @@ void bytes_that_are_not_utf8_are_replaced(void **)
     }
 }
 
+std::string font_fault(const std::string &folders)
+{
+    const insitu_words words{"a", INSITU_TOP_LEFT, 1};
+    insitu_decorations what{};
+    what.size = 0.2;
+    what.words_count = 1;
+    what.words = &words;
+    insitu_word_faults faults;
+    setenv("OPENIMAGEIO_FONTS", folders.c_str(), 1);
+    check_words({width, height, nullptr, nullptr, &what, 0, nullptr, nullptr}, faults);
+    unsetenv("OPENIMAGEIO_FONTS");
+    return faults.font;
+}
+
+void a_font_of_the_users_that_cannot_be_read_is_a_warning(void **)
+{
+    const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("glyphs" + std::to_string(getpid()));
+    const std::string file = folder / "DejaVuSans.ttf", system = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+    std::filesystem::create_directory(folder);
+    const std::string absent = font_fault(folder);
+    std::ofstream(file) << "no font";
+    const std::string unreadable = font_fault("/nowhere:" + folder.string());
+    std::filesystem::copy_file(system, file, std::filesystem::copy_options::overwrite_existing);
+    const std::string good = font_fault(folder);
+    std::filesystem::remove_all(folder);
+    assert_non_null(std::strstr(absent.c_str(), ("OPENIMAGEIO_FONTS, which is " + folder.string()).c_str()));
+    assert_non_null(std::strstr(absent.c_str(), ("words are drawn by " + system).c_str()));
+    assert_non_null(std::strstr(unreadable.c_str(), (file + " cannot be read as a font").c_str()));
+    assert_string_equal(good.c_str(), "");
+}
+
 } // namespace
 
 int main()
 {
     const CMUnitTest tests[] = {cmocka_unit_test(words_beyond_ascii_are_freetypes_glyphs),
                                 cmocka_unit_test(a_missing_glyph_is_a_box_and_a_warning),
-                                cmocka_unit_test(bytes_that_are_not_utf8_are_replaced)};
+                                cmocka_unit_test(bytes_that_are_not_utf8_are_replaced),
+                                cmocka_unit_test(a_font_of_the_users_that_cannot_be_read_is_a_warning)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

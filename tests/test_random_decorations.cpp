@@ -25,10 +25,9 @@ void draw_and_check(int width, int height, const insitu_decorations &what)
 {
     std::vector<float> rgba(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     const insitu_image image{width, height, rgba.data(), nullptr, &what, 0, nullptr, nullptr};
-    std::string warning;
     std::vector<float> out = rgba;
     alarm(10);
-    decorate(image, out, warning);
+    decorate(image, out);
     alarm(0);
     for (const float value : out)
         if (!(value >= 0 && value <= 1.001F)) fail_msg("%d x %d: a colour of %g", width, height, (double)value);

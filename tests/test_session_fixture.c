@@ -305,11 +305,12 @@ bool session_writes_behind;
 
 library_loading library_loaded;
 
-bool has_font = true;
+insitu_word_faults word_faults;
 
-bool session_has_font(void)
+void session_check_words(const insitu_image *image, insitu_word_faults *out)
 {
-    return has_font;
+    (void)image;
+    *out = word_faults;
 }
 
 double session_load_image_library(void)
@@ -368,6 +369,5 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
         return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);
     }
     caught[caught_count++] = picture;
-    if (error && image->decorations && !has_font) snprintf(error->message, sizeof error->message, "no font was found");
     return INSITU_OK;
 }

@@ -151,7 +151,7 @@ typedef struct library_loading {
 
 extern library_loading library_loaded;
 
-/* Whether the image library finds a font. */
-extern bool has_font;
+/* What the image library finds wrong with the words of every picture. */
+extern insitu_word_faults word_faults;
 
 #endif

@@ -448,15 +448,17 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     test_free(values);
 }
 
-/* In the step that draws the words first, though they are written after it. */
-static void lack_of_a_font_is_told_at_once(void **context)
+/* In the step that draws the words first, though they are written after it; none hides another. */
+static void faults_of_words_are_told_at_once(void **context)
 {
     (void)context;
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (int i = 0; i < 3; i++) {
         const bool has_words = i > 0, is_told = i == 2;
-        has_font = !is_told;
+        word_faults = (insitu_word_faults){.font = ""};
+        if (is_told)
+            word_faults = (insitu_word_faults){"no font was found", "no glyphs for U+6E29", "no room for the axes"};
         insitu_session *session =
             open_session(MPI_COMM_WORLD,
                          write_scene(has_words ? IMAGE_OF_PNG("    decorations: {title: Words}\n") : IMAGE_OF_PNG("")));
@@ -464,12 +466,14 @@ static void lack_of_a_font_is_told_at_once(void **context)
         for (int cycle = 0; cycle < 2; cycle++) {
             step_is_good(session, cycle);
             const char *warnings = insitu_last_report(session)->warnings;
-            everywhere(is_told && cycle == 0 ? strstr(warnings, "image \"a\": no font was found, so its words") != NULL
+            everywhere(is_told && cycle == 0 ? strstr(warnings, "image \"a\": no font was found") &&
+                                                   strstr(warnings, "image \"a\": no glyphs for U+6E29") &&
+                                                   strstr(warnings, "image \"a\": no room for the axes")
                                              : !*warnings);
         }
         insitu_destroy(&session);
     }
-    has_font = true;
+    word_faults = (insitu_word_faults){.font = ""};
     input_free(&in);
 }
 
@@ -539,7 +543,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(warnings_come_back_with_what_they_are_about),
         cmocka_unit_test(pictures_that_would_take_hours_are_refused),
         cmocka_unit_test(control_characters_are_escaped),
-        cmocka_unit_test(lack_of_a_font_is_told_at_once),
+        cmocka_unit_test(faults_of_words_are_told_at_once),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -163,6 +163,21 @@ void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
     }
 }
 
+/* The only step of a run tells what is wrong with its words, and a missing letter does not hide a lack of room. */
+void faults_of_words_are_told_in_a_run_of_one_step(void **)
+{
+    write_lattice("words.vtu", 2, [](auto &at) { return at[0]; });
+    write_file(folder + "/words.yaml", "images:\n  - {name: w, size: [120, 80], layers: [{surface: {}}], decorations: "
+                                       "{size: 0.2, title: \"\u6e29\", axes: true}, outputs: [{path: w.png}]}\n");
+    for (const std::string &start : {std::string(), shell_word(mpiexec) + " -n 3 "}) {
+        const run_result r = run_in(folder, start + shell_word(tool) + " words.yaml words.vtu");
+        if (r.status != 0) fail_msg("%s", r.err.c_str());
+        for (const char *words : {"warning: image \"w\": the font", "no glyphs for U+6E29",
+                                  "warning: image \"w\": no room in 120 x 80 pixels for the axes, which is left out"})
+            if (!r.says(words)) fail_msg("no \"%s\" in %s", words, r.err.c_str());
+    }
+}
+
 int begin(void **)
 {
     folder = fresh_folder("vtk_default");
@@ -180,6 +195,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_solid_with_a_dark_outside_is_cut_open),
         cmocka_unit_test(a_solid_whose_outside_shows_the_field_is_drawn_whole),
         cmocka_unit_test(flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map),
+        cmocka_unit_test(faults_of_words_are_told_in_a_run_of_one_step),
     };
     return cmocka_run_group_tests(tests, begin, nullptr);
 }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 namespace
@@ -257,6 +258,11 @@ bool has_words(const insitu_decorations &what)
            what.scale_bar.length > 0;
 }
 
+layout place_blocks(const insitu_image &image, const typeface *font)
+{
+    return make_layout(image, [&](const std::string &text, int size) { return font ? font->width_of(text, size) : 0; });
+}
+
 std::string describe_left_out(const insitu_image &image, const std::vector<std::string> &left_out)
 {
     std::string names;
@@ -264,12 +270,13 @@ std::string describe_left_out(const insitu_image &image, const std::vector<std::
     for (const std::string &name : left_out)
         names += (names.empty() ? "" : &name == &left_out.back() ? " and " : ", ") + name;
     return "no room in " + std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels for " + names +
-           ", which is left out; a smaller \"size\" of decorations or a larger picture has more";
+           ", which " + (left_out.size() == 1 ? "is" : "are") +
+           " left out; a smaller \"size\" of decorations or a larger picture has more";
 }
 
 } // namespace
 
-void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &warning)
+void decorate(const insitu_image &image, std::vector<float> &rgba)
 {
     const insitu_decorations &what = *image.decorations;
     sheet s{image, what, rgba, nullptr};
@@ -278,14 +285,21 @@ void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &
     draw_strokes(s, true);
     put_background(s);
     draw_strokes(s, false);
-    const layout places =
-        make_layout(image, [&](const std::string &text, int size) { return font ? font->width_of(text, size) : 0; });
-    for (const block &b : places.blocks) draw_block(s, b);
-    warning = describe_left_out(image, places.left_out);
-    const std::string letters =
-        !font           ? ""
-        : font->found() ? font->missing()
-                        : "no font was found, so its words are left out; expected DejaVuSans in the system's fonts or "
-                          "in a folder that OPENIMAGEIO_FONTS names";
-    warning += (warning.empty() || letters.empty() ? "" : "; ") + letters;
+    for (const block &b : place_blocks(image, s.font).blocks) draw_block(s, b);
+}
+
+void check_words(const insitu_image &image, insitu_word_faults &out)
+{
+    const auto tell = [](char(&text)[1024], const std::string &words) {
+        std::snprintf(text, sizeof text, "%s", words.c_str());
+    };
+    out = {};
+    if (!has_words(*image.decorations)) return;
+    typeface font;
+    const layout places = place_blocks(image, &font);
+    for (const block &b : places.blocks)
+        for (const placed_line &line : b.lines) font.look_up(line.text);
+    tell(out.font, font.fault());
+    tell(out.letters, font.missing());
+    tell(out.room, describe_left_out(image, places.left_out));
 }

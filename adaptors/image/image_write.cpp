@@ -23,7 +23,6 @@
 #include "encoded_file.h"
 #include "memory_reserve.h"
 #include "picture_file.h"
-#include "typeface.h"
 
 namespace
 {
@@ -230,18 +229,16 @@ void write_undecorated(const insitu_image &image, insitu_image_format format, co
     }
 }
 
-std::string write(const insitu_image &image, insitu_image_format format, const std::string &path)
+void write(const insitu_image &image, insitu_image_format format, const std::string &path)
 {
-    std::string warning;
     insitu_image finished = image;
     std::vector<float> rgba;
     if (image.decorations && format != INSITU_DEEP_EXR) {
         rgba.assign(image.rgba, image.rgba + 4 * pixel_count(image));
-        decorate(image, rgba, warning);
+        decorate(image, rgba);
         finished.rgba = rgba.data();
     }
     write_undecorated(finished, format, path);
-    return warning;
 }
 
 insitu_status fail(insitu_status status, const char *path, const char *what, char *message, std::size_t size)
@@ -252,12 +249,15 @@ insitu_status fail(insitu_status status, const char *path, const char *what, cha
 
 } // namespace
 
-extern "C" int insitu_image_has_font(void)
+extern "C" insitu_status insitu_image_check_words(const insitu_image *image, insitu_word_faults *out)
 {
+    if (!image || !out || !image->decorations || image->width < 1 || image->height < 1) return INSITU_ERROR_ARGUMENT;
     try {
-        return typeface().found();
+        check_words(*image, *out);
+        return INSITU_OK;
     } catch (...) {
-        return 1; /* the picture's own warning says what is wrong */
+        *out = {};
+        return INSITU_ERROR_MEMORY;
     }
 }
 
@@ -270,8 +270,8 @@ extern "C" insitu_status insitu_image_write(const insitu_image *image, insitu_im
         return fail(INSITU_ERROR_ARGUMENT, path, "no image, no path, no pixels or an unknown format", message, size);
     }
     try {
-        const std::string warning = write(*image, format, path);
-        if (message && size) std::snprintf(message, size, "%s", warning.c_str());
+        write(*image, format, path);
+        if (message && size) *message = '\0';
         return INSITU_OK;
     } catch (const std::bad_alloc &) {
         return fail(INSITU_ERROR_MEMORY, path, "no memory", message, size);

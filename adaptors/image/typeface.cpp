@@ -7,6 +7,7 @@
 #include FT_GLYPH_H
 #include FT_STROKER_H
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -43,35 +44,55 @@ std::vector<std::string> find_files(const std::string &folder, const std::string
     return out;
 }
 
-/* OPENIMAGEIO_FONTS holds folders between colons or semicolons. */
-std::vector<std::string> font_folders()
+std::string own_folders()
+{
+    const char *own = std::getenv("OPENIMAGEIO_FONTS");
+    return own ? own : "";
+}
+
+/* Folders stand between colons or semicolons. */
+std::vector<std::string> split_folders(const std::string &list)
 {
     std::vector<std::string> out;
-    const char *own = std::getenv("OPENIMAGEIO_FONTS");
-    std::string folder;
-    for (const char *at = own ? own : ""; *at; at++) {
-        const bool ends = *at == ':' || *at == ';';
-        if (!ends) folder += *at;
-        if ((ends || !at[1]) && !folder.empty()) out.push_back(folder), folder.clear();
+    for (std::size_t at = 0; at < list.size();) {
+        const std::size_t end = std::min(list.find_first_of(":;", at), list.size());
+        if (end > at) out.push_back(list.substr(at, end - at));
+        at = end + 1;
     }
-    out.emplace_back("/usr/share/fonts");
-    out.emplace_back("/usr/local/share/fonts");
     return out;
 }
 
-FT_Face open_font(FT_Library library, std::string &name)
+struct opened_font {
+    FT_Face face;
+    std::string name, file, unreadable;
+};
+
+bool try_font(FT_Library library, const char *name, const std::string &path, opened_font &out)
 {
-    const std::vector<std::string> folders = font_folders();
+    FT_Face face = nullptr;
+    if (!is_done(FT_New_Face(library, path.c_str(), 0, &face)) || !FT_IS_SCALABLE(face)) {
+        if (face) FT_Done_Face(face);
+        if (out.unreadable.empty()) out.unreadable = path;
+        return false;
+    }
+    out.face = face, out.name = name, out.file = path;
+    return true;
+}
+
+bool open_font(FT_Library library, const std::vector<std::string> &folders, opened_font &out)
+{
     for (const char *font : fonts)
         for (const std::string &folder : folders)
-            for (const std::string &path : find_files(folder, font)) {
-                FT_Face face = nullptr;
-                name = font;
-                if (!is_done(FT_New_Face(library, path.c_str(), 0, &face))) continue;
-                if (FT_IS_SCALABLE(face)) return face;
-                FT_Done_Face(face);
-            }
-    return nullptr;
+            for (const std::string &path : find_files(folder, font))
+                if (try_font(library, font, path, out)) return true;
+    return false;
+}
+
+std::string usual_fonts()
+{
+    std::string out;
+    for (const char *font : fonts) out += (out.empty() ? "" : ", ") + std::string(font);
+    return out;
 }
 
 /* ---- characters ---- */
@@ -181,7 +202,10 @@ typeface::typeface()
 {
     if (!is_done(FT_Init_FreeType(&library_))) return;
     try {
-        face_ = open_font(library_, name_);
+        opened_font font{};
+        is_from_system_ = !open_font(library_, split_folders(own_folders()), font) &&
+                          open_font(library_, {"/usr/share/fonts", "/usr/local/share/fonts"}, font);
+        face_ = font.face, name_ = font.name, file_ = font.file, unreadable_ = font.unreadable;
     } catch (...) {
         FT_Done_FreeType(library_);
         throw;
@@ -220,9 +244,8 @@ int typeface::advance_of(unsigned glyph, int size) const
 void typeface::draw(const std::string &text, int size, double halo, const cover_pixel &cover)
 {
     if (!face_) return;
-    const std::vector<char32_t> characters = decode_utf8(text, has_bad_bytes_);
-    for (const char32_t character : characters)
-        if (glyph_of(face_, character) == 0) missing_.insert(character);
+    bool is_bad = false;
+    const std::vector<char32_t> characters = decode_utf8(text, is_bad);
     if (!(halo > 0)) {
         const FT_GlyphSlot slot = face_->glyph;
         walk(face_, characters, size, FT_LOAD_RENDER,
@@ -234,6 +257,25 @@ void typeface::draw(const std::string &text, int size, double halo, const cover_
     const std::unique_ptr<FT_StrokerRec_, void (*)(FT_Stroker)> guard(stroker, FT_Stroker_Done);
     FT_Stroker_Set(stroker, std::lround(64 * halo), FT_STROKER_LINECAP_ROUND, FT_STROKER_LINEJOIN_ROUND, 0);
     walk(face_, characters, size, FT_LOAD_NO_BITMAP, [&](int x) { cover_widened(face_->glyph, stroker, x, cover); });
+}
+
+void typeface::look_up(const std::string &text)
+{
+    if (!face_) return;
+    for (const char32_t character : decode_utf8(text, has_bad_bytes_))
+        if (glyph_of(face_, character) == 0) missing_.insert(character);
+}
+
+std::string typeface::fault() const
+{
+    const std::string own = own_folders();
+    const std::string read = unreadable_.empty() ? "" : " (" + unreadable_ + " cannot be read as a font)";
+    if (!face_)
+        return "no font was found, so its words are left out" + read +
+               "; expected DejaVuSans in the system's fonts or in a folder that OPENIMAGEIO_FONTS names";
+    if (own.empty() || !is_from_system_) return "";
+    return "no font was found in OPENIMAGEIO_FONTS, which is " + own + read + "; expected a file of " + usual_fonts() +
+           "; words are drawn by " + file_;
 }
 
 std::string typeface::missing() const

@@ -16,30 +16,34 @@ struct FT_FaceRec_;
 /* How much of one pixel a glyph covers, 0 to 1; x to the right of the line's begin, y down from its baseline. */
 using cover_pixel = std::function<void(int x, int y, double covered)>;
 
-/* Every call but found() may throw std::bad_alloc. */
+/* Every call may throw std::bad_alloc. */
 class typeface
 {
   public:
-    /* Opens the first of the usual fonts that is in the system's folders or in those that OPENIMAGEIO_FONTS names. */
+    /* Opens the first of the usual fonts that is in a folder that OPENIMAGEIO_FONTS names, else in the system's. */
     typeface();
     ~typeface();
     typeface(const typeface &) = delete;
     typeface &operator=(const typeface &) = delete;
 
-    bool found() const { return face_ != nullptr; }
     /* Pixels from the line's begin to its end, for letters of this height. 0 where no font was found. */
     int width_of(const std::string &text, int size) const;
     /* Covers the pixels of glyphs; where halo > 0, those of glyphs that are wider by so many pixels on every side. */
     void draw(const std::string &text, int size, double halo, const cover_pixel &cover);
-    /* Empty, or a message about characters that were drawn as boxes. */
+    /* Keeps the characters of the line that are drawn as boxes, for missing(). */
+    void look_up(const std::string &text);
+    /* Empty, or a message about characters that are drawn as boxes. */
     std::string missing() const;
+    /* Empty, or a message: no font was found, or none where OPENIMAGEIO_FONTS names folders. */
+    std::string fault() const;
 
   private:
     int advance_of(unsigned glyph, int size) const;
 
     FT_LibraryRec_ *library_ = nullptr;
     FT_FaceRec_ *face_ = nullptr;
-    std::string name_;
+    std::string name_, file_, unreadable_; /* the font's; a file that is no font or cannot be read */
+    bool is_from_system_ = false;
     mutable std::map<std::pair<int, unsigned>, int> advances_; /* by size and glyph */
     std::set<char32_t> missing_;
     bool has_bad_bytes_ = false;

@@ -27,7 +27,6 @@ enum change_word {
     WRITES_AT_ONCE,
     ISA_LOW, /* and the lowest rank that has it */
     ISA_HIGH,
-    FONT_LACKING,
     TELLING,   /* session_telling_word() */
     ROOT_TIME, /* the bits of rank 0's */
     CHANGE_WORDS
@@ -77,7 +76,6 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
     words[ISA_LOW] = -(render_isa_level() * more_ranks + team->rank);
     words[ISA_HIGH] = render_isa_level();
-    words[FONT_LACKING] = session->writer.lacks_font;
     words[TELLING] = session_telling_word(&session->report, team);
     words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
 }
@@ -105,7 +103,6 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .isa_level = (int)(-all[ISA_LOW] / more_ranks),
                              .isa_rank = (int)(-all[ISA_LOW] % more_ranks),
                              .isa_best = (int)all[ISA_HIGH],
-                             .is_font_lacking = all[FONT_LACKING],
                              .telling_rank = session_telling_rank((int)all[TELLING], &session->team)};
     return INSITU_OK;
 }

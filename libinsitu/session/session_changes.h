@@ -12,14 +12,13 @@ typedef struct session_changes {
     bool of_scene, of_cells, of_names;
     bool are_names_shared; /* all ranks have the same tables of names */
     bool are_threads_lacking;
-    bool are_unwritten;   /* pictures of earlier steps */
-    bool is_filled;       /* some field's values are made on demand: what fills it may call MPI */
-    bool writes_behind;   /* this step's pictures are written when it is over */
-    int isa_level;        /* the lowest of the ranks' instruction sets (render_isa.h) */
-    int isa_rank;         /* the lowest rank that has no better */
-    int isa_best;         /* the highest of the ranks' */
-    bool is_font_lacking; /* on rank 0, for words */
-    int telling_rank;     /* the lowest that has warnings for all ranks; -1: none */
+    bool are_unwritten; /* pictures of earlier steps */
+    bool is_filled;     /* some field's values are made on demand: what fills it may call MPI */
+    bool writes_behind; /* this step's pictures are written when it is over */
+    int isa_level;      /* the lowest of the ranks' instruction sets (render_isa.h) */
+    int isa_rank;       /* the lowest rank that has no better */
+    int isa_best;       /* the highest of the ranks' */
+    int telling_rank;   /* the lowest that has warnings for all ranks; -1: none */
 } session_changes;
 
 /* One small reduction. Collective. */

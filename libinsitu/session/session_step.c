@@ -164,22 +164,10 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
                                 changes->is_filled,   s->kept.is_on};
     base_error of_events = {.status = INSITU_OK};
-    const session_drawing drawing = {team,
-                                     s->scene_file.path,
-                                     changes->cycle,
-                                     &s->meshes,
-                                     &s->trees.parent,
-                                     &s->space,
-                                     &s->run_ranges,
-                                     &s->report,
-                                     &s->kept,
-                                     basis.scene,
-                                     &s->cinema,
-                                     &s->overwrites,
-                                     &s->writer,
-                                     &s->catalogue,
-                                     changes->writes_behind,
-                                     changes->is_font_lacking};
+    const session_drawing drawing = {
+        team,       s->scene_file.path, changes->cycle, &s->meshes,    &s->trees.parent,
+        &s->space,  &s->run_ranges,     &s->report,     &s->kept,      basis.scene,
+        &s->cinema, &s->overwrites,     &s->writer,     &s->catalogue, changes->writes_behind};
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, refused, error);
     if (!status) status = name_derived(s, error);

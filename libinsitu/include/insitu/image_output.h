@@ -22,7 +22,7 @@ typedef enum insitu_image_format {
 } insitu_image_format;
 
 /* Where in the picture a decoration stands. Decorations of one place are stacked, and none covers another: what is too
- * large is wrapped or made smaller, and what has no room at all is left out and named by a warning. */
+ * large is wrapped or made smaller, and what has no room at all is left out, which insitu_image_check_words() says. */
 typedef enum insitu_anchor {
     INSITU_TOP_LEFT,
     INSITU_TOP,
@@ -133,17 +133,24 @@ typedef struct insitu_image {
  * The temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written; the first
  * picture that a process writes to a folder removes the temporary files that killed runs of the same user left there.
  * It is an error if path is a pipe, a device or a directory. On an error, message (size bytes) says what went wrong,
- * with the path. Otherwise message is empty, or warns: no font was found and the picture has no words, or the font
- * lacks characters of words, which are boxes, or words are not UTF-8, or decorations had no room. Local. */
+ * with the path; otherwise it is empty. Local. */
 typedef insitu_status insitu_image_write_function(const insitu_image *image, insitu_image_format format,
                                                   const char *path, char *message, size_t size);
 
 INSITU_API insitu_image_write_function insitu_image_write;
 
-/* Tells whether a font for words is found; if not, words are left out. Local. */
-typedef int insitu_image_has_font_function(void);
+/* Reasons why a picture's words are not drawn as they are given. Each text is empty, or one line. */
+typedef struct insitu_word_faults {
+    char font[1024];    /* no font was found, so words are left out; or OPENIMAGEIO_FONTS names none that can be read */
+    char letters[1024]; /* the font lacks characters, which are drawn as boxes; or words are not UTF-8 */
+    char room[1024];    /* decorations that have no room in the picture are left out */
+} insitu_word_faults;
 
-INSITU_API insitu_image_has_font_function insitu_image_has_font;
+/* Lay the image's decorations out as insitu_image_write() does, without drawing them. Of the image only the size and
+ * the decorations are read. Local. Thread-safe. */
+typedef insitu_status insitu_image_check_words_function(const insitu_image *image, insitu_word_faults *out);
+
+INSITU_API insitu_image_check_words_function insitu_image_check_words;
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,8 @@
 
 #include "session_agree.h"
 
+enum { MOST_BYTES = 2048 }; /* of a line */
+
 int session_telling_word(const session_report *report, const session_team *team)
 {
     return report->own.size ? team->ranks - team->rank : 0;
@@ -16,18 +18,19 @@ int session_telling_rank(int word, const session_team *team)
 
 insitu_status session_share_lines(session_report *report, int root, const session_team *team, base_error *error)
 {
-    char text[4096] = "";
-    const size_t size = report->own.size < sizeof text ? report->own.size : sizeof text - 1;
-    if (size) memcpy(text, report->own.data, size);
+    const char *lines = team->rank == root && report->own.size ? report->own.data : "";
+    char line[MOST_BYTES];
     report->own.size = 0;
-    const insitu_status status =
-        session_mpi(error, MPI_Bcast(text, sizeof text, MPI_CHAR, root, team->comm), "MPI_Bcast");
-    for (char *line = text; *line && !status;) {
-        char *end = line + strcspn(line, "\n");
-        const bool is_last = !*end;
-        *end = '\0';
+    for (;;) {
+        int size = (int)strcspn(lines, "\n");
+        insitu_status status = session_mpi(error, MPI_Bcast(&size, 1, MPI_INT, root, team->comm), "MPI_Bcast");
+        if (status || !size) return status;
+        const int taken = size < MOST_BYTES ? size : MOST_BYTES - 1;
+        if (team->rank == root) memcpy(line, lines, (size_t)taken);
+        status = session_mpi(error, MPI_Bcast(line, taken, MPI_CHAR, root, team->comm), "MPI_Bcast");
+        if (status) return status;
+        line[taken] = '\0';
         session_text_add(&report->warnings, "%s", line);
-        line = is_last ? end : end + 1;
+        if (team->rank == root) lines += size + (lines[size] == '\n');
     }
-    return status;
 }

@@ -15,6 +15,7 @@
 #include "session_deep.h"
 #include "session_files.h"
 #include "session_frame.h"
+#include "session_image.h"
 #include "session_layers.h"
 #include "session_lines.h"
 #include "session_view.h"
@@ -367,7 +368,7 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     c->channels = (session_channels){0};
     c->deep = (deep_image){0};
     c->decorations = NULL;
-    session_writer_give(d->writer, files, d->report, error);
+    session_writer_give(d->writer, files, error);
 }
 
 /* Where nothing is written in the step, only rank 0's lack of memory to hand the picture over can go wrong. The next
@@ -389,15 +390,25 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* The picture's own warning, which is the same, would come a step later. */
-static void warn_of_font(const session_drawing *d, const scene_image *image)
+static bool writes_words(const scene_image *image)
 {
-    if (!d->lacks_font || !scene_has_words(image)) return;
-    session_warn(
-        d->report, &(session_warning){WARNING_WORDS, image->name, NULL, 0}, true,
-        "image \"%s\": no font was found, so its words are left out; expected DejaVuSans in the system's fonts or "
-        "in a folder that OPENIMAGEIO_FONTS names",
-        image->name);
+    bool is_decorated = false;
+    for (int i = 0; i < image->output_count; i++)
+        is_decorated = is_decorated || (image->outputs[i].has_decorations && !image->outputs[i].is_deep);
+    return is_decorated && scene_has_words(image);
+}
+
+/* On rank 0. The words are laid out here, before the writing thread does it again, so that the warnings come with the
+ * step that draws them. */
+static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
+{
+    insitu_word_faults faults;
+    session_check_words(
+        &(insitu_image){.width = image->width, .height = image->height, .decorations = &decorations->all}, &faults);
+    const char *const texts[] = {faults.font, faults.letters, faults.room};
+    for (int i = 0; i < 3; i++)
+        session_warn_own(d->report, &(session_warning){WARNING_WORDS, image->name, NULL, i}, *texts[i] != '\0',
+                         "image \"%s\": %.900s", image->name, texts[i]);
 }
 
 /* Collective where the outline is of meshes or ranks; what fails on rank 0 alone is for the next agreement. */
@@ -406,7 +417,6 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
 {
     session_outline outline;
     const scene_moment moment = moment_of(d, image);
-    warn_of_font(d, image);
     const insitu_status status =
         session_find_outline(&image->decorations, d->catalogue, d->meshes, &d->space->extent, d->team, &outline, error);
     if (status) return status;
@@ -414,6 +424,7 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
         out->decorations = session_make_decorations(
             image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline});
         if (!out->decorations) session_no_memory(error, (int64_t)sizeof *out->decorations, "decorations");
+        if (out->decorations && writes_words(image)) warn_of_words(d, image, out->decorations);
     }
     session_free_outline(&outline);
     return INSITU_OK;
@@ -456,7 +467,7 @@ static void write_tables(const session_drawing *d, base_error *first)
             files->scene = d->scene;
             files->cinema = d->cinema;
             files->moment.cycle = d->cycle;
-            session_writer_give(d->writer, files, d->report, &reason);
+            session_writer_give(d->writer, files, &reason);
         } else
             session_no_memory(&reason, (int64_t)sizeof *files, "the tables of databases");
         d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
@@ -469,8 +480,10 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
                                   base_error *error)
 {
     base_error first = plan->refusal;
+    bool has_lines = !d->writes_behind; /* rank 0 may have warnings for all */
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
+        has_lines = has_lines || writes_words(plan->images[i]);
         scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {
@@ -480,7 +493,7 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         }
         if (first.status == INSITU_OK) first = reason;
     }
-    if (!d->writes_behind) session_share_lines(d->report, 0, d->team, &first);
+    if (0) session_share_lines(d->report, 0, d->team, &first);
     write_tables(d, &first);
     if (first.status) *error = first;
     return error->status;

@@ -31,7 +31,6 @@ typedef struct session_drawing {
     session_writer *writer; /* rank 0's */
     const session_catalogue *catalogue;
     bool writes_behind; /* pictures are written when the step is over */
-    bool lacks_font;    /* rank 0 has none for words */
 } session_drawing;
 
 /* Draw the plan's images and give them to the writer. One that fails is left out. The plan's refusal, if there is one,

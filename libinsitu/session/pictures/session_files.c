@@ -48,7 +48,6 @@ static void write_output(session_files *files, const scene_output *output)
         base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
     else if (output->database >= 0)
         session_note_picture(files->cinema, files->scene, &files->image, output, &files->moment, &files->error);
-    if (!reason.status && *reason.message) files->warning = reason;
     base_free(path);
 }
 

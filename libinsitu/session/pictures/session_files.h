@@ -27,7 +27,6 @@ typedef struct session_files {
     deep_image deep;                  /* without counts: there is none */
     session_decorations *decorations; /* NULL: none, and the frame has its background */
     base_error error;                 /* the first reason why a file could not be written */
-    base_error warning;               /* its status is INSITU_OK; its message says what was left out of the last file */
     double ms;                        /* that writing took */
 } session_files;
 

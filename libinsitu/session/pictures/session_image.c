@@ -26,7 +26,7 @@
 static const char library[] = "libinsitu_image.so";
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static insitu_image_write_function *loaded_writer;
-static insitu_image_has_font_function *loaded_font_finder; /* NULL: not loaded, or of another version */
+static insitu_image_check_words_function *loaded_checker; /* NULL: not loaded, or of another version */
 
 static void *open_library(const char *path, char *why, size_t size)
 {
@@ -120,8 +120,8 @@ static insitu_status load(base_error *error)
                          library);
     }
     memcpy(&loaded_writer, &symbol, sizeof symbol);
-    symbol = dlsym(handle, "insitu_image_has_font");
-    if (symbol) memcpy(&loaded_font_finder, &symbol, sizeof symbol);
+    symbol = dlsym(handle, "insitu_image_check_words");
+    if (symbol) memcpy(&loaded_checker, &symbol, sizeof symbol);
     return INSITU_OK;
 }
 
@@ -149,10 +149,12 @@ double session_load_image_library(void)
     return is_there ? 0 : 1e3 * (double)(end.tv_sec - start.tv_sec) + 1e-6 * (double)(end.tv_nsec - start.tv_nsec);
 }
 
-bool session_has_font(void)
+void session_check_words(const insitu_image *image, insitu_word_faults *out)
 {
     insitu_image_write_function *unused;
-    return load_once(NULL, &unused) != INSITU_OK || !loaded_font_finder || loaded_font_finder();
+    *out = (insitu_word_faults){.font = ""};
+    if (load_once(NULL, &unused) == INSITU_OK && loaded_checker && loaded_checker(image, out) != INSITU_OK)
+        *out = (insitu_word_faults){.font = ""};
 }
 
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
@@ -165,6 +167,5 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     char message[sizeof error->message / 2] = "";
     const insitu_status written = write(image, format, path, message, sizeof message);
     if (written != INSITU_OK) return base_fail(error, written, "%s", message);
-    if (error && *message) snprintf(error->message, sizeof error->message, "%s", message);
     return INSITU_OK;
 }

@@ -16,8 +16,9 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
  * where it was there. Local. Thread-safe. */
 double session_load_image_library(void);
 
-/* Tells whether words can be drawn, as far as is known: true where the library cannot be loaded. Local. Thread-safe. */
-bool session_has_font(void);
+/* Finds what hinders the words of a picture (image_output.h), of which only the size and the decorations are read.
+ * Nothing if the library cannot be loaded or memory runs out, as writing the picture then fails. Local. Thread-safe. */
+void session_check_words(const insitu_image *image, insitu_word_faults *out);
 
 /* Whether pictures may be written by a thread of their own (session_writer.h). Tests that replace this file set it to
  * false. */

@@ -214,20 +214,9 @@ bool session_writer_is_behind(const session_writer *w, const scene *scene)
     return scene->writing == SCENE_WRITE_BEHIND && (w->is_running || (session_writes_behind && !w->is_refused));
 }
 
-static void find_font(session_writer *w, const scene *scene)
-{
-    for (int i = 0; i < scene->image_count && !w->is_font_known; i++) {
-        if (!scene_has_words(&scene->images[i])) continue;
-        w->is_font_known = true;
-        w->lacks_font = !session_has_font();
-    }
-}
-
-static double start_thread(session_writer *w, const scene *scene)
+static void start_thread(session_writer *w)
 {
     sigset_t all, before;
-    if (w->is_running || scene->image_count == 0 || !session_writer_is_behind(w, scene)) return 0;
-    const double ms = session_load_image_library();
     atexit(wait_for_all);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -235,27 +224,20 @@ static double start_thread(session_writer *w, const scene *scene)
     w->is_refused = !w->is_running;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (w->is_running) enlist(w);
-    return ms;
 }
 
 double session_writer_begin(session_writer *w, const scene *scene)
 {
-    const double ms = start_thread(w, scene);
-    find_font(w, scene);
+    if (scene->image_count == 0) return 0;
+    const double ms = w->is_loaded ? 0 : session_load_image_library();
+    w->is_loaded = true;
+    if (!w->is_running && session_writer_is_behind(w, scene)) start_thread(w);
     return ms;
 }
 
 /* ---- what goes in and what comes out -------------------------------------------------------------------------- */
 
-static void warn(const session_files *files, session_report *report)
-{
-    const session_warning warning = {WARNING_WORDS, files->image.name, NULL, 0};
-    if (files->has_picture)
-        session_warn_own(report, &warning, *files->warning.message != '\0', "image \"%s\": %.900s", files->image.name,
-                         files->warning.message);
-}
-
-void session_writer_give(session_writer *w, session_files *files, session_report *report, base_error *error)
+void session_writer_give(session_writer *w, session_files *files, base_error *error)
 {
     const bool is_behind = w->is_running && files->scene->writing == SCENE_WRITE_BEHIND;
     if (is_behind) {
@@ -268,7 +250,6 @@ void session_writer_give(session_writer *w, session_files *files, session_report
         return;
     }
     session_write_files(files);
-    warn(files, report);
     if (files->error.status && !error->status) *error = files->error;
     session_writer_release(w, &files->memory);
     session_files_free(files);
@@ -282,7 +263,6 @@ void session_writer_note(session_writer *w, int64_t cycle, const base_error *err
 
 static void collect_one(session_writer *w, const session_files *files, session_report *report)
 {
-    warn(files, report);
     report->numbers.background_ms += files->ms;
     session_writer_note(w, files->moment.cycle, &files->error);
 }

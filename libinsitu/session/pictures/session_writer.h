@@ -26,8 +26,8 @@ typedef struct session_writer {
     pthread_mutex_t mutex;
     pthread_cond_t has_changed; /* the queue, or is_ending */
     pthread_t thread;
-    bool is_running, is_refused; /* a thread was started; a thread could not be started */
-    bool is_ending;
+    bool is_running, is_refused;        /* a thread was started; a thread could not be started */
+    bool is_ending, is_loaded;          /* the thread is to end; the image library was loaded, or cannot be */
     struct session_files *first, *last; /* the queue; the thread is at the first */
     struct session_files *done, *last_done;
     int64_t written;                                    /* by the thread, whose it is */
@@ -36,7 +36,6 @@ typedef struct session_writer {
     session_picture free_memory[SESSION_FREE_PICTURES]; /* for pictures that come */
     base_error failure;                                 /* the first that no step has told yet; the caller's thread's */
     int failures;                                       /* how many there were */
-    bool is_font_known, lacks_font;                     /* whether one was looked for; none was found for words */
     double loading_ms;                                  /* of insitu_create(), for the next report */
     struct session_writer *next;                        /* of the process's */
 } session_writer;
@@ -44,10 +43,8 @@ typedef struct session_writer {
 /* Nothing is started yet. Local. */
 void session_writer_create(session_writer *writer);
 
-/* Load the image library and start the thread, if the scene has pictures, which are to be written by one, and there is
- * none; find out whether there is a font, if the scene has words. Returns the milliseconds that the library took.
- * Local.
- */
+/* Load the image library and start the thread, if the scene has pictures and these were not done. Where the scene has
+ * its pictures written in the step, no thread is started. Returns the milliseconds that the library took. Local. */
 double session_writer_begin(session_writer *writer, const scene *scene);
 
 /* Tells whether session_writer_begin() has started the thread, or will start it for this scene. Local. */
@@ -63,12 +60,11 @@ session_picture session_writer_reserve(session_writer *writer, size_t bytes);
 /* Give memory back. Local. */
 void session_writer_release(session_writer *writer, session_picture *memory);
 
-/* Write the files by the thread, or at once where there is none; then what went wrong is in error and the report. files
- * is the writer's from here on. Local. */
-void session_writer_give(session_writer *writer, struct session_files *files, session_report *report,
-                         base_error *error);
+/* Write the files by the thread, or at once where there is none; then what went wrong is in error. files is the
+ * writer's from here on. Local. */
+void session_writer_give(session_writer *writer, struct session_files *files, base_error *error);
 
-/* Take what the thread has written: warnings and its time go to the report, errors to the writer's failure. Local. */
+/* Take what the thread has written: its time goes to the report, errors to the writer's failure. Local. */
 void session_writer_collect(session_writer *writer, session_report *report);
 
 /* The first failure, and how many more there were; none is left to tell. Local. */

@@ -318,8 +318,9 @@ static const cyaml_schema_value_t statistics = {
           "Words, bars and lines beside the data. None of them lies over another, and all of them grow with "          \
           "the picture. What is too large is wrapped or made smaller, bars may stand in several columns, and what "    \
           "has no room at all is left out and named by the report. Words need a font: DejaVuSans, or another common "  \
-          "one, in the system's folders or in those that OPENIMAGEIO_FONTS names in rank 0's environment; without "    \
-          "one the report warns. Words are UTF-8; a character that the font lacks is a box, and the report names it.", \
+          "one, in the folders that OPENIMAGEIO_FONTS names in rank 0's environment, or else in the system's. The "    \
+          "report warns if there is none, or none in the folders named. Words are UTF-8; a character that the font "   \
+          "lacks is a box, and the report names it.",                                                                  \
       .by_default = "none", .child = &decorations_mapping)                                                             \
     X(CYAML_FIELD_SEQUENCE("outputs", POINTER, scene_file_image, outputs, &output, 1, 16),                             \
       .help = "Files that the image is written to. No two files of a scene may have the same name. An image without "  \
