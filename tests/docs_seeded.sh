@@ -1,6 +1,6 @@
 #!/bin/sh
 # docs_seeded.sh ROOT PYTHON FOLDER: docs/site/check_pages.py finds each kind of fault in a tree made for it, docs/site/check_site.py
-# in a site, and docs/site/header_page.py a declaration without a comment.
+# in a site, docs/site/header_page.py a declaration without a comment, and docs/site/check_claims.py a sentence that is not proved.
 set -eu
 root=$1 python=$2 folder=$3
 rm -rf "$folder"
@@ -68,4 +68,23 @@ site '<script src="https://example.org/a.js"></script>' 'fetches https://example
 printf '/* A header. */\n/* A call. */\nINSITU_API int good(void);\n\nINSITU_API int bad(void);\n' >"$folder/bad.h"
 "$python" "$root/docs/site/header_page.py" "$folder/bad.h" >"$folder/out" 2>&1 && { echo 'no fault: bad.h'; failed=1; }
 grep -qF 'bad() has no comment right before it' "$folder/out" || { echo 'not said of bad.h'; cat "$folder/out"; failed=1; }
+
+mkdir -p docs/development tests build
+printf 'It is\nso, and\nthus | said.\n' >page.md
+printf 'cmocka_unit_test(it_is_so)\n' >tests/test_one.c
+printf 'add_test([=[one_np2]=] "mpiexec" "bin/test_one")\nset_tests_properties([=[one_np2]=] PROPERTIES  X "(y)")\n' >build/CTestTestfile.cmake
+claims() {
+    printf '| document | sentence | test | case |\n|---|---|---|---|\n%s\n' "$1" >docs/development/claims.md
+    "$python" "$root/docs/site/check_claims.py" . build >"$folder/out"
+}
+claims '| page.md | It is so, and thus \| said. | one | it_is_so |' || { cat "$folder/out"; failed=1; }
+claim() {
+    claims "$1" && { echo "no fault: $2"; failed=1; }
+    grep -qF "$2" "$folder/out" || { echo "not said: $2"; cat "$folder/out"; failed=1; }
+}
+claim '| page.md | It is not so | one | it_is_so |' 'page.md does not say: It is not so'
+claim '| gone.md | It is | one | it_is_so |' 'there is no gone.md'
+claim '| page.md | It is so | two | it_is_so |' 'no test is registered as two'
+claim '| page.md | It is so | one | it_is |' 'the test one has no case it_is'
+claim '' 'it has no table'
 exit $failed

@@ -493,7 +493,7 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         }
         if (first.status == INSITU_OK) first = reason;
     }
-    if (0) session_share_lines(d->report, 0, d->team, &first);
+    if (has_lines) session_share_lines(d->report, 0, d->team, &first);
     write_tables(d, &first);
     if (first.status) *error = first;
     return error->status;
