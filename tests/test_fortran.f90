@@ -65,6 +65,8 @@ program test_fortran
     integer(int64), target :: faces_8(4, face_count), face_sizes_8(face_count)
     integer(int32), target :: face_sizes(face_count), cell_faces(6, cells), cell_offsets(cells + 1)
     type(c_ptr), target :: face_lists(face_count), face_lists_8(2, face_count)
+    integer(int32), allocatable, target :: inner_faces(:, :), inner_offsets(:), inner_owner(:), inner_neighbour(:)
+    integer(int32), allocatable, target :: outer_faces(:, :), outer_offsets(:), outer_owner(:)
     integer(int8), target :: types(cells), ghosts(cells)
     real(real64), target :: vector(2*vertices)
     integer(int32), target :: places(vertices), nodes(27, cells), own(8, cells), dofs(10, cells)
@@ -107,6 +109,9 @@ program test_fortran
         with_lists=2), 'lists in long integers, pointers apart')
     call same(picture('cells', insitu_points(xyz), insitu_borrow(cell_faces), insitu_borrow(pressure), with_owner=.true., &
         with_lists=3), 'cells of faces that have lists')
+    call split_faces()
+    call same(picture('apart', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true., &
+        with_apart=.true.), 'faces of the boundary in a list of their own')
     call make_dofs()
     call same(picture('rows', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), insitu_borrow(pressure)), 'first rows')
     call same(picture('nodes', insitu_points(xyz), insitu_borrow(nodes(1:8, :)), insitu_borrow(vector), with_dofs=.true.), &
@@ -206,6 +211,22 @@ contains
         call expect(count == face_count, 'all faces are found')
     end subroutine make_faces
 
+    ! Faces of the boundary in a list of their own, but for one, which has a cell of a halo beyond.
+    subroutine split_faces()
+        logical :: is_outer(face_count)
+        integer :: face
+        is_outer = neighbour == 0
+        is_outer(findloc(is_outer, .true., dim=1)) = .false.
+        inner_faces = reshape(pack(faces, spread(.not. is_outer, 1, 4)), [4, count(.not. is_outer)])
+        outer_faces = reshape(pack(faces, spread(is_outer, 1, 4)), [4, count(is_outer)])
+        inner_owner = pack(owner, .not. is_outer)
+        outer_owner = pack(owner, is_outer)
+        inner_neighbour = pack(neighbour, .not. is_outer)
+        where (inner_neighbour == 0) inner_neighbour = cells + 1
+        inner_offsets = [(1 + 4*(face - 1), face=1, size(inner_owner) + 1)]
+        outer_offsets = [(1 + 4*(face - 1), face=1, size(outer_owner) + 1)]
+    end subroutine split_faces
+
     ! The connectivity as a list.
     function reshaped()
         integer(int32), pointer :: reshaped(:)
@@ -282,11 +303,11 @@ contains
 
     ! The file's bytes, on rank 0.
     function picture(name, points, connectivity, values, component, with_types, with_owner, with_dofs, at_corner, &
-        with_lists) result(out)
+        with_lists, with_apart) result(out)
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity, values
         character(*), intent(in), optional :: component
-        logical, intent(in), optional :: with_types, with_owner, with_dofs
+        logical, intent(in), optional :: with_types, with_owner, with_dofs, with_apart
         integer, intent(in), optional :: at_corner, with_lists
         character(:), allocatable :: out
         type(insitu_session) :: session
@@ -303,6 +324,11 @@ contains
                 offsets=insitu_borrow(offsets_8), ghosts=insitu_borrow(ghosts))
         else if (present(with_lists)) then
             call set_lists(session, with_lists, connectivity)
+        else if (present(with_owner) .and. present(with_apart)) then
+            call session%set_mesh_of_faces('m', points, insitu_borrow(inner_faces), insitu_borrow(inner_offsets), &
+                insitu_borrow(inner_owner), insitu_borrow(inner_neighbour), cells, status, halo_cells=1, &
+                boundary_faces=insitu_borrow(outer_faces), boundary_offsets=insitu_borrow(outer_offsets), &
+                boundary_owner=insitu_borrow(outer_owner))
         else if (present(with_owner)) then
             call session%set_mesh_of_faces('m', points, connectivity, insitu_borrow(face_offsets), insitu_borrow(owner), &
                 insitu_borrow(neighbour), cells, status, ghosts=insitu_borrow(ghosts))

@@ -41,6 +41,23 @@ static void make_narrow(owned *o, int64_t faces, int32_t base)
     for (int64_t i = 0; i < o->offsets[faces]; i++) o->narrow_vertices[i] = (int32_t)o->vertices[i] + base;
 }
 
+/* The list for the boundary ends with a face of no cell, the first vertex over and over. */
+static void make_apart(owned *o, int64_t cells, int32_t base)
+{
+    for (int64_t face = 0; face < o->middle; face++) {
+        const int32_t halo = (int32_t)(cells + face % OWNED_HALO) + base, own = (int32_t)o->owner[face] + base;
+        const bool is_beyond = face >= o->inner, is_first = face % 2;
+        o->halo_pairs[2 * face] = is_beyond && is_first ? halo : own;
+        o->halo_pairs[2 * face + 1] = !is_beyond ? (int32_t)o->neighbour[face] + base : is_first ? own : halo;
+    }
+    for (int64_t face = o->middle; face <= o->faces; face++)
+        o->apart_offsets[face - o->middle] = (int32_t)(o->offsets[face] - o->offsets[o->middle]) + base;
+    for (int64_t face = o->middle; face < o->faces; face++)
+        o->apart_owner[face - o->middle] = (int32_t)o->owner[face] + base;
+    o->apart_offsets[o->faces - o->middle + 1] = o->apart_offsets[o->faces - o->middle];
+    o->apart_owner[o->faces - o->middle] = base - 1;
+}
+
 owned make_owned(const test_mesh *part, int32_t base)
 {
     const int64_t faces = part->face_count, entries = part->face_connectivity_count;
@@ -51,7 +68,11 @@ owned make_owned(const test_mesh *part, int32_t base)
                .pairs = test_allocate(2 * faces, sizeof(int32_t)),
                .narrow_offsets = test_allocate(faces + 1, sizeof(int32_t)),
                .narrow_vertices = test_allocate(entries, sizeof(int32_t)),
-               .lists = test_allocate(faces, sizeof(label_list))};
+               .lists = test_allocate(faces, sizeof(label_list)),
+               .faces = faces,
+               .halo_pairs = test_allocate(2 * faces, sizeof(int32_t)),
+               .apart_offsets = test_allocate(faces + 2, sizeof(int32_t)),
+               .apart_owner = test_allocate(faces + 1, sizeof(int32_t))};
     int64_t *first = test_allocate(faces, sizeof *first), *second = test_allocate(faces, sizeof *second), at = 0;
     find_sides(part, first, second);
     for (int64_t face = 0; face < faces; face++)
@@ -59,7 +80,9 @@ owned make_owned(const test_mesh *part, int32_t base)
     o.inner = at;
     for (int64_t face = 0; face < faces; face++)
         if (second[face] < 0) take_face(&o, part, face, at++, first[face], second[face]);
+    o.middle = o.inner + (faces - o.inner) / 3;
     make_narrow(&o, faces, base);
+    make_apart(&o, part->cell_count, base);
     free(first);
     free(second);
     return o;
@@ -67,10 +90,27 @@ owned make_owned(const test_mesh *part, int32_t base)
 
 void free_owned(owned *o)
 {
-    void *const arrays[] = {o->owner, o->neighbour,      o->offsets,         o->vertices,
-                            o->pairs, o->narrow_offsets, o->narrow_vertices, o->lists};
+    void *const arrays[] = {o->owner,      o->neighbour,      o->offsets,         o->vertices,
+                            o->pairs,      o->narrow_offsets, o->narrow_vertices, o->lists,
+                            o->halo_pairs, o->apart_offsets,  o->apart_owner};
     for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) free(arrays[i]);
     *o = (owned){0};
+}
+
+static void describe_apart(const owned *o, int base, insitu_mesh *mesh)
+{
+    const int64_t pair = 2 * sizeof(int32_t), first = o->offsets[o->middle];
+    mesh->face_count = mesh->neighbour_count = o->middle;
+    mesh->face_connectivity_count = first;
+    mesh->owner = (insitu_array){o->halo_pairs, INSITU_INT32, pair};
+    mesh->neighbour = (insitu_array){o->halo_pairs + 1, INSITU_INT32, pair};
+    mesh->halo_cell_count = OWNED_HALO;
+    mesh->boundary_face_count = o->faces - o->middle + 1;
+    mesh->boundary_face_offsets = (insitu_array){o->apart_offsets, INSITU_INT32, 0};
+    mesh->boundary_face_connectivity_count = o->offsets[o->faces] - first;
+    mesh->boundary_face_connectivity = (insitu_array){o->narrow_vertices + first, INSITU_INT32, 0};
+    mesh->boundary_owner = (insitu_array){o->apart_owner, INSITU_INT32, 0};
+    mesh->index_base = base;
 }
 
 void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh)
@@ -92,6 +132,7 @@ void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh)
         mesh->face_connectivity = (insitu_array){o->vertices, INSITU_INT64, 0};
         mesh->index_base = 0;
     }
+    if (which == FORM_APART) describe_apart(o, base, mesh);
     if (which != FORM_LISTS) return;
     mesh->face_connectivity_count = 0;
     mesh->face_offsets = mesh->face_connectivity = (insitu_array){0};

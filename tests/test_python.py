@@ -183,6 +183,22 @@ def finite_volumes_are_their_hexes():
             comm.Barrier()
             with open(f"{folder}/volumes.png", "rb") as file:
                 everywhere(file.read() == plain, "the picture of the hexes")
+            order = numpy.argsort(neighbour < 0, kind="stable")
+            inner = numpy.count_nonzero(neighbour >= 0) + 1  # the last of them has a cell of a halo beyond
+            apart = {**mesh, "faces": mesh["faces"][order][:inner], "face_offsets": mesh["face_offsets"][:inner + 1],
+                     "owner": mesh["owner"][order][:inner], "neighbour": mesh["neighbour"][order][:inner],
+                     "boundary_faces": mesh["faces"][order][inner:], "boundary_owner": mesh["owner"][order][inner:],
+                     "boundary_face_offsets": mesh["face_offsets"][:len(faces) - inner + 1], "halo_cell_count": 1}
+            apart["neighbour"][-1] = 64 + base
+            raises(ValueError, "boundary_face_offsets: has 96 elements, expected 95", s.set_mesh, "m",
+                   **{**apart, "boundary_owner": apart["boundary_owner"][1:]})
+            s.set_mesh("m", **apart)
+            s.set_field("m", "f", f)
+            s.step(4, 0.0)
+            everywhere(s.report["cells_recognised"] == 64, "hexes are recognised, of two lists")
+            comm.Barrier()
+            with open(f"{folder}/volumes.png", "rb") as file:
+                everywhere(file.read() == plain, "the picture of the hexes, by two lists of faces")
             lists = {**mesh, "faces": [face.astype(kind) + base for face in faces]}
             del lists["face_offsets"]
             raises(ValueError, "faces[3]: is strided", s.set_mesh, "m",

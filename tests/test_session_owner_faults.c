@@ -155,7 +155,149 @@ static void float_lists(session_input *in)
     in->mesh.face_lists.type = INSITU_FLOAT32;
 }
 
+static void apart(session_input *in)
+{
+    by_owner(in, FORM_APART, 0);
+}
+static void neighbour_beyond_the_halo(session_input *in)
+{
+    apart(in);
+    spoilt.halo_pairs[1] = (int32_t)in->part.cell_count + OWNED_HALO;
+}
+static void halo_not_told(session_input *in)
+{
+    apart(in);
+    for (int64_t i = 0; i < spoilt.middle; i++) spoilt.halo_pairs[2 * i] = (int32_t)in->part.cell_count;
+    in->mesh.halo_cell_count = 0;
+}
+static void boundary_owner_large(session_input *in)
+{
+    apart(in);
+    spoilt.apart_owner[1] = 1000000;
+}
+static void boundary_owner_negative(session_input *in)
+{
+    apart(in);
+    spoilt.apart_owner[0] = -2;
+}
+static void boundary_offset_large(session_input *in)
+{
+    apart(in);
+    spoilt.apart_offsets[1] = 1000000;
+}
+static void boundary_offset_falls(session_input *in)
+{
+    apart(in);
+    spoilt.apart_offsets[1] = -1;
+}
+static void boundary_vertex_large(session_input *in)
+{
+    by_owner(in, FORM_APART, 1);
+    spoilt.narrow_vertices[spoilt.offsets[spoilt.middle]] = 1000000;
+}
+static void boundary_without_owners(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_owner.data = NULL;
+}
+static void boundary_without_offsets(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_face_offsets.data = NULL;
+}
+static void boundary_owners_alone(session_input *in)
+{
+    apart(in);
+    in->mesh.owner.data = in->mesh.neighbour.data = NULL;
+    in->mesh.neighbour_count = 0;
+}
+static void boundary_count_negative(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_face_count = -1;
+}
+static void boundary_count_huge(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_face_count = INT64_MAX;
+}
+static void boundary_entries_huge(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_face_connectivity_count = INT64_MAX;
+}
+static void halo_negative(session_input *in)
+{
+    apart(in);
+    in->mesh.halo_cell_count = -7;
+}
+static void halo_huge(session_input *in)
+{
+    apart(in);
+    in->mesh.halo_cell_count = INT64_MAX;
+}
+static void halo_without_owners(session_input *in)
+{
+    in->mesh.halo_cell_count = 3;
+}
+static void boundary_stride(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_owner.stride_bytes = 6;
+}
+static void boundary_far(session_input *in)
+{
+    apart(in);
+    in->mesh.boundary_face_offsets.stride_bytes = (int64_t)1 << 47;
+}
+static void boundary_beside_lists(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    in->mesh.boundary_face_count = 1;
+    in->mesh.boundary_face_offsets = (insitu_array){spoilt.apart_offsets, INSITU_INT32, 0};
+    in->mesh.boundary_owner = (insitu_array){spoilt.apart_owner, INSITU_INT32, 0};
+}
+
 static const spoilt_case cases[] = {
+    {"beyond the halo", neighbour_beyond_the_halo, INSITU_ERROR_MESH, false, {"face 0: its neighbour ", "outside 0.."}},
+    {"no halo", halo_not_told, INSITU_ERROR_MESH, false, {"face 0: its owner ", "is outside 0.."}},
+    {"its owner", boundary_owner_large, INSITU_ERROR_MESH, false, {"its owner 1000000 is outside 0.."}},
+    {"its owner -2", boundary_owner_negative, INSITU_ERROR_MESH, false, {"its owner -2 is outside 0.."}},
+    {"offset",
+     boundary_offset_large,
+     INSITU_ERROR_MESH,
+     false,
+     {"from offset 0 on, 1000000 of them, do not lie within"}},
+    {"offset -1", boundary_offset_falls, INSITU_ERROR_MESH, false, {"from offset 0 on, -1 of them, do not lie within"}},
+    {"its vertex", boundary_vertex_large, INSITU_ERROR_MESH, false, {"vertex index 1000000 is outside 1..", "is 1"}},
+    {"no owners", boundary_without_owners, INSITU_ERROR_MESH, true, {"owners of boundary faces are not given"}},
+    {"no offsets", boundary_without_offsets, INSITU_ERROR_MESH, true, {"offsets of boundary faces are not given"}},
+    {"owners alone",
+     boundary_owners_alone,
+     INSITU_ERROR_MESH,
+     true,
+     {"owners of boundary faces are given, but those of "}},
+    {"faces -1", boundary_count_negative, INSITU_ERROR_ARGUMENT, true, {"boundary_face_count is -1"}},
+    {"faces",
+     boundary_count_huge,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"boundary_face_count is 9223372036854775807, at most"}},
+    {"entries", boundary_entries_huge, INSITU_ERROR_ARGUMENT, true, {"boundary_face_connectivity_count is 92"}},
+    {"halo -7", halo_negative, INSITU_ERROR_ARGUMENT, true, {"halo_cell_count is -7"}},
+    {"halo", halo_huge, INSITU_ERROR_ARGUMENT, true, {"halo_cell_count is 9223372036854775807, at most"}},
+    {"halo alone", halo_without_owners, INSITU_ERROR_MESH, true, {"halo_cell_count is 3, but owners of faces"}},
+    {"stride 6", boundary_stride, INSITU_ERROR_MESH, true, {"owners of boundary faces have a stride of 6 bytes"}},
+    {"far",
+     boundary_far,
+     INSITU_ERROR_MESH,
+     true,
+     {"offsets of boundary faces have a stride of ", "outside of memory"}},
+    {"beside lists",
+     boundary_beside_lists,
+     INSITU_ERROR_MESH,
+     true,
+     {"boundary_face_count is 1 and face lists are given"}},
     {"owner", owner_large, INSITU_ERROR_MESH, false, {"face 3: its owner 1000000 is outside 0..", "index_base is 0"}},
     {"owner -1", owner_negative, INSITU_ERROR_MESH, false, {"face 2: its owner -1 is outside 0.."}},
     {"owner 0 of 1", owner_before_one, INSITU_ERROR_MESH, false, {"face 5: its owner 0 is outside 1..", "is 1"}},

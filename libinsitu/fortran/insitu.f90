@@ -78,6 +78,11 @@ module insitu
         type(c_array) :: neighbour, face_sizes, face_lists
         integer(c_int) :: keep_polyhedra, vertex_order
         integer(c_int64_t) :: connectivity_row
+        integer(c_int64_t) :: boundary_face_count
+        type(c_array) :: boundary_face_offsets
+        integer(c_int64_t) :: boundary_face_connectivity_count
+        type(c_array) :: boundary_face_connectivity, boundary_owner
+        integer(c_int64_t) :: halo_cell_count
     end type c_mesh
 
     type, bind(C) :: c_patch
@@ -645,16 +650,17 @@ contains
 
     ! Hand over this rank's part of a finite-volume mesh: faces' vertices and where each face begins, or a list for each
     ! face; and for each face the cell that owns it and the neighbour beyond. Faces on the boundary have 0 (index_base -
-    ! 1) as neighbour, or come last, beyond the neighbours.
+    ! 1) as neighbour, or come last, beyond the neighbours, or are in a list of their own: boundary_faces, where each of
+    ! them begins, and its only cell. owner and neighbour may name the halo_cells cells of a halo, behind cell_count.
     subroutine set_faces_by_offsets(self, name, points, faces, face_offsets, owner, neighbour, cell_count, status, ghosts, &
-        vertex_ids, changed, index_base, keep_polyhedra)
+        vertex_ids, changed, index_base, keep_polyhedra, boundary_faces, boundary_offsets, boundary_owner, halo_cells)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), faces, face_offsets, owner, neighbour
         integer, intent(in) :: cell_count
         integer, intent(out) :: status
-        type(insitu_array), intent(in), optional :: ghosts, vertex_ids
-        integer, intent(in), optional :: changed, index_base
+        type(insitu_array), intent(in), optional :: ghosts, vertex_ids, boundary_faces, boundary_offsets, boundary_owner
+        integer, intent(in), optional :: changed, index_base, halo_cells
         logical, intent(in), optional :: keep_polyhedra
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
@@ -664,7 +670,19 @@ contains
         status = INSITU_ERROR_ARGUMENT
         fault = find_fault(points, faces, 0_c_int64_t, [face_offsets])
         if (len(fault) == 0 .and. face_offsets%columns /= owner%columns + 1) fault = 'face_offsets are not one more than owner'
+        if (len(fault) == 0 .and. any([present(boundary_faces), present(boundary_offsets)] .neqv. present(boundary_owner))) &
+            fault = 'boundary_faces, boundary_offsets and boundary_owner are given together or not at all'
+        if (len(fault) == 0 .and. present(boundary_owner)) &
+            fault = find_boundary_fault(points, boundary_faces, boundary_offsets, boundary_owner)
         if (is_refused(self, fault)) return
+        if (present(halo_cells)) mesh%halo_cell_count = halo_cells
+        if (present(boundary_owner)) then
+            mesh%boundary_face_count = boundary_owner%columns
+            mesh%boundary_owner = as_c(boundary_owner, nothing)
+            mesh%boundary_face_offsets = as_c(boundary_offsets, nothing)
+            mesh%boundary_face_connectivity_count = boundary_faces%rows * boundary_faces%columns
+            mesh%boundary_face_connectivity = as_c(boundary_faces, nothing)
+        end if
         mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
         mesh%face_offsets = as_c(face_offsets, nothing)
         mesh%face_connectivity_count = faces%rows * faces%columns
@@ -672,6 +690,15 @@ contains
         call set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
             index_base, keep_polyhedra)
     end subroutine set_faces_by_offsets
+
+    ! As find_fault(), of the list for the boundary.
+    function find_boundary_fault(points, faces, offsets, owner) result(out)
+        type(insitu_array), intent(in) :: points(3), faces, offsets, owner
+        character(:), allocatable :: out
+        out = find_fault(points, faces, 0_c_int64_t, [offsets, owner])
+        if (len(out) == 0 .and. offsets%columns /= owner%columns + 1) &
+            out = 'boundary_offsets are not one more than boundary_owner'
+    end function find_boundary_fault
 
     subroutine set_faces_by_lists(self, name, points, face_lists, owner, neighbour, cell_count, status, ghosts, vertex_ids, &
         changed, index_base, keep_polyhedra)

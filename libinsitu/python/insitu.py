@@ -68,6 +68,12 @@ class _Mesh(ctypes.Structure):
         ("keep_polyhedra", ctypes.c_int),
         ("vertex_order", ctypes.c_int),
         ("connectivity_row", ctypes.c_int64),
+        ("boundary_face_count", ctypes.c_int64),
+        ("boundary_face_offsets", _Array),
+        ("boundary_face_connectivity_count", ctypes.c_int64),
+        ("boundary_face_connectivity", _Array),
+        ("boundary_owner", _Array),
+        ("halo_cell_count", ctypes.c_int64),
     ]
 
 
@@ -373,11 +379,14 @@ class Session:
 
     def set_mesh(self, name, *, coordinates, connectivity=None, cell_type=TET, cell_types=None, offsets=None, faces=None,
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
-                 keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL):
+                 keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL, boundary_faces=None,
+                 boundary_face_offsets=None, boundary_owner=None, halo_cell_count=0):
         """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h),
         or a list of arrays, one a face, without face_offsets. For cells of one type, connectivity may be the first
         columns of a table: nodes[:, :8]. Finite-volume codes may give owner, neighbour and cell_count instead of
-        connectivity, cell_type, cell_types and offsets."""
+        connectivity, cell_type, cell_types and offsets; boundary_faces, boundary_face_offsets and boundary_owner, if
+        the boundary's faces are in a list of their own, and halo_cell_count, if owner and neighbour name cells of a
+        halo."""
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
         axes, mesh.vertex_count, held = _axes(coordinates)
@@ -394,7 +403,8 @@ class Session:
         mesh.index_base, mesh.keep_polyhedra, mesh.vertex_order = index_base, keep_polyhedra, vertex_order
         counts = {}
         for key, given in [("cell_types", cell_types), ("offsets", offsets), ("face_offsets", face_offsets),
-                           ("owner", owner), ("neighbour", neighbour), ("ghosts", ghosts), ("vertex_ids", vertex_ids)]:
+                           ("owner", owner), ("neighbour", neighbour), ("ghosts", ghosts), ("vertex_ids", vertex_ids),
+                           ("boundary_face_offsets", boundary_face_offsets), ("boundary_owner", boundary_owner)]:
             if given is not None:
                 borrowed, counts[key], array = _list(key, given)
                 setattr(mesh, key, borrowed)
@@ -407,6 +417,11 @@ class Session:
         elif faces is not None:
             mesh.face_connectivity, mesh.face_connectivity_count, array = _rows("faces", faces)
             held.append(array)
+        if boundary_faces is not None:
+            mesh.boundary_face_connectivity, mesh.boundary_face_connectivity_count, array = _rows("boundary_faces",
+                                                                                                  boundary_faces)
+            held.append(array)
+        mesh.boundary_face_count, mesh.halo_cell_count = counts.get("boundary_owner", 0), halo_cell_count
         mesh.neighbour_count = counts.get("neighbour", 0)
         mesh.cell_count = self._cell_count(counts, cells) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
@@ -567,6 +582,7 @@ class Session:
     def _expect_counts(mesh, counts):
         """Check lengths that the C interface does not get, and would read beyond."""
         cells, vertices, faces = mesh.cell_count, mesh.vertex_count, mesh.face_count
-        for key, expected in [("offsets", cells + 1), ("ghosts", cells), ("vertex_ids", vertices), ("owner", faces)]:
+        for key, expected in [("offsets", cells + 1), ("ghosts", cells), ("vertex_ids", vertices), ("owner", faces),
+                              ("boundary_face_offsets", mesh.boundary_face_count + 1)]:
             if key in counts and counts[key] != expected:
                 raise ValueError(f"{key}: has {counts[key]} elements, expected {expected}")

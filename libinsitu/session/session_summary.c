@@ -22,6 +22,9 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     if (m->face_lists.data) bytes += m->face_count * (int64_t)sizeof(void *);
     bytes += array_bytes(&m->owner, m->face_count);
     bytes += array_bytes(&m->neighbour, m->neighbour_count);
+    bytes += array_bytes(&m->boundary_face_offsets, m->boundary_face_count + 1);
+    bytes += array_bytes(&m->boundary_face_connectivity, m->boundary_face_connectivity_count);
+    bytes += array_bytes(&m->boundary_owner, m->boundary_face_count);
     bytes += array_bytes(&m->connectivity, m->connectivity_count);
     bytes += array_bytes(&m->offsets, m->offsets.data ? m->cell_count + 1 : 0);
     for (int axis = 0; m->lattice && axis < 3; axis++)

@@ -191,6 +191,18 @@ typedef struct insitu_mesh {
      * read. vertex_count and cell_count are the lengths of the vertices' and the cells' arrays, padding included. The
      * description is copied, the axes are borrowed. Nothing is held for each cell or vertex. */
     const insitu_lattice *lattice;
+    /* Codes that hold the faces of the boundary in a list of their own, as code_saturne does, give it beside owner and
+     * neighbour. Its faces are numbered on from face_count, in patches too. Both lists are copied into one, once for
+     * each topology, and held as long as polyhedra are drawn from them, as at face_lists. Not with face_lists. */
+    int64_t boundary_face_count;              /* 0 by default */
+    insitu_array boundary_face_offsets;       /* int32 or int64, boundary_face_count + 1, as face_offsets, but in: */
+    int64_t boundary_face_connectivity_count; /* elements in boundary_face_connectivity */
+    insitu_array boundary_face_connectivity;  /* int32 or int64: the faces' vertex indices from index_base */
+    insitu_array boundary_owner; /* int32 or int64, boundary_face_count: the only cell of each face; -1 (or 0 where
+                                    index_base is 1): none, and the face is passed over */
+    int64_t halo_cell_count;     /* 0 by default. Cells of a halo that owner and neighbour may name: the numbers of the
+                                    halo follow those of the mesh's cells. They count as no cell, so that a face
+                                    between a cell and the halo is on the boundary of this rank's part. */
 } insitu_mesh;
 
 /* A field has one value at each vertex, one in each cell, or one at each corner of each cell. Volumes and colours show

@@ -18,7 +18,7 @@ const signed char *session_vertex_turn(insitu_vertex_order order, int type)
 
 bool session_is_reordered(const insitu_mesh *given)
 {
-    if (given->cell_count == 0 || given->owner.data) return false;
+    if (given->cell_count == 0 || session_has_owners(given)) return false;
     if (given->cell_types.data) return given->vertex_order != INSITU_ORDER_VTK;
     const int type = (int)given->cell_type;
     const bool has_gaps = given->connectivity_row && given->connectivity_row != grid_type_vertices(type);

@@ -162,7 +162,7 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
     case FACE_BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face index %lld is outside %lld..%lld", name, at, face,
-                         base, (long long)mesh->given.face_count - 1 + base);
+                         base, (long long)session_face_count(&mesh->given) - 1 + base);
     case FACE_BAD_OFFSETS:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: offsets %lld and %lld do not rise within "

@@ -172,7 +172,7 @@ static insitu_status check_others(const insitu_mesh *mesh, base_error *error)
                   {"offsets", mesh->offsets.data},
                   {"cell types", mesh->cell_types.data},
                   {"face vertex indices", mesh->face_connectivity.data || mesh->face_count},
-                  {"owners of faces", mesh->owner.data},
+                  {"owners of faces", mesh->owner.data || mesh->boundary_owner.data},
                   {"rows of connectivity", mesh->connectivity_row}};
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
         if (others[i].is_given)

@@ -327,4 +327,16 @@ void session_take_back(session_meshes *meshes);
  * does; filling.refused says so, and is what the step fails with. Local. */
 bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
+/* Tells whether cells are given by the owners of their faces. */
+static inline bool session_has_owners(const insitu_mesh *mesh)
+{
+    return mesh->owner.data || mesh->boundary_owner.data;
+}
+
+/* The number of given faces: those of the list for the boundary come behind the others. */
+static inline int64_t session_face_count(const insitu_mesh *mesh)
+{
+    return mesh->face_count + mesh->boundary_face_count;
+}
+
 #endif

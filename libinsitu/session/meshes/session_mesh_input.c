@@ -57,16 +57,34 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_count("face_count", mesh->face_count, INT64_MAX / 32, error);
     if (!status) status = check_count("face_connectivity_count", mesh->face_connectivity_count, INT64_MAX / 32, error);
     if (!status) status = check_count("neighbour_count", mesh->neighbour_count, INT64_MAX / 32, error);
+    if (!status) status = check_count("boundary_face_count", mesh->boundary_face_count, INT64_MAX / 32, error);
+    if (!status)
+        status = check_count("boundary_face_connectivity_count", mesh->boundary_face_connectivity_count, INT64_MAX / 32,
+                             error);
+    if (!status) status = check_count("halo_cell_count", mesh->halo_cell_count, 4294967294, error);
     return status;
 }
 
 static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
 {
-    const insitu_array *const arrays[] = {
-        &mesh->coordinates[0], &mesh->coordinates[1], &mesh->coordinates[2],   &mesh->vertex_ids,   &mesh->cell_types,
-        &mesh->connectivity,   &mesh->offsets,        &mesh->ghosts,           &mesh->face_offsets, &mesh->face_sizes,
-        &mesh->owner,          &mesh->neighbour,      &mesh->face_connectivity};
+    const insitu_array *const arrays[] = {&mesh->coordinates[0],
+                                          &mesh->coordinates[1],
+                                          &mesh->coordinates[2],
+                                          &mesh->vertex_ids,
+                                          &mesh->cell_types,
+                                          &mesh->connectivity,
+                                          &mesh->offsets,
+                                          &mesh->ghosts,
+                                          &mesh->face_offsets,
+                                          &mesh->face_sizes,
+                                          &mesh->owner,
+                                          &mesh->neighbour,
+                                          &mesh->face_connectivity,
+                                          &mesh->boundary_face_offsets,
+                                          &mesh->boundary_owner,
+                                          &mesh->boundary_face_connectivity};
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
+    const int64_t apart = mesh->boundary_face_count;
     const bool has_lists = mesh->face_lists.data != NULL, has_axes = session_has_axes(mesh);
     const int floats = SESSION_ALLOW_FLOATS, integers = SESSION_ALLOW_INTEGERS, bytes = SESSION_ALLOW_BYTES;
     const int optional = SESSION_IS_OPTIONAL, end = SESSION_HAS_END;
@@ -84,6 +102,9 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         {"owners of faces", faces, integers | optional, 1},
         {"neighbours of faces", mesh->neighbour_count, integers, 1},
         {"face vertex indices", mesh->face_connectivity_count, integers, 1},
+        {"offsets of boundary faces", apart, integers | end, 1},
+        {"owners of boundary faces", apart, integers, 1},
+        {"vertex indices of boundary faces", mesh->boundary_face_connectivity_count, integers, 1},
     };
     for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
         const insitu_status status = session_check_array(arrays[i], &rules[i], INSITU_ERROR_MESH, error);
@@ -111,10 +132,21 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
 /* Cells that have their faces by owner and neighbour have them by nothing else. */
 static insitu_status check_owner(const insitu_mesh *mesh, base_error *error)
 {
-    if (!mesh->owner.data) {
+    if (!session_has_owners(mesh)) {
+        if (mesh->halo_cell_count)
+            return base_fail(error, INSITU_ERROR_MESH, "halo_cell_count is %lld, but owners of faces are not given",
+                             (long long)mesh->halo_cell_count);
         if (!mesh->neighbour.data) return INSITU_OK;
         return base_fail(error, INSITU_ERROR_MESH, "neighbours of faces are given without owners");
     }
+    if (mesh->face_count && !mesh->owner.data)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "owners of boundary faces are given, but those of %lld faces are not",
+                         (long long)mesh->face_count);
+    if (mesh->boundary_face_count && mesh->face_lists.data)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "boundary_face_count is %lld and face lists are given: give all faces by lists",
+                         (long long)mesh->boundary_face_count);
     if (mesh->neighbour_count > mesh->face_count)
         return base_fail(error, INSITU_ERROR_MESH, "neighbour_count is %lld, more than face_count, %lld",
                          (long long)mesh->neighbour_count, (long long)mesh->face_count);
@@ -152,10 +184,10 @@ static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = grid_type_vertices((int)mesh->cell_type);
     if (row == 0 || mesh->cell_count == 0) return INSITU_OK;
-    const char *other = mesh->owner.data        ? "owners of faces"
-                        : mesh->offsets.data    ? "offsets"
-                        : mesh->cell_types.data ? "cell types"
-                                                : NULL;
+    const char *other = session_has_owners(mesh) ? "owners of faces"
+                        : mesh->offsets.data     ? "offsets"
+                        : mesh->cell_types.data  ? "cell types"
+                                                 : NULL;
     if (other)
         return base_fail(error, INSITU_ERROR_MESH,
                          "connectivity_row is %lld and %s are given: rows are of cells of one type without offsets",
@@ -172,7 +204,7 @@ static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 
 static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
 {
-    if (mesh->cell_count == 0 || mesh->owner.data || mesh->lattice) return INSITU_OK;
+    if (mesh->cell_count == 0 || session_has_owners(mesh) || mesh->lattice) return INSITU_OK;
     if (mesh->cell_types.data) {
         if (!mesh->offsets.data)
             return base_fail(error, INSITU_ERROR_MESH, "cell types are given without offsets: mixed cells need both");
@@ -220,7 +252,9 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra ||
            a->vertex_order != b->vertex_order || a->connectivity_row != b->connectivity_row ||
            !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data ||
-           session_lattice_changes(a->lattice, b->lattice) == INSITU_CHANGED_ALL;
+           session_lattice_changes(a->lattice, b->lattice) == INSITU_CHANGED_ALL ||
+           a->boundary_face_count != b->boundary_face_count || a->halo_cell_count != b->halo_cell_count ||
+           a->boundary_face_connectivity_count != b->boundary_face_connectivity_count;
 }
 
 /* The changes that two descriptions with as many cells and vertices show: arrays at other addresses, or read in another
@@ -234,7 +268,10 @@ static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
         session_is_same_array(&a->face_connectivity, &b->face_connectivity) &&
         session_is_same_array(&a->face_sizes, &b->face_sizes) &&
         session_is_same_array(&a->face_lists, &b->face_lists) && session_is_same_array(&a->owner, &b->owner) &&
-        session_is_same_array(&a->neighbour, &b->neighbour);
+        session_is_same_array(&a->neighbour, &b->neighbour) &&
+        session_is_same_array(&a->boundary_owner, &b->boundary_owner) &&
+        session_is_same_array(&a->boundary_face_offsets, &b->boundary_face_offsets) &&
+        session_is_same_array(&a->boundary_face_connectivity, &b->boundary_face_connectivity);
     bool has_same_vertices = session_is_same_array(&a->vertex_ids, &b->vertex_ids);
     for (int axis = 0; axis < 3; axis++)
         has_same_vertices = has_same_vertices && session_is_same_array(&a->coordinates[axis], &b->coordinates[axis]);

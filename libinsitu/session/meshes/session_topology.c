@@ -1,8 +1,8 @@
 /* The rooms below the session read cells -> faces -> vertices. Codes of finite volumes hold faces -> vertices and, for
  * each face, the cell that owns it and the neighbour beyond. The link between the two is built here, once for each
  * topology: the faces of each cell, in the order of their numbers. The rooms below do not care which way round a face
- * runs, so nothing is turned. The faces' vertices are read where they are; only where each face has a list of its own
- * are they brought together.
+ * runs, so nothing is turned. The faces' vertices are read where they are; only if each face has a list of its own, or
+ * those of the boundary are in another list than the others, they are copied into one.
  *
  * A polyhedron of six quads may be a hex, which is drawn in a fraction of the time. It is recognised by its faces
  * alone, never by coordinates: all ranks that have the cell take it for the same, and so does every step of a mesh that
@@ -69,6 +69,7 @@ void session_read_topology(session_mesh *mesh)
         t->connectivity_count = mesh->given.connectivity_count;
     }
     if (t->has_own_faces) {
+        g.face_count = session_face_count(&mesh->given);
         g.face_offsets = t->face_offsets;
         g.face_connectivity = t->face_connectivity;
     } else {
@@ -90,29 +91,55 @@ int session_given_type(const session_mesh *mesh, int64_t cell)
     return grid_cell_type(&given, cell);
 }
 
-/* ---- faces' vertices out of lists ----------------------------------------------------------------------------- */
+/* ---- faces' vertices out of several lists --------------------------------------------------------------------- */
 
-/* Returns how many vertices all faces have, or -1 where a list is bad. */
+session_face_row session_given_face(const insitu_mesh *mesh, int64_t face)
+{
+    const bool is_apart = face >= mesh->face_count;
+    if (mesh->face_lists.data) {
+        const grid_array sizes = session_grid_array(&mesh->face_sizes);
+        const insitu_array list = {session_face_list(mesh, face), mesh->face_lists.type, 0};
+        const int64_t size = grid_array_index(&sizes, face);
+        return (session_face_row){session_index_array(mesh, &list), 0, size, size};
+    }
+    const grid_array offsets = session_index_array(mesh, is_apart ? &mesh->boundary_face_offsets : &mesh->face_offsets);
+    const insitu_array *list = is_apart ? &mesh->boundary_face_connectivity : &mesh->face_connectivity;
+    const int64_t at = is_apart ? face - mesh->face_count : face, first = grid_array_index(&offsets, at);
+    return (session_face_row){session_index_array(mesh, list), first,
+                              (int64_t)((uint64_t)grid_array_index(&offsets, at + 1) - (uint64_t)first),
+                              is_apart ? mesh->boundary_face_connectivity_count : mesh->face_connectivity_count};
+}
+
+static insitu_status check_row(const session_mesh *mesh, int64_t face, const session_face_row *row, base_error *error)
+{
+    const long long base = mesh->given.index_base, at = face + base, first = row->first, size = row->size;
+    if (!mesh->given.face_lists.data) {
+        if (first >= 0 && first <= row->limit && size >= 0 && size <= row->limit - first) return INSITU_OK;
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": face %lld: its vertices from offset %lld on, %lld of them, do not lie within "
+                         "%lld..%lld",
+                         mesh->name, at, first + base, size, base, (long long)row->limit + base);
+    }
+    if (size < 0 || size > INT64_MAX / 64)
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld", mesh->name, at, size);
+    if (size > 0 && !row->list.data)
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its list is NULL, its size %lld",
+                         mesh->name, at, size);
+    return INSITU_OK;
+}
+
+/* Returns how many vertices all faces have, or -1 if a list is bad. */
 static int64_t count_listed(const session_mesh *mesh, base_error *error)
 {
-    const insitu_mesh *given = &mesh->given;
-    const grid_array sizes = session_grid_array(&given->face_sizes);
-    const int64_t most = INT64_MAX / 32;
     int64_t total = 0;
-    for (int64_t face = 0; face < given->face_count; face++) {
-        const int64_t size = grid_array_index(&sizes, face);
-        const long long at = face + given->index_base;
-        if (size < 0 || size > most - total) {
-            base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld", mesh->name, at,
-                      (long long)size);
-            return -1;
-        }
-        if (size > 0 && !session_face_list(given, face)) {
-            base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its list is NULL, its size %lld", mesh->name,
-                      at, (long long)size);
-            return -1;
-        }
-        total += size;
+    for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
+        const session_face_row row = session_given_face(&mesh->given, face);
+        if (check_row(mesh, face, &row, error)) return -1;
+        total += row.size;
+        if (total <= INT64_MAX / 64) continue;
+        base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld, too many with those before",
+                  mesh->name, (long long)(face + mesh->given.index_base), (long long)row.size);
+        return -1;
     }
     return total;
 }
@@ -121,21 +148,17 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
-    const grid_array sizes = session_grid_array(&given->face_sizes);
-    const int64_t total = count_listed(mesh, error);
+    const int64_t total = count_listed(mesh, error), count = session_face_count(given);
     const long long base = given->index_base;
     int64_t at = 0;
     t->has_own_faces = true;
-    if (total < 0 || !session_make_indices(mesh, "faces' offsets", given->face_count, total, &t->face_offsets, error) ||
+    if (total < 0 || !session_make_indices(mesh, "faces' offsets", count, total, &t->face_offsets, error) ||
         !session_make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
         return error->status;
-    insitu_array list = {NULL, given->face_lists.type, 0};
-    for (int64_t face = 0; face < given->face_count; face++) {
-        const int64_t size = grid_array_index(&sizes, face);
-        list.data = session_face_list(given, face);
-        const grid_array vertices = session_index_array(given, &list);
-        for (int64_t i = 0; i < size; i++) {
-            const int64_t vertex = grid_array_index(&vertices, i);
+    for (int64_t face = 0; face < count; face++) {
+        const session_face_row row = session_given_face(given, face);
+        for (int64_t i = 0; i < row.size; i++) {
+            const int64_t vertex = grid_array_index(&row.list, row.first + i);
             if (vertex < 0 || vertex >= given->vertex_count)
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
@@ -145,27 +168,35 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
         session_put_index(&t->face_offsets, face + 1, at);
     }
     t->face_connectivity_count = total;
-    t->face_bytes = (given->face_count + 1) * t->face_offsets.stride + (total + 1) * t->face_connectivity.stride;
+    t->face_bytes = (count + 1) * t->face_offsets.stride + (total + 1) * t->face_connectivity.stride;
     return INSITU_OK;
 }
 
 /* ---- cells' faces out of owner and neighbour ------------------------------------------------------------------ */
 
+static const int64_t outside = INT64_MIN; /* a cell of the halo, or none of an own list's face */
+
 session_face_sides session_sides(const insitu_mesh *given)
 {
     return (session_face_sides){given, session_index_array(given, &given->owner),
-                                session_index_array(given, &given->neighbour)};
+                                session_index_array(given, &given->neighbour),
+                                session_index_array(given, &given->boundary_owner)};
 }
 
 void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2])
 {
-    cells[0] = grid_array_index(&sides->owner, face);
+    const insitu_mesh *given = sides->given;
+    const int64_t base = given->index_base, apart = face - given->face_count;
+    cells[0] = grid_array_index(apart < 0 ? &sides->owner : &sides->boundary_owner, apart < 0 ? face : apart);
     cells[1] = -1;
-    if (face >= sides->given->neighbour_count || !sides->neighbour.data) return;
-    cells[1] = grid_array_index(&sides->neighbour, face);
-    if (cells[1] + sides->given->index_base == -1) cells[1] = -1;
+    if (apart < 0 && face < given->neighbour_count && sides->neighbour.data)
+        cells[1] = grid_array_index(&sides->neighbour, face);
+    if (cells[1] == -1 - base) cells[1] = -1;
+    if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
+    for (int i = 0; i < 2; i++)
+        if (cells[i] >= given->cell_count && cells[i] - given->cell_count < given->halo_cell_count) cells[i] = outside;
     /* CGNS has 0 for no cell on either side. */
-    if (sides->given->index_base == 1 && cells[0] == -1 && cells[1] >= 0) {
+    if (cells[1] >= 0 && (cells[0] == outside || (base == 1 && cells[0] == -1))) {
         cells[0] = cells[1];
         cells[1] = -1;
     }
@@ -173,17 +204,18 @@ void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_
 
 static insitu_status check_sides(const session_mesh *mesh, int64_t face, const int64_t cells[2], base_error *error)
 {
-    const long long base = mesh->given.index_base, last = mesh->given.cell_count - 1 + base, at = face + base;
-    if (cells[0] < 0 || cells[0] > last - base)
+    const long long base = mesh->given.index_base, at = face + base;
+    const long long last = mesh->given.cell_count + mesh->given.halo_cell_count - 1 + base;
+    if (cells[0] != outside && (cells[0] < 0 || cells[0] > last - base))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": face %lld: its owner %lld is outside %lld..%lld (index_base is %lld)",
                          mesh->name, at, cells[0] + base, base, last, base);
-    if (cells[1] < -1 || cells[1] > last - base)
+    if (cells[1] != outside && (cells[1] < -1 || cells[1] > last - base))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": face %lld: its neighbour %lld is outside %lld..%lld (index_base is %lld), "
                          "nor is it %lld, as on the boundary",
                          mesh->name, at, cells[1] + base, base, last, base, base - 1);
-    if (cells[0] == cells[1])
+    if (cells[0] == cells[1] && cells[0] != outside)
         return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its owner and its neighbour are both %lld",
                          mesh->name, at, cells[0] + base);
     return INSITU_OK;
@@ -193,7 +225,7 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
 static insitu_status count_faces(const session_mesh *mesh, const session_face_sides *sides, const grid_array *offsets,
                                  base_error *error)
 {
-    for (int64_t face = 0; face < mesh->given.face_count; face++) {
+    for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
         session_cells_of_face(sides, face, cells);
         if (check_sides(mesh, face, cells, error)) return error->status;
@@ -210,7 +242,7 @@ static void put_faces(const session_mesh *mesh, const session_face_sides *sides,
     const int64_t count = mesh->given.cell_count;
     for (int64_t c = 0; c < count; c++)
         session_put_index(&t->offsets, c + 1, grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
-    for (int64_t face = 0; face < mesh->given.face_count; face++) {
+    for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
         session_cells_of_face(sides, face, cells);
         for (int i = 0; i < 2 && cells[i] >= 0; i++) {
@@ -228,7 +260,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
     const session_face_sides sides = session_sides(given);
-    const int64_t most = given->face_count + given->neighbour_count;
+    const int64_t faces = session_face_count(given), most = faces + given->neighbour_count;
     t->has_own_cells = true;
     t->cell_type = GRID_POLYHEDRON;
     if (!session_make_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error))
@@ -236,8 +268,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     if (count_faces(mesh, &sides, &t->offsets, error)) return error->status;
     int64_t total = 0;
     for (int64_t c = 0; c < given->cell_count; c++) total += grid_array_index(&t->offsets, c + 1);
-    if (!session_make_indices(mesh, "cells' faces", total, given->face_count, &t->connectivity, error))
-        return error->status;
+    if (!session_make_indices(mesh, "cells' faces", total, faces, &t->connectivity, error)) return error->status;
     put_faces(mesh, &sides, t);
     t->connectivity_count = total;
     t->cell_bytes = (given->cell_count + 1) * t->offsets.stride + (total + 1) * t->connectivity.stride;
@@ -552,8 +583,9 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
     insitu_status status = INSITU_OK;
     session_drop_topology(&mesh->topology);
     session_read_topology(mesh);
-    if (mesh->given.face_lists.data && mesh->given.face_sizes.data) status = copy_lists(mesh, error);
-    if (!status && mesh->given.owner.data) status = list_faces(mesh, error);
+    if ((mesh->given.face_lists.data && mesh->given.face_sizes.data) || mesh->given.boundary_face_count)
+        status = copy_lists(mesh, error);
+    if (!status && session_has_owners(&mesh->given)) status = list_faces(mesh, error);
     if (!status && session_is_reordered(&mesh->given)) status = session_order_cells(mesh, threads, error);
     session_read_topology(mesh);
     if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))

@@ -26,8 +26,7 @@ typedef struct patch_faces {
 
 /* The vertices around a face. */
 typedef struct patch_face {
-    grid_array list;
-    int64_t first, size;
+    session_face_row row;
     int64_t number; /* of the mesh's faces, from 0; -1: it is told by its vertices */
 } patch_face;
 
@@ -62,54 +61,37 @@ static insitu_status tell_range(const patch_faces *p, int patch, int64_t face, c
 /* Gets a face's vertices from the patch's own list. */
 static void own_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
 {
-    out->list = session_index_array(mesh, &patch->connectivity);
+    session_face_row *row = &out->row;
+    row->list = session_index_array(mesh, &patch->connectivity);
+    row->limit = patch->connectivity_count;
     out->number = -1;
     if (!patch->offsets.data) {
-        out->size = patch->connectivity_count / patch->count;
-        out->first = i * out->size;
+        row->size = patch->connectivity_count / patch->count;
+        row->first = i * row->size;
         return;
     }
     const grid_array offsets = session_index_array(mesh, &patch->offsets);
-    out->first = grid_array_index(&offsets, i);
-    out->size = grid_array_index(&offsets, i + 1) - out->first;
-}
-
-/* Gets a face's vertices from the mesh. */
-static void mesh_vertices(const insitu_mesh *mesh, int64_t number, patch_face *out)
-{
-    out->number = number;
-    if (mesh->face_lists.data) {
-        const grid_array sizes = session_grid_array(&mesh->face_sizes);
-        const insitu_array list = {session_face_list(mesh, number), mesh->face_lists.type, 0};
-        out->list = session_index_array(mesh, &list);
-        out->first = 0;
-        out->size = grid_array_index(&sizes, number);
-        return;
-    }
-    const grid_array offsets = session_index_array(mesh, &mesh->face_offsets);
-    out->list = session_index_array(mesh, &mesh->face_connectivity);
-    out->first = grid_array_index(&offsets, number);
-    out->size = grid_array_index(&offsets, number + 1) - out->first;
+    row->first = grid_array_index(&offsets, i);
+    row->size = grid_array_index(&offsets, i + 1) - row->first;
 }
 
 static insitu_status find_face(const patch_faces *p, int patch, int64_t i, patch_face *out, base_error *error)
 {
     const insitu_mesh *mesh = &p->mesh->given;
     const insitu_patch *given = &p->field->given.patches[patch];
-    int64_t most = given->connectivity_count;
+    const session_face_row *row = &out->row;
     if (given->connectivity.data) {
         own_vertices(mesh, given, i, out);
     } else {
         const grid_array faces = session_index_array(mesh, &given->faces);
         const int64_t number =
             given->faces.data ? grid_array_index(&faces, i) : given->first_face - mesh->index_base + i;
-        if (number < 0 || number >= mesh->face_count)
-            return tell_range(p, patch, i, "is outside", mesh->face_count, error);
-        mesh_vertices(mesh, number, out);
-        most = mesh->face_lists.data ? out->size : mesh->face_connectivity_count;
+        if (number < 0 || number >= session_face_count(mesh))
+            return tell_range(p, patch, i, "is outside", session_face_count(mesh), error);
+        *out = (patch_face){session_given_face(mesh, number), number};
     }
-    if (out->size < 3) return tell(p, patch, i, "has fewer than three vertices", error);
-    if (out->first < 0 || out->first > most || out->size > most - out->first)
+    if (row->size < 3) return tell(p, patch, i, "has fewer than three vertices", error);
+    if (row->first < 0 || row->first > row->limit || row->size > row->limit - row->first)
         return tell(p, patch, i, "has vertices beyond the connectivity", error);
     return INSITU_OK;
 }
@@ -118,8 +100,8 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
                                base_error *error)
 {
     const int64_t count = p->mesh->given.vertex_count;
-    for (int64_t k = 0; k < face->size; k++) {
-        const int64_t vertex = grid_array_index(&face->list, face->first + k);
+    for (int64_t k = 0; k < face->row.size; k++) {
+        const int64_t vertex = grid_array_index(&face->row.list, face->row.first + k);
         if (vertex < 0 || vertex >= count) return tell_range(p, patch, i, "has a vertex index outside", count, error);
         groups[k] = p->mesh->torn.is_torn ? -1 : p->numbers->of_vertex[vertex];
         if (groups[k] >= 0) continue;
@@ -139,7 +121,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
             patch_face face;
             if (find_face(p, patch, i, &face, error)) return error->status;
             p->starts[f++] = entries;
-            entries += face.size;
+            entries += face.row.size;
         }
     p->starts[f] = entries;
     p->groups = base_alloc((size_t)entries * sizeof *p->groups);
@@ -169,7 +151,7 @@ static insitu_status ask_owner(patch_faces *p, int patch, int64_t i, int64_t f, 
     unsigned char *taken = &is_taken[face.number / 8], bit = (unsigned char)(1u << face.number % 8);
     if (*taken & bit) return tell(p, patch, i, "is given twice", error);
     *taken |= bit;
-    p->is_drawn[f] = !grid_is_ghost(&p->mesh->cells, cells[0]);
+    p->is_drawn[f] = cells[0] >= 0 && !grid_is_ghost(&p->mesh->cells, cells[0]);
     return INSITU_OK;
 }
 
@@ -184,7 +166,7 @@ static bool are_by_number(const insitu_field *field)
 static insitu_status ask_owners(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
-    const int64_t bytes = p->mesh->given.face_count / 8 + 1;
+    const int64_t bytes = session_face_count(&p->mesh->given) / 8 + 1;
     unsigned char *is_taken = base_calloc((size_t)bytes, 1);
     int64_t f = 0;
     if (!is_taken) return no_memory(bytes / 8, error);
@@ -373,7 +355,7 @@ insitu_status session_find_patch_values(const session_mesh *mesh, int field, int
     p.starts = base_alloc((size_t)(p.count + 1) * sizeof *p.starts);
     p.is_drawn = base_calloc((size_t)p.count, 1);
     insitu_status status = p.starts && p.is_drawn ? list_faces(&p, error) : no_memory(p.count * 2, error);
-    const bool has_sides = mesh->given.owner.data && are_by_number(given);
+    const bool has_sides = session_has_owners(&mesh->given) && are_by_number(given);
     if (!status) status = has_sides ? ask_owners(&p, error) : ask_cells(&p, error);
     if (!status) status = give_values(&p, component, out, error);
     base_free(p.starts);

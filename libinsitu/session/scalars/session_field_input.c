@@ -80,7 +80,7 @@ static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *
     if (mesh->lattice)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has values at corners, and the mesh is a lattice: corners need cells by connectivity");
-    if (mesh->owner.data || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
+    if (session_has_owners(mesh) || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has values at corners, and the mesh has polyhedra, whose corners have no order");
     if (row == 0) return INSITU_OK;
@@ -132,10 +132,11 @@ static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *p
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has %lld connectivity indices, no multiple of its %lld faces, and no offsets",
                          (long long)patch->connectivity_count, (long long)patch->count);
-    if (!has_vertices && !mesh->given.face_count)
+    const int64_t faces = session_face_count(&mesh->given);
+    if (!has_vertices && !faces)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "names faces by their numbers, but the mesh has none: give their vertices");
-    const long long base = mesh->given.index_base, last = mesh->given.face_count - 1 + base;
+    const long long base = mesh->given.index_base, last = faces - 1 + base;
     if (!has_vertices && !patch->faces.data &&
         (patch->first_face < base || patch->first_face > last || patch->count - 1 > last - patch->first_face))
         return base_fail(error, INSITU_ERROR_FIELD,
