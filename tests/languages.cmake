@@ -1,10 +1,11 @@
 # Other languages than C: each example draws the pictures of six_calls.c, which the README's test draws, to the byte, on
 # 2 ranks.
 set(truth ${CMAKE_CURRENT_BINARY_DIR}/readme)
+set(scene ${PROJECT_SOURCE_DIR}/examples/six_calls.yaml)
 function(insitu_add_same_pictures_test name)
   add_test(NAME ${name}
     COMMAND ${CMAKE_COMMAND} "-DPROGRAM=${ARGN}" "-DTRUTH=${truth}"
-      -DSCENE=${PROJECT_SOURCE_DIR}/examples/six_calls.yaml -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}
+      -DSCENE=${scene} -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}
       "-DMPIRUN=${MPIEXEC_EXECUTABLE};${MPIEXEC_NUMPROC_FLAG}" -P ${CMAKE_CURRENT_SOURCE_DIR}/languages_run.cmake)
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2
     FIXTURES_REQUIRED readme)
@@ -93,4 +94,22 @@ else()
     set_tests_properties(${test} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}" TIMEOUT 120
       PROCESSORS 2)
   endforeach()
+endif()
+
+# Plane runs, whose truth is the program in C.
+set(plane ${PROJECT_SOURCE_DIR}/examples/plane)
+set(scene ${plane}/heat.yaml)
+add_executable(plane_heat ${plane}/heat.c)
+target_link_libraries(plane_heat PRIVATE insitu insitu_flags)
+set(truth $<TARGET_FILE:plane_heat>)
+if(TARGET insitu_fortran)
+  add_executable(plane_heat_fortran ${plane}/heat.f90)
+  target_link_libraries(plane_heat_fortran PRIVATE insitu_fortran)
+  target_compile_options(plane_heat_fortran PRIVATE $<$<Fortran_COMPILER_ID:GNU>:-ffp-contract=off>)
+  insitu_add_same_pictures_test(plane_fortran_example_draws_on_2_ranks $<TARGET_FILE:plane_heat_fortran>)
+endif()
+if(INSITU_TEST_PYTHON)
+  insitu_add_same_pictures_test(plane_python_example_draws_on_2_ranks ${INSITU_TEST_PYTHON} ${plane}/heat.py)
+  set_tests_properties(plane_python_example_draws_on_2_ranks PROPERTIES
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}")
 endif()

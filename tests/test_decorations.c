@@ -23,19 +23,24 @@ static void ticks_are_at_round_numbers(void **state)
         int most;
         const char *words; /* of all ticks, low ones first */
     } cases[] = {
-        {{RENDER_LINEAR, 0, 0, 1}, 6, "0 0.2 0.4 0.6 0.8 1.0"},
-        {{RENDER_LINEAR, 0, -1, 1}, 6, "-1.0 -0.5 0 0.5 1.0"},
-        {{RENDER_LINEAR, 0, 0, 6.3}, 6, "0 2 4 6"},
-        {{RENDER_LINEAR, 0, 0.1, 0.3}, 3, "0.1 0.2 0.3"},
-        {{RENDER_LINEAR, 0, 101300, 101340}, 6, "101300 101310 101320 101330 101340"},
-        {{RENDER_LINEAR, 0, 0, 3.2e7}, 4, "0 1e7 2e7 3e7"},
-        {{RENDER_LINEAR, 0, -2.5e-7, 2.5e-7}, 4, "-2e-7 0 2e-7"},
-        {{RENDER_LINEAR, 0, 1e9, 1e9 + 30}, 4, "1.00000000e9 1.00000001e9 1.00000002e9 1.00000003e9"},
-        {{RENDER_LOG, 0, 0.01, 100}, 6, "0.01 0.1 1 10 100"},
-        {{RENDER_LOG, 0, 1e-8, 1e8}, 6, "1e-6 0.001 1 1000 1e6"},
-        {{RENDER_LOG, 0, 1, 10}, 6, "1 2 5 10"},
-        {{RENDER_LOG, 0, 3, 4}, 6, "3.0 3.2 3.4 3.6 3.8 4.0"},
-        {{RENDER_SYMLOG, 1, -100, 100}, 8, "-1 -10 -100 0 1 10 100"},
+        {{RENDER_LINEAR, 0, 0, 1, {0}}, 6, "0 0.2 0.4 0.6 0.8 1.0"},
+        {{RENDER_LINEAR, 0, -1, 1, {0}}, 6, "-1.0 -0.5 0 0.5 1.0"},
+        {{RENDER_LINEAR, 0, 0, 6.3, {0}}, 6, "0 2 4 6"},
+        {{RENDER_LINEAR, 0, 0.1, 0.3, {0}}, 3, "0.1 0.2 0.3"},
+        {{RENDER_LINEAR, 0, 101300, 101340, {0}}, 6, "101300 101310 101320 101330 101340"},
+        {{RENDER_LINEAR, 0, 0, 3.2e7, {0}}, 4, "0 1e7 2e7 3e7"},
+        {{RENDER_LINEAR, 0, -2.5e-7, 2.5e-7, {0}}, 4, "-2e-7 0 2e-7"},
+        {{RENDER_LINEAR, 0, 1e9, 1e9 + 30, {0}}, 4, "1.00000000e9 1.00000001e9 1.00000002e9 1.00000003e9"},
+        {{RENDER_LOG, 0, 0.01, 100, {0}}, 6, "0.01 0.1 1 10 100"},
+        {{RENDER_LOG, 0, 1e-8, 1e8, {0}}, 6, "1e-6 0.001 1 1000 1e6"},
+        {{RENDER_LOG, 0, 1, 10, {0}}, 6, "1 2 5 10"},
+        {{RENDER_LOG, 0, 3, 4, {0}}, 6, "3.0 3.2 3.4 3.6 3.8 4.0"},
+        {{RENDER_SYMLOG, 1, -100, 100, {0}}, 8, "-1 -10 -100 0 1 10 100"},
+        {{RENDER_LINEAR, 0, 0, 1, {SCENE_FIXED, true, 3}}, 4, "0 0.500 1.000"},
+        {{RENDER_LINEAR, 0, 0, 1, {SCENE_SCIENTIFIC, false, 0}}, 6, "0 2.0e-1 4.0e-1 6.0e-1 8.0e-1 1.0e0"},
+        {{RENDER_LINEAR, 0, 0, 3.2e7, {SCENE_FIXED, false, 0}}, 4, "0 10000000 20000000 30000000"},
+        {{RENDER_LINEAR, 0, 0, 4e40, {SCENE_FIXED, true, 2}}, 4, "0 2.00e40 4.00e40"},
+        {{RENDER_LOG, 0, 0.01, 100, {SCENE_SCIENTIFIC, true, 1}}, 6, "1.0e-2 1.0e-1 1.0e0 1.0e1 1.0e2"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         insitu_tick ticks[SESSION_MAX_TICKS];
@@ -55,7 +60,7 @@ static void ticks_stand_where_their_numbers_are(void **state)
     for (int i = 0; i < 20000; i++) {
         const double size = pow(10, rand() % 40 - 20), middle = size * (2.0 * rand() / RAND_MAX - 1);
         const double half = size * pow(10, -(rand() % 6)) * (0.1 + (double)rand() / RAND_MAX);
-        const session_scale scale = {RENDER_LINEAR, 0, middle - half, middle + half};
+        const session_scale scale = {.kind = RENDER_LINEAR, .low = middle - half, .high = middle + half};
         const int most = 2 + rand() % 11;
         insitu_tick ticks[SESSION_MAX_TICKS];
         const int count = session_make_ticks(&scale, most, ticks);
@@ -82,7 +87,7 @@ static void bands_of_ids_have_them_in_their_middle(void **state)
     } cases[] = {{0, 3, 4, 4, 0}, {1, 5, 5, 5, 1},       {-0.5, 3.5, 4, 4, 0}, {7, 7 + 63, 64, 11, 7},
                  {0, 3, 5, 0, 0}, {0.25, 3.25, 4, 0, 0}, {0, 4, 4, 0, 0},      {0, 1e-3, 4, 0, 0}};
     for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
-        const session_scale scale = {RENDER_LINEAR, 0, cases[n].low, cases[n].high};
+        const session_scale scale = {.kind = RENDER_LINEAR, .low = cases[n].low, .high = cases[n].high};
         insitu_tick ticks[SESSION_MAX_TICKS], plain[SESSION_MAX_TICKS];
         const int count = session_make_band_ticks(&scale, cases[n].bands, 6, ticks);
         if (!cases[n].count) {

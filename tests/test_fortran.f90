@@ -122,6 +122,7 @@ program test_fortran
         'values at corners')
     call same(picture('corner_index', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(unknowns), at_corner=2), &
         'values at corners by an index')
+    call planes_go_without_z()
     call patches_have_values()
     call procedures_make_values()
     call errors_are_told()
@@ -312,7 +313,6 @@ contains
         character(:), allocatable :: out
         type(insitu_session) :: session
         type(insitu_report) :: report
-        integer :: unit, size
         if (present(component)) then
             call session%create_from_text(MPI_COMM_WORLD%MPI_VAL, scene_of(name, component), status)
         else
@@ -358,6 +358,14 @@ contains
         call expect(report%cells == cells .and. index(insitu_text(report%copied_why), 'outer faces') > 0, 'and its texts')
         call session%destroy(status)
         call expect(status == INSITU_OK, 'the session ends')
+        out = file_of(name)
+    end function picture
+
+    ! The picture's bytes, on rank 0.
+    function file_of(name) result(out)
+        character(*), intent(in) :: name
+        character(:), allocatable :: out
+        integer :: unit, size
         out = ''
         if (rank /= 0) return
         open (newunit=unit, file=prefix//name//'.png', access='stream', form='unformatted', status='old')
@@ -366,7 +374,7 @@ contains
         allocate (character(size) :: out)
         read (unit) out
         close (unit)
-    end function picture
+    end function file_of
 
     ! Values on the wall y = 0: the same picture whether its faces are told by their numbers or by their vertices.
     subroutine patches_have_values()
@@ -391,7 +399,6 @@ contains
         type(insitu_patch), intent(in) :: patches(:)
         character(:), allocatable :: out
         type(insitu_session) :: session
-        integer :: unit, size
         call session%create_from_text(MPI_COMM_WORLD, scene_of('wall', 'magnitude'), status)
         call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(face_offsets), &
             insitu_borrow(owner), insitu_borrow(neighbour), cells, status)
@@ -401,14 +408,7 @@ contains
         call session%step(0, 0.0_real64, status)
         call expect(status == INSITU_OK, session%error())
         call session%destroy(status)
-        out = ''
-        if (rank /= 0) return
-        open (newunit=unit, file=prefix//'wall.png', access='stream', form='unformatted', status='old')
-        inquire (unit, size=size)
-        deallocate (out)
-        allocate (character(size) :: out)
-        read (unit) out
-        close (unit)
+        out = file_of('wall')
     end function wall_picture
 
     subroutine procedures_make_values()
@@ -466,6 +466,41 @@ contains
         deallocate (session)
     end subroutine procedures_make_values
 
+    ! The same picture of quads with z, which is 0, and without.
+    subroutine planes_go_without_z()
+        real(real64), target :: flat(3, vertices), plane(2, vertices)
+        real(real32), target :: plane_4(2, vertices)
+        integer(int32), target :: quads(4, (n - 1)**2)
+        flat = 0
+        flat(1:2, :) = xyz(1:2, :)
+        plane = xyz(1:2, :)
+        plane_4 = real(plane, real32)
+        quads = hexes(1:4, 1:(n - 1)**2)
+        plain = plane_picture('flat', insitu_points(flat), quads)
+        call expect(len(plain) > 300 .or. rank /= 0, 'the plane picture shows something')
+        call same(plane_picture('plane', insitu_points(plane), quads), 'coordinates of two rows')
+        call same(plane_picture('plane_4', insitu_points(plane_4), quads), 'in single precision')
+        call same(plane_picture('plane_xy', insitu_points(axes(:, 1), axes(:, 2)), quads), 'x and y')
+    end subroutine planes_go_without_z
+
+    function plane_picture(name, points, quads) result(out)
+        character(*), intent(in) :: name
+        type(insitu_array), intent(in) :: points(3)
+        integer(int32), intent(in), target :: quads(:, :)
+        character(:), allocatable :: out
+        type(insitu_session) :: session
+        call session%create_from_text(MPI_COMM_WORLD, 'images: [{name: a, size: [48, 32], layers: [{surface: {colour_by: '// &
+            '{field: p}}}], outputs: [{path: '//prefix//name//'.png}]}]', status)
+        call expect(status == INSITU_OK, session%error())
+        call session%set_mesh('m', points, insitu_borrow(quads), status, cell_type=INSITU_QUAD)
+        call expect(status == INSITU_OK, session%error())
+        call session%set_field('m', 'p', insitu_borrow(pressure), status)
+        call session%step(0, 0.0_real64, status)
+        call expect(status == INSITU_OK, session%error())
+        call session%destroy(status)
+        out = file_of(name)
+    end function plane_picture
+
     subroutine refused(session, words)
         type(insitu_session), intent(in) :: session
         character(*), intent(in) :: words
@@ -480,7 +515,9 @@ contains
         call refused(session, 'scene text:1')
         call session%create_from_text(MPI_COMM_WORLD, scene_of('none', 'x'), status)
         call session%set_mesh('m', insitu_points(axes), insitu_borrow(hexes), status)
-        call refused(session, 'first extent than 3')
+        call refused(session, 'first extent than 2 or 3')
+        call session%set_mesh('m', insitu_points(axes(:, 1), axes(:, 2)), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+        call refused(session, 'z coordinates are not given')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), status, cell_type=INSITU_HEX, &
             offsets=insitu_borrow(offsets_8))
         call refused(session, 'gaps between their columns')

@@ -26,6 +26,9 @@ images:
 """
 
 
+PLANE = "images: [{name: a, size: [48, 32], background: [0, 0, 0, 0], layers: [{surface: {colour_by: {field: f}}}]}]"
+
+
 def everywhere(is_well, what):
     if not comm.allreduce(bool(is_well), MPI.LAND):
         raise SystemExit(f"rank {comm.rank}: {what}: {'another rank failed' if is_well else 'not so'}")
@@ -93,6 +96,22 @@ def layouts_draw_the_same_picture():
     everywhere(picture("ghosts", xyz, hexes, f, ghosts=numpy.zeros(64, bool)) == plain, "ghosts of type bool")
 
 
+def planes_go_without_z():
+    n = 5
+    xyz, hexes, f = lattice()
+    quads, flat = hexes[:(n - 1)**2, :4].copy(), xyz * [1, 1, 0]
+    pictures = []
+    for coordinates in flat, flat[:, :2], flat[:, :2].copy(), (flat[:, 0].copy(), flat[:, 1]), flat[:, :2].astype("f4"):
+        with insitu.Session(comm, scene_text=PLANE) as session:
+            session.keep_pictures()
+            session.set_mesh("m", coordinates=coordinates, connectivity=quads, cell_type=insitu.QUAD)
+            session.set_field("m", "f", f)
+            session.step(0, 0.0)
+            pictures.append(session.pictures[0].rgba if comm.rank == 0 else numpy.ones(1))
+    everywhere(pictures[0].any(), "the plane picture shows something")
+    everywhere(all((other == pictures[0]).all() for other in pictures), "coordinates of two columns draw the same picture")
+
+
 def what_cannot_be_borrowed_is_refused():
     xyz, hexes, f = lattice()
     with insitu.Session(comm, scene_text=SCENE.format(name="refused", folder=folder)) as s:
@@ -100,7 +119,8 @@ def what_cannot_be_borrowed_is_refused():
         for changed, kind, words in [
             (dict(coordinates=xyz.tolist()), TypeError, "a list cannot be borrowed"),
             (dict(coordinates=xyz.astype(">f8")), TypeError, "native"),
-            (dict(coordinates=xyz[:, :2]), ValueError, "vertices x 3"),
+            (dict(coordinates=xyz[:, :1]), ValueError, "vertices x 3 (or x 2)"),
+            (dict(coordinates=xyz[:, :2]), insitu.Error, "z coordinates are not given"),
             (dict(coordinates=[axis.reshape(5, 5, -1) for axis in xyz.T]), ValueError, "reshape(-1) makes a list"),
             (dict(connectivity=hexes.astype("uint64")), TypeError, "uint64"),
             (dict(connectivity=numpy.asfortranarray(hexes)), ValueError, "rows that follow one another"),
@@ -421,6 +441,7 @@ if comm.rank == 0:
     os.makedirs(folder, exist_ok=True)
 comm.Barrier()
 layouts_draw_the_same_picture()
+planes_go_without_z()
 what_cannot_be_borrowed_is_refused()
 pictures_are_arrays()
 finite_volumes_are_their_hexes()

@@ -108,7 +108,7 @@ static const char every_key[] =
     "    once: true\n"
     "    when: {field: p, component: 2, mesh: [air, sea], of: mean, above: 1, below: 2.5}\n"
     "    antialias: 4\n"
-    "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
+    "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box, bounds: [[0, 1, 2], [3, 4, 5]]},\n"
     "             projection: orthographic, height: 2.5}\n"
     "    layers: [{volume: {field: p}}]\n"
     "    sampling: {step: 0.125}\n"
@@ -126,7 +126,7 @@ static const char every_key[] =
     "    decorations:\n"
     "      title: \"{name} at {time:.2f} s\"\n"
     "      text: [{text: \"cycle {cycle}\", at: bottom_right}, {text: plain}]\n"
-    "      colour_bar: {at: left, labels: [p in Pa, q], ticks: 4}\n"
+    "      colour_bar: {at: left, labels: [p in Pa, q], ticks: 4, units: [Pa, K], notation: fixed, digits: 2}\n"
     "      outline: true\n"
     "      axes: true\n"
     "      rulers: true\n"
@@ -264,7 +264,9 @@ static void scene_view_keys_are_read(void **state)
     assert_true(s.images[0].every_time == 0 && s.images[1].every_time == 0.25);
     assert_true(s.images[1].camera.is_orthographic && s.images[1].camera.height == 2.5);
     check_vector(s.images[1].camera.direction, 0, 0.6, 0.8);
-    assert_true(s.images[1].camera.zoom == 1.5);
+    assert_true(s.images[1].camera.zoom == 1.5 && s.images[1].camera.has_bounds);
+    check_vector(s.images[1].camera.lower, 0, 1, 2);
+    check_vector(s.images[1].camera.upper, 3, 4, 5);
 
     const scene_light *lights = s.images[0].lights;
     assert_int_equal(s.images[0].light_count, 2);
@@ -714,6 +716,11 @@ static const struct bad_file {
     {6, "    antialias: 3", 6, {"antialias: is 3", "1, 2, 4, 8 or 16"}},
     {6, "    antialias: 32", 6, {"antialias: \"32\"", "from 1 to 16"}},
     {6, "    camera: {automatic: {fit: data}}", 6, {"camera.automatic.fit: \"data\"", "one of sphere, box"}},
+    {6,
+     "    camera: {automatic: {bounds: [[0, 0, 0], [1, -1, 1]]}}",
+     6,
+     {"automatic.bounds: goes from 0 to -1 along y"}},
+    {6, "    camera: {automatic: {bounds: [0, 0, 0]}}", 6, {"automatic.bounds", "expected a list of 2"}},
     {6, "    camera: {projection: flat}", 6, {"camera.projection: \"flat\"", "perspective, orthographic"}},
     {6, "    camera: {height: 3}", 6, {"camera.height: given without projection: orthographic"}},
     {6, "    camera: {projection: orthographic, height: 0}", 6, {"camera.height: \"0\"", "above 0"}},
@@ -877,6 +884,9 @@ static const struct bad_file {
     {12, "    decorations: {colour_bar: yes}", 12, {"colour_bar: \"yes\"", "keys at, labels, ticks"}},
     {12, "    decorations: {colour_bar: {at: top}}", 12, {"colour_bar.at: \"top\"", "one of left, right"}},
     {12, "    decorations: {colour_bar: {ticks: 1}}", 12, {"colour_bar.ticks: \"1\"", "from 2 to 12"}},
+    {12, "    decorations: {colour_bar: {digits: 20}}", 12, {"colour_bar.digits: \"20\"", "from 0 to 12"}},
+    {12, "    decorations: {colour_bar: {notation: \"%.2f\"}}", 12, {"notation: \"%.2f\"", "auto, fixed, scientific"}},
+    {12, "    decorations: {colour_bar: {units: {p: Pa}}}", 12, {"colour_bar.units", "a mapping"}},
     {12, "    decorations: {outline: box}", 12, {"decorations.outline: \"box\"", "one of false, true, meshes, ranks"}},
     {12, "    decorations: {axes: 3}", 12, {"decorations.axes: \"3\"", "true or false"}},
     {12, "    decorations: {colour: [1, 0]}", 12, {"decorations.colour: a list of 2", "a list of 3 numbers"}},

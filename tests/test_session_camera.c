@@ -18,7 +18,7 @@ static double uniform(double low, double high)
 
 static session_extent random_extent(void)
 {
-    session_extent e = {.cell_count = 1};
+    session_extent e = {.cell_count = 1, .solid_count = 1};
     double square = 0;
     const double size = pow(10, uniform(-3, 6));
     for (int a = 0; a < 3; a++) {
@@ -222,11 +222,84 @@ static void zoom_and_height_are_what_they_say(void **state)
     assert_true(camera.is_orthographic && fabs(camera.half_height - 10) < 1e-12);
 }
 
+/* Two axes of the data are across the picture, so that its first axis goes to the right and its second up. */
+static bool is_faced(const session_extent *extent, const scene_image *image, int axis)
+{
+    static const int right[3] = {1, 0, 0}, up[3] = {2, 2, 1};
+    static const double towards[3] = {1, -1, 1};
+    render_camera c;
+    double low[2], high[2], most = 0;
+    if (!session_make_camera(extent, image, &c) || !borders(&c, extent, low, high)) return false;
+    for (int a = 0; a < 2; a++) most = fmax(most, fmax(-low[a], high[a]));
+    return c.is_orthographic && fabs(c.right[right[axis]] - 1) < 1e-12 && fabs(c.up[up[axis]] - 1) < 1e-12 &&
+           fabs(c.forward[axis] + towards[axis]) < 1e-12 && fabs(most - 0.95) < 1e-9;
+}
+
+static void flat_data_is_seen_from_the_front(void **state)
+{
+    (void)state;
+    for (int axis = 0; axis < 3; axis++) {
+        session_extent extent = {.cell_count = 9};
+        scene_image image = {.width = 300, .height = 100};
+        render_camera camera;
+        image.camera =
+            (scene_camera){.is_automatic = true, .angle = 40, .zoom = 1, .direction = {1, 0.8, 1.2}, .up = {0, 1, 0}};
+        for (int a = 0; a < 3; a++) extent.upper[a] = a == axis ? 0 : 2 + a;
+        extent.half_diagonal = 4; /* of any size */
+        assert_true(session_flat_axis(&extent) == axis && is_faced(&extent, &image, axis));
+        extent.upper[axis] = 1.9e-6; /* less than a millionth of 2 */
+        assert_true(is_faced(&extent, &image, axis));
+        extent.upper[axis] = 5e-6;
+        assert_true(session_flat_axis(&extent) == -1 && session_make_camera(&extent, &image, &camera));
+        assert_true(!camera.is_orthographic && fabs(camera.forward[axis]) < 0.9);
+        extent.upper[axis] = 0;
+        extent.solid_count = 1;
+        assert_true(session_flat_axis(&extent) == -1);
+    }
+}
+
+/* Each key that the scene gives stays, and the others follow the data. */
+static void keys_of_the_scene_come_before_flat_data(void **state)
+{
+    (void)state;
+    const session_extent flat = {.upper = {2, 1, 0}, .half_diagonal = sqrt(1.25), .cell_count = 9};
+    const scene_camera given = {
+        .is_automatic = true, .angle = 40, .zoom = 1, .direction = {0, 0.6, 0.8}, .up = {0, 1, 0}};
+    scene_image image = {.width = 200, .height = 100, .camera = given};
+    render_camera camera;
+    image.camera.has_direction = true;
+    assert_true(session_make_camera(&flat, &image, &camera));
+    assert_true(camera.is_orthographic && fabs(camera.forward[1] + 0.6) < 1e-12);
+    image.camera = given;
+    image.camera.has_projection = true;
+    assert_true(session_make_camera(&flat, &image, &camera));
+    assert_true(!camera.is_orthographic && camera.forward[2] == -1);
+    image.camera = given;
+    image.camera.has_fit = true; /* the sphere of radius 1.118 in a frame that is twice as wide as high */
+    assert_true(session_make_camera(&flat, &image, &camera));
+    assert_true(camera.is_orthographic && fabs(camera.half_height - sqrt(1.25)) < 1e-12);
+    image.camera = given;
+    image.camera.has_up = true;
+    image.camera.up[0] = 1, image.camera.up[1] = 0;
+    assert_true(session_make_camera(&flat, &image, &camera) && camera.up[0] == 1);
+    image.camera = given;
+    image.camera.has_bounds = true; /* twice as large as the data */
+    image.camera.upper[0] = 4, image.camera.upper[1] = 2;
+    assert_true(session_make_camera(&flat, &image, &camera));
+    assert_true(fabs(camera.half_height - 1 / 0.95) < 1e-12 && fabs(camera.eye[0] - 2) < 1e-12);
+    image.camera = given;
+    image.camera.orbit.view_count = 3;
+    assert_true(session_make_camera(&flat, &image, &camera) && !camera.is_orthographic);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_box_fills_the_frame), cmocka_unit_test(a_box_fills_an_orthographic_frame),
-        cmocka_unit_test(decorations_keep_their_room), cmocka_unit_test(a_sphere_keeps_off_decorations),
-        cmocka_unit_test(zoom_and_height_are_what_they_say)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_box_fills_the_frame),
+                                       cmocka_unit_test(a_box_fills_an_orthographic_frame),
+                                       cmocka_unit_test(decorations_keep_their_room),
+                                       cmocka_unit_test(a_sphere_keeps_off_decorations),
+                                       cmocka_unit_test(zoom_and_height_are_what_they_say),
+                                       cmocka_unit_test(flat_data_is_seen_from_the_front),
+                                       cmocka_unit_test(keys_of_the_scene_come_before_flat_data)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

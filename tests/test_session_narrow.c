@@ -304,7 +304,7 @@ static void constant_fields_have_one_tick(void **state)
             insitu_tick tick;
             assert_true(session_make_transfer(1, &map, value, value, NULL, &made));
             assert_true(made.is_constant && made.low < made.high);
-            assert_int_equal(session_make_constant_tick(made.constant, &tick), 1);
+            assert_int_equal(session_make_constant_tick(made.constant, &(scene_number_form){0}, &tick), 1);
             assert_string_equal(tick.text, constants[i].text);
             assert_true(tick.place == 0.5);
             session_transfer_free(&made);

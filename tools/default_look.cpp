@@ -206,20 +206,19 @@ std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &towards)
 
 } // namespace
 
-std::array<double, 3> eye_direction(const options &o, const default_look &look)
+std::array<double, 3> eye_direction(const options &o)
 {
-    static const std::array<vector, 3> front = {{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}};
-    vector towards = look.flat_axis >= 0 ? front[static_cast<size_t>(look.flat_axis)] : usual_direction;
+    vector towards = usual_direction;
     if (!o.direction.empty())
         (void)std::sscanf(o.direction.c_str(), "%lf, %lf, %lf", &towards[0], &towards[1], &towards[2]);
     return towards;
 }
 
-std::array<double, 3> up_direction(const options &o, const default_look &look)
+std::array<double, 3> up_direction(const options &o)
 {
-    const vector towards = eye_direction(o, look);
+    const vector towards = eye_direction(o);
     const bool is_upright = std::hypot(towards[0], towards[2]) < 1e-6 * std::hypot(towards[0], towards[1], towards[2]);
-    if (is_upright || (o.direction.empty() && look.flat_axis == 0)) return {0, 0, 1};
+    if (is_upright) return {0, 0, 1};
     return {0, 1, 0};
 }
 
@@ -240,7 +239,7 @@ default_look choose_look(const options &o)
     }
     for (int axis = 0; dimension == 2 && axis < 3; axis++)
         if (bounds.GetLength(axis) <= 1e-6 * bounds.GetMaxLength()) look.flat_axis = axis;
-    const vector towards = eye_direction(o, look);
+    const vector towards = eye_direction(o);
     if (dimension == 3 && !o.whole && seen_share(grids, look.field, towards) < little)
         look.cut = best_cut(bounds, towards);
     return look;

@@ -22,10 +22,9 @@ struct default_look {
  * Throws std::runtime_error. */
 default_look choose_look(const options &o);
 
-/* The direction from the data to the eye, the options' or that of the look, and the one that is up. Of flat meshes the
- * first axis then goes to the right and the second one up. */
-std::array<double, 3> eye_direction(const options &o, const default_look &look);
-std::array<double, 3> up_direction(const options &o, const default_look &look);
+/* The direction from a solid to the eye, the options' or the usual one, and the direction that is up. */
+std::array<double, 3> eye_direction(const options &o);
+std::array<double, 3> up_direction(const options &o);
 
 } // namespace render_tool
 

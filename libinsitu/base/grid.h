@@ -53,7 +53,7 @@ typedef struct grid_axis {
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
 typedef struct grid_array {
     const char *data;
-    int64_t stride; /* bytes, never 0 */
+    int64_t stride; /* bytes; 0: one element stands for all */
     bool is_wide;
     bool is_integer;
     int64_t base;          /* for indices and offsets: the entry that counts as 0 */

@@ -187,7 +187,7 @@ module insitu
         module procedure borrow_r4_2, borrow_r8_2, borrow_i4_2, borrow_i8_2
     end interface insitu_borrow
 
-    ! Coordinates (3, vertices), or x, y and z.
+    ! Coordinates (3, vertices), or x, y and z. Without z, which is 0 then: (2, vertices), or x and y.
     interface insitu_points
         module procedure points_of_matrix_r4, points_of_matrix_r8, points_of_axes_r4, points_of_axes_r8
     end interface insitu_points
@@ -363,14 +363,22 @@ contains
         out%rows = size(a, 1)
     end function borrow_i8_2
 
-    ! Three lists of a matrix of three rows; of another matrix an array that set_mesh refuses.
+    ! So many elements that are not there: the coordinates z that plane meshes go without.
+    function absent(count) result(out)
+        integer, intent(in) :: count
+        type(insitu_array) :: out
+        out%columns = count
+    end function absent
+
+    ! Three lists of a matrix of three rows or two; of another matrix an array that set_mesh refuses.
     function points_of_matrix_r4(xyz) result(out)
         real(real32), intent(in), target :: xyz(:, :)
         type(insitu_array) :: out(3)
         integer :: axis
         out%rows = size(xyz, 1)
-        if (size(xyz, 1) /= 3) return
-        do axis = 1, 3
+        if (size(xyz, 1) /= 2 .and. size(xyz, 1) /= 3) return
+        out(3) = absent(size(xyz, 2))
+        do axis = 1, size(xyz, 1)
             out(axis) = borrow_r4(xyz(axis, :))
         end do
     end function points_of_matrix_r4
@@ -380,22 +388,27 @@ contains
         type(insitu_array) :: out(3)
         integer :: axis
         out%rows = size(xyz, 1)
-        if (size(xyz, 1) /= 3) return
-        do axis = 1, 3
+        if (size(xyz, 1) /= 2 .and. size(xyz, 1) /= 3) return
+        out(3) = absent(size(xyz, 2))
+        do axis = 1, size(xyz, 1)
             out(axis) = borrow_r8(xyz(axis, :))
         end do
     end function points_of_matrix_r8
 
     function points_of_axes_r4(x, y, z) result(out)
-        real(real32), intent(in), target :: x(:), y(:), z(:)
+        real(real32), intent(in), target :: x(:), y(:)
+        real(real32), intent(in), target, optional :: z(:)
         type(insitu_array) :: out(3)
-        out = [borrow_r4(x), borrow_r4(y), borrow_r4(z)]
+        out = [borrow_r4(x), borrow_r4(y), absent(size(x))]
+        if (present(z)) out(3) = borrow_r4(z)
     end function points_of_axes_r4
 
     function points_of_axes_r8(x, y, z) result(out)
-        real(real64), intent(in), target :: x(:), y(:), z(:)
+        real(real64), intent(in), target :: x(:), y(:)
+        real(real64), intent(in), target, optional :: z(:)
         type(insitu_array) :: out(3)
-        out = [borrow_r8(x), borrow_r8(y), borrow_r8(z)]
+        out = [borrow_r8(x), borrow_r8(y), absent(size(x))]
+        if (present(z)) out(3) = borrow_r8(z)
     end function points_of_axes_r8
 
     function pointers_of(pointers, kind) result(out)
@@ -525,7 +538,7 @@ contains
         character(:), allocatable :: out
         out = ''
         if (points(1)%rows /= 1) then
-            out = 'points have another first extent than 3'
+            out = 'points have another first extent than 2 or 3'
         else if (any(points%columns /= points(1)%columns)) then
             out = 'x, y and z are of different lengths'
         else if (row == 0 .and. .not. is_list(connectivity)) then

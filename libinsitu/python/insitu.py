@@ -287,15 +287,16 @@ def _connectivity(given, cell_type, may_have_gaps):
 
 
 def _axes(given):
-    """Coordinates: vertices x 3, or one array each of x, y and z."""
+    """Coordinates: vertices x 3, or one array each of x, y and z. Without z, which is 0 then, vertices x 2, or x and y."""
     if isinstance(given, (tuple, list)):
         axes = [_list(f"coordinates[{i}]", axis) for i, axis in enumerate(given)]
     else:
         array = _view("coordinates", given, (2,))
         axes = [_list("coordinates", array[:, i]) for i in range(array.shape[1])]
-    if len(axes) != 3 or len({size for _, size, _ in axes}) != 1:
-        raise ValueError("coordinates: expected vertices x 3, or x, y and z of equal length")
-    return [array for array, _, _ in axes], axes[0][1], [held for _, _, held in axes]
+    if len(axes) not in (2, 3) or len({size for _, size, _ in axes}) != 1:
+        raise ValueError("coordinates: expected vertices x 3 (or x 2), or x, y and z (or x and y) of equal length")
+    arrays = [array for array, _, _ in axes] + [_Array()] * (3 - len(axes))
+    return arrays, axes[0][1], [held for _, _, held in axes]
 
 
 def _put_values(field, given):

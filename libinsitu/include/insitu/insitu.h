@@ -63,8 +63,9 @@ typedef enum insitu_cell_type {
     INSITU_PYRAMID = 14,    /* 5 vertices: the quad around, then the apex */
     INSITU_POLYHEDRON = 42, /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
     /* Shells: cells of two dimensions, alone or among others. Only layers of outer surfaces show them; a shell that
-     * lies on the face of another cell is shown instead of that face. Isosurfaces, volumes, slices and statistics pass
-     * shells over. When cell values are averaged at a vertex (insitu_centring), those of shells count too. */
+     * lies on the face of another cell is shown instead of that face. Isosurfaces, volumes and slices pass shells over.
+     * Statistics weigh them by their area where a field is on shells alone, and else pass them over. When cell values
+     * are averaged at a vertex (insitu_centring), those of shells count too. */
     INSITU_TRIANGLE = 5, /* 3 vertices */
     INSITU_POLYGON = 7,  /* 3 vertices or more around it; offsets tell how many. It is drawn as triangles, which
                             cover it once, convex or not; it should be flat. */
@@ -126,7 +127,8 @@ typedef struct insitu_mesh {
     int64_t vertex_count;        /* >= 0 */
     insitu_array coordinates[3]; /* x, y, z: float32 or float64, vertex_count each; drawn cells' are at most 1e100 in
                                     size. Interleaved xyz is three arrays of stride 3 elements: see
-                                    insitu_mesh_interleaved(). */
+                                    insitu_mesh_interleaved(). Meshes of triangles, quads and polygons may go without
+                                    z (no data in coordinates[2]): then it is 0 everywhere. */
     insitu_array vertex_ids;     /* optional, int32 or int64, vertex_count: ids unique over all ranks, by which the
                                     vertices that ranks share are matched. Without them, vertices of bitwise equal
                                     coordinates match. */

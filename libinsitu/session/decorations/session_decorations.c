@@ -139,7 +139,7 @@ static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, dou
     insitu_tick ticks[SESSION_MAX_TICKS];
     const double length = hypot(e->pixels[1][0] - e->pixels[0][0], e->pixels[1][1] - e->pixels[0][1]);
     const int most = (int)fmin(fmax(length / (4 * size), 2), 8);
-    const session_scale scale = {RENDER_LINEAR, 0, e->from[axis], e->to[axis]};
+    const session_scale scale = {.kind = RENDER_LINEAR, .low = e->from[axis], .high = e->to[axis]};
     const double middle[2] = {0.5 * (e->pixels[0][0] + e->pixels[1][0]), 0.5 * (e->pixels[0][1] + e->pixels[1][1])};
     const int count = e->from[axis] < e->to[axis] ? session_make_ticks(&scale, most, ticks) : 0;
     for (int i = 0; i < count; i++) {
@@ -175,7 +175,7 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
     if (!(pixel > 0)) return out;
     const double room = 0.2 * camera->width * pixel, power = pow(10, floor(log10(room)));
     const double length = power * (room >= 5 * power ? 5 : room >= 2 * power ? 2 : 1);
-    const session_scale scale = {RENDER_LINEAR, 0, 0, length};
+    const session_scale scale = {.kind = RENDER_LINEAR, .high = length};
     insitu_tick ticks[SESSION_MAX_TICKS];
     const int count = session_make_ticks(&scale, 2, ticks);
     if (count < 2) return out;
@@ -213,20 +213,46 @@ static bool fill_words(session_decorations *d, const scene_decorations *scene, c
     return well;
 }
 
-static void write_label(const scene_decorations *scene, int bar, const scene_field *field, char label[300])
+/* Tells whether the layer shows the magnitude of the field: by its own word, or because the field has several
+ * components.
+ */
+static bool is_magnitude(const session_catalogue *catalogue, const scene_field *field)
 {
-    static const char *const axes[] = {" x", " y", " z"};
-    char component[16] = "";
-    if (field->component == SCENE_COMPONENT_MAGNITUDE)
-        snprintf(component, sizeof component, " magnitude");
+    int components = 1;
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        const session_catalogue_field *found =
+            scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+        if (found && found->component_count > components) components = found->component_count;
+    }
+    return field->component == SCENE_COMPONENT_MAGNITUDE ||
+           (field->component == SCENE_COMPONENT_DEFAULT && components > 1);
+}
+
+/* Writes the field's name: |v|, v x, v 7. */
+static void write_name(const session_catalogue *catalogue, const scene_field *field, char *out, size_t size)
+{
+    static const char *const axes[] = {"x", "y", "z"};
+    if (is_magnitude(catalogue, field))
+        snprintf(out, size, "|%s|", field->name);
     else if (field->component > 2)
-        snprintf(component, sizeof component, " %d", field->component);
+        snprintf(out, size, "%s %d", field->name, field->component);
     else if (field->component >= 0)
-        snprintf(component, sizeof component, "%s", axes[field->component]);
-    if (bar < scene->label_count)
-        snprintf(label, 300, "%s", scene->labels[bar]);
+        snprintf(out, size, "%s %s", field->name, axes[field->component]);
     else
-        snprintf(label, 300, "%s%s", field->name, component);
+        snprintf(out, size, "%s", field->name);
+}
+
+static void write_label(const scene_decorations *scene, int bar, const session_catalogue *catalogue,
+                        const scene_field *field, char *label, size_t size)
+{
+    const char *unit = scene->unit_count == 1 ? scene->units[0] : bar < scene->unit_count ? scene->units[bar] : NULL;
+    if (bar < scene->label_count)
+        snprintf(label, size, "%s", scene->labels[bar]);
+    else
+        write_name(catalogue, field, label, size);
+    const size_t length = strlen(label);
+    if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
 /* Tells whether an earlier bar has the same field, colours and numbers; several layers may show one field. */
@@ -245,17 +271,27 @@ static bool is_repeated(const session_decorations *d, int bar)
     return is_found;
 }
 
-static void add_bar(session_decorations *d, const scene_decorations *scene, const scene_field *field,
+/* Input that bars are made from, beside the layers. */
+typedef struct bar_basis {
+    const scene_decorations *scene;
+    const session_catalogue *catalogue;
+} bar_basis;
+
+/* Makes the bar of a layer, unless an earlier one says the same. */
+static void add_bar(session_decorations *d, const bar_basis *basis, const scene_field *field,
                     const scene_colour_map *map, const session_transfer *transfer)
 {
+    const scene_decorations *scene = basis->scene;
     const int i = d->all.bar_count, most = scene->tick_count;
     if (i == SESSION_MAX_BARS) return;
-    const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high};
-    const int tick_count = transfer->is_constant ? session_make_constant_tick(transfer->constant, d->ticks[i])
-                           : map->is_banded      ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
-                                                 : session_make_ticks(&scale, most, d->ticks[i]);
+    const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high,
+                                 scene->numbers};
+    const int tick_count = transfer->is_constant
+                               ? session_make_constant_tick(transfer->constant, &scene->numbers, d->ticks[i])
+                           : map->is_banded ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
+                                            : session_make_ticks(&scale, most, d->ticks[i]);
     d->fields[i] = field;
-    write_label(scene, i, field, d->labels[i]);
+    write_label(scene, i, basis->catalogue, field, d->labels[i], sizeof d->labels[i]);
     d->bars[i] = (insitu_colour_bar){.label = d->labels[i],
                                      .colours = map->colours,
                                      .colour_count = map->count,
@@ -268,23 +304,22 @@ static void add_bar(session_decorations *d, const scene_decorations *scene, cons
     if (!is_repeated(d, i)) d->all.bar_count++;
 }
 
-static void fill_bars(session_decorations *d, const scene_image *image, const session_layers *layers)
+static void fill_bars(session_decorations *d, const scene_image *image, const session_decoration_basis *given)
 {
+    const bar_basis basis = {&image->decorations, given->catalogue};
+    const session_transfer *transfers = given->layers->transfers;
     for (int i = 0; i < image->isosurface_count; i++)
         if (image->isosurfaces[i].has_colour_by)
-            add_bar(d, &image->decorations, &image->isosurfaces[i].colour_by, &image->isosurfaces[i].colour_map,
-                    &layers->transfers[i]);
+            add_bar(d, &basis, &image->isosurfaces[i].colour_by, &image->isosurfaces[i].colour_map, &transfers[i]);
     const int outer = image->isosurface_count, planes = outer + image->surface_count;
     for (int i = 0; i < image->surface_count; i++)
         if (image->surfaces[i].has_colour_by)
-            add_bar(d, &image->decorations, &image->surfaces[i].colour_by, &image->surfaces[i].colour_map,
-                    &layers->transfers[outer + i]);
+            add_bar(d, &basis, &image->surfaces[i].colour_by, &image->surfaces[i].colour_map, &transfers[outer + i]);
     for (int i = 0, plane = planes; i < image->slice_count; plane += image->slices[i++].plane_count)
-        add_bar(d, &image->decorations, &image->slices[i].field, &image->slices[i].colour_map,
-                &layers->transfers[plane]);
+        add_bar(d, &basis, &image->slices[i].field, &image->slices[i].colour_map, &transfers[plane]);
     for (int i = 0; i < image->volume_count; i++)
-        add_bar(d, &image->decorations, &image->volumes[i].field, &image->volumes[i].colour_map,
-                &layers->transfers[layers->surface_count + i]);
+        add_bar(d, &basis, &image->volumes[i].field, &image->volumes[i].colour_map,
+                &transfers[given->layers->surface_count + i]);
 }
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
@@ -336,7 +371,7 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     d->background.has_axes = false;
     choose_colour(image, d->all.colour);
     fill_axes(d, &basis->view->camera);
-    if (scene->has_bars) fill_bars(d, image, basis->layers);
+    if (scene->has_bars) fill_bars(d, image, basis);
     if (d->strokes) {
         fill_outline(d, basis->outline, &basis->view->camera);
         if (basis->extent->cell_count) fill_lengths(d, scene, basis->extent, &basis->view->camera);

@@ -4,6 +4,7 @@
 
 #include "insitu/image_output.h"
 #include "scene.h"
+#include "session_catalogue.h"
 #include "session_layers.h"
 #include "session_outline.h"
 #include "session_space.h"
@@ -32,6 +33,7 @@ typedef struct session_decoration_basis {
     const session_view *view;
     const session_layers *layers;
     const session_outline *outline;
+    const session_catalogue *catalogue;
 } session_decoration_basis;
 
 /* Make them for an image that has some. NULL: no memory. Local. */

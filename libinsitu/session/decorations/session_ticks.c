@@ -47,7 +47,8 @@ static void shorten_exponent(char *text)
     char *e = strchr(text, 'e');
     if (!e) return;
     const bool is_negative = e[1] == '-';
-    const char *digits = e + 2 + strspn(e + 2, "0");
+    const size_t zeros = strspn(e + 2, "0");
+    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one of e+00 stays */
     memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
 }
 
@@ -64,6 +65,18 @@ static void write_number(double value, bool is_plain, int digits, char *text, si
     if (!is_plain) shorten_exponent(text);
 }
 
+/* Writes the number in the form that is asked for, or else plain or with an exponent, with so many digits behind the
+ * point. */
+static void write_in_form(double value, const scene_number_form *form, bool is_plain, int digits, insitu_tick *tick)
+{
+    enum { MOST = sizeof tick->text - 2 };
+    const int wanted = form->has_digits ? form->digits : digits;
+    const double size = fabs(value);
+    if (form->notation == SCENE_SCIENTIFIC) is_plain = false;
+    if (form->notation == SCENE_FIXED) is_plain = !(size >= 1) || log10(size) + 2 + wanted < MOST;
+    write_number(value, is_plain, wanted, tick->text, sizeof tick->text);
+}
+
 static double place_of(const session_scale *s, double value)
 {
     const double low = render_scaled(s->kind, s->threshold, s->low);
@@ -77,7 +90,9 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 {
     const round_step step = choose_step(s->low, s->high, most);
     const double largest = fmax(fabs(s->low), fabs(s->high));
-    const bool is_plain = largest < 1e6 && largest >= 1e-3 && step.exponent > -9;
+    const bool is_short = largest < 1e6 && largest >= 1e-3 && step.exponent > -9;
+    const scene_notation notation = s->numbers.notation;
+    const bool is_plain = notation == SCENE_SHORTEST ? is_short : notation == SCENE_FIXED;
     const int digits = is_plain ? -step.exponent : (int)floor(log10(largest)) - step.exponent;
     double first, last;
     int count = 0;
@@ -85,7 +100,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
     for (double n = first; n <= last && count < SESSION_MAX_TICKS; n++) {
         const double value = n * size_of(step);
         ticks[count].place = place_of(s, value);
-        write_number(value, is_plain, digits, ticks[count].text, sizeof ticks[count].text);
+        write_in_form(value, &s->numbers, is_plain, digits, &ticks[count]);
         count++;
     }
     return count;
@@ -105,10 +120,11 @@ static void add_value(const session_scale *s, double value, insitu_tick *ticks, 
     if (value < s->low - slack || value > s->high + slack) return;
     if (*count < SESSION_MAX_TICKS) {
         insitu_tick *tick = &ticks[*count];
-        const bool is_plain = size < 1e4 && size > 9e-4;
+        const bool is_short = size < 1e4 && size > 9e-4;
+        const bool is_plain = s->numbers.notation == SCENE_SHORTEST ? is_short : s->numbers.notation == SCENE_FIXED;
         tick->place = place_of(s, value);
-        write_number(value, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0, tick->text,
-                     sizeof tick->text);
+        write_in_form(value, &s->numbers, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0,
+                      tick);
     }
     (*count)++;
 }
@@ -181,13 +197,17 @@ int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[S
     return count;
 }
 
-int session_make_constant_tick(double value, insitu_tick *tick)
+int session_make_constant_tick(double value, const scene_number_form *form, insitu_tick *tick)
 {
     c_numbers numbers;
     const bool is_begun = c_numbers_begin(&numbers);
     tick->place = 0.5;
-    snprintf(tick->text, sizeof tick->text, "%.9g", value);
-    shorten_exponent(tick->text);
+    if (form->has_digits || form->notation != SCENE_SHORTEST) {
+        write_in_form(value, form, fabs(value) < 1e6, 6, tick);
+    } else {
+        snprintf(tick->text, sizeof tick->text, "%.9g", value);
+        shorten_exponent(tick->text);
+    }
     if (is_begun) c_numbers_end(&numbers);
     return 1;
 }

@@ -17,6 +17,14 @@ grid_array session_grid_array(const insitu_array *array)
     return out;
 }
 
+grid_array session_coordinates(const insitu_mesh *mesh, int axis)
+{
+    static const double zero = 0; /* and its first half is a float's */
+    const insitu_array *given = &mesh->coordinates[axis];
+    if (given->data) return session_grid_array(given);
+    return (grid_array){.data = (const char *)&zero, .is_wide = session_type_size(mesh->coordinates[0].type) == 8};
+}
+
 grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array)
 {
     grid_array out = session_grid_array(array);

@@ -229,6 +229,9 @@ static inline int64_t session_type_size(insitu_type type)
 /* An array as the rooms below read it; its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
+/* The vertices' coordinates along an axis: 0 along z, one element for all of them, where none are given. */
+grid_array session_coordinates(const insitu_mesh *mesh, int axis);
+
 /* As above, for an array whose indices count from the mesh's index_base. */
 grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
 

@@ -65,6 +65,13 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
+/* Tells whether cells without z coordinates may be seen: shells in the plane z = 0. */
+static bool may_be_plane(const insitu_mesh *mesh)
+{
+    if (mesh->lattice) return mesh->lattice->cells[2] == 0;
+    return mesh->cell_types.data || mesh->cell_count == 0 || grid_is_shell_type((int)mesh->cell_type);
+}
+
 static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_array *const arrays[] = {&mesh->coordinates[0],
@@ -91,7 +98,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     const session_array_rule rules[] = {
         {"x coordinates", vertices, floats | (has_axes ? optional : 0), 1},
         {"y coordinates", vertices, floats | (has_axes ? optional : 0), 1},
-        {"z coordinates", vertices, floats | (has_axes ? optional : 0), 1},
+        {"z coordinates", vertices, floats | (has_axes || may_be_plane(mesh) ? optional : 0), 1},
         {"vertex ids", vertices, integers | optional, 1},
         {"cell types", cells, integers | bytes | optional, 1},
         {"connectivity indices", mesh->connectivity_count, integers, 1},

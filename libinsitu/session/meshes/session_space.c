@@ -41,7 +41,7 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
     if (!status)
         status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
     if (status) return status;
-    *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
+    *out = (session_extent){.cell_count = totals[0], .solid_count = totals[2], .rank_count = (int)totals[1]};
     /* The mean is over cells that have a size: flat ones change no sample. */
     if (totals[2] > 0) out->cell_size = rounded_size(all_sizes / (double)totals[2]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
@@ -56,6 +56,16 @@ static double half_diagonal(const double lower[3], const double upper[3])
     double half[3];
     for (int axis = 0; axis < 3; axis++) half[axis] = 0.5 * upper[axis] - 0.5 * lower[axis];
     return hypot(hypot(half[0], half[1]), half[2]);
+}
+
+int session_flat_axis(const session_extent *extent)
+{
+    int flat = -1;
+    double widest = 0;
+    for (int axis = 0; axis < 3; axis++) widest = fmax(widest, extent->upper[axis] - extent->lower[axis]);
+    for (int axis = 0; axis < 3 && widest > 0 && extent->solid_count == 0; axis++)
+        if (extent->upper[axis] - extent->lower[axis] <= 1e-6 * widest) flat = axis;
+    return flat;
 }
 
 /* Kept while the bounds' centre is inside the old ones and the size is within a factor of 4 up, 8 down. */

@@ -10,10 +10,16 @@
 typedef struct session_extent {
     double lower[3], upper[3]; /* both 0 where there are no cells */
     double half_diagonal;
-    int64_t cell_count; /* drawn ones */
-    double cell_size;   /* their mean: of the cube roots of their volumes; 0 where they have none */
-    int rank_count;     /* ranks that have some */
+    int64_t cell_count;  /* drawn ones */
+    int64_t solid_count; /* of them, those with a volume */
+    double cell_size;    /* their mean: of the cube roots of their volumes; 0 where they have none */
+    int rank_count;      /* ranks that have some */
 } session_extent;
+
+/* The axis that flat data is flat along; -1 if the data is not flat: if it has cells with a volume, or if it is more
+ * than 1e-6 as wide along each axis as along the widest. Twice the places of float32 fit in that share; a sheet that is
+ * bent by less than a thousandth of a pixel looks flat. */
+int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {
     bool has_extent, has_origin; /* by a step before this one */

@@ -34,7 +34,7 @@
 static grid as_grid(const insitu_mesh *mesh)
 {
     grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
-    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_grid_array(&mesh->coordinates[axis]);
+    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_coordinates(mesh, axis);
     g.connectivity = session_index_array(mesh, &mesh->connectivity);
     g.offsets = session_index_array(mesh, &mesh->offsets);
     g.face_count = mesh->face_count;

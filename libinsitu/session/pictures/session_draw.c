@@ -422,7 +422,7 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
     if (status) return status;
     if (image->decorations.is_given && d->team->rank == 0 && !error->status) {
         out->decorations = session_make_decorations(
-            image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline});
+            image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline, d->catalogue});
         if (!out->decorations) session_no_memory(error, (int64_t)sizeof *out->decorations, "decorations");
         if (out->decorations && writes_words(image)) warn_of_words(d, image, out->decorations);
     }
@@ -434,7 +434,13 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
  * the first frame. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {
-    session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report, NULL, image};
+    const session_extent *extent = &d->space->extent;
+    session_layer_basis basis = {.meshes = d->meshes,
+                                 .team = d->team,
+                                 .half_diagonal = extent->half_diagonal,
+                                 .is_flat = session_flat_axis(extent) >= 0,
+                                 .report = d->report,
+                                 .image = image};
     session_view view;
     session_layers layers = {0};
     canvas canvas = {0};

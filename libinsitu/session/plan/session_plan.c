@@ -374,8 +374,8 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
     const session_warning warning = {WARNING_SHELLS, image->name, field->name, field->line};
     session_warn(report, &warning, name && is_empty,
                  "image \"%s\": the %s of \"%s\" shows nothing: the cells that have the field, as on mesh \"%s\", are "
-                 "triangles, quads and polygons, which layers of kind surface draw",
-                 image->name, layer, field->name, name ? name : "");
+                 "triangles, quads and polygons, which a layer surface: {colour_by: {field: %s}} draws",
+                 image->name, layer, field->name, name ? name : "", field->name);
 }
 
 static void warn_of_shells_alone(const session_catalogue *catalogue, const scene_image *image, session_report *report)

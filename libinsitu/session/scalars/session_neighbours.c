@@ -31,6 +31,6 @@ session_key session_given_vertex_key(const session_mesh *mesh, int64_t vertex, b
     if (by_id) return key_of_id(mesh, vertex);
     if (mesh->cells.lattice) return key_of_position(mesh->cells.coordinates, vertex);
     grid_array coordinates[3];
-    for (int axis = 0; axis < 3; axis++) coordinates[axis] = session_grid_array(&mesh->given.coordinates[axis]);
+    for (int axis = 0; axis < 3; axis++) coordinates[axis] = session_coordinates(&mesh->given, axis);
     return key_of_position(coordinates, vertex);
 }

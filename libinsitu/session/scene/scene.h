@@ -168,6 +168,7 @@ typedef struct scene_surface {
     scene_field colour_by;
     scene_colour_map colour_map;
     float opacity;
+    bool has_material; /* else flat data takes no light */
     scene_material material;
     uint32_t clips; /* a set of the image's */
     int number;     /* in the image's list of layers */
@@ -232,6 +233,10 @@ typedef struct scene_camera_point {
 
 typedef struct scene_camera {
     bool is_automatic; /* eye and focal from the global bounds, looking along -direction */
+    /* Keys that the scene gives; the others follow the data where that is flat (session_camera.h). */
+    bool has_direction, has_up, has_fit, has_projection;
+    bool has_bounds; /* automatic: of these, not of the data */
+    double lower[3], upper[3];
     double eye[3], focal[3];
     double direction[3]; /* automatic: from the focal point towards the eye */
     double up[3];
@@ -271,6 +276,15 @@ typedef struct scene_words {
 /* Boxes around all data, around each mesh, or around what each rank holds. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
+/* The numbers of colour bars: as short as tells them apart, or all as 0.25, or all as 2.5e-1. */
+typedef enum scene_notation { SCENE_SHORTEST, SCENE_FIXED, SCENE_SCIENTIFIC } scene_notation;
+
+typedef struct scene_number_form {
+    scene_notation notation;
+    bool has_digits; /* else as many as tell neighbours apart */
+    int digits;      /* 0 .. 12, behind the point */
+} scene_number_form;
+
 typedef struct scene_decorations {
     bool is_given; /* else there are none */
     char *title;   /* NULL: none */
@@ -281,6 +295,9 @@ typedef struct scene_decorations {
     int tick_count; /* about so many a bar */
     int label_count;
     char **labels; /* of the bars in turn; beyond them the fields' names */
+    int unit_count;
+    char **units; /* likewise; one alone is that of all bars */
+    scene_number_form numbers;
     scene_boxes outline;
     bool has_rulers, has_axes;
     bool has_scale_bar;
@@ -361,6 +378,7 @@ typedef struct scene_image {
     int clip_count; /* 0 .. SCENE_MAX_CLIPS, each once */
     scene_clip *clips;
     uint32_t clips_of_all; /* a set of them, a bit each: those that cut all layers */
+    bool has_lights;       /* the scene gives some */
     int light_count;       /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
     uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */

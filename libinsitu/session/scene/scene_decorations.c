@@ -34,12 +34,17 @@ static insitu_status convert_words(const scene_document *d, const char *path, co
 static insitu_status convert_bars(const scene_document *d, const char *path, const scene_file_colour_bar *in,
                                   scene_decorations *out)
 {
-    char labels_path[SCENE_PATH_SIZE + 8];
+    char labels_path[SCENE_PATH_SIZE + 8], units_path[SCENE_PATH_SIZE + 8];
     snprintf(labels_path, sizeof labels_path, "%s.colour_bar.labels", path);
+    snprintf(units_path, sizeof units_path, "%s.colour_bar.units", path);
     out->has_bars = in != NULL;
     out->bars_at = in && in->at ? (scene_anchor)*in->at : SCENE_RIGHT;
     out->tick_count = in && in->ticks ? *in->ticks : 6;
-    return scene_copy_texts(d, in ? labels_path : NULL, &out->labels, &out->label_count);
+    out->numbers.notation = in && in->notation ? (scene_notation)*in->notation : SCENE_SHORTEST;
+    out->numbers.has_digits = in && in->digits;
+    out->numbers.digits = out->numbers.has_digits ? *in->digits : 0;
+    const insitu_status status = scene_copy_texts(d, in ? labels_path : NULL, &out->labels, &out->label_count);
+    return status ? status : scene_copy_texts(d, in ? units_path : NULL, &out->units, &out->unit_count);
 }
 
 insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,
@@ -67,7 +72,9 @@ void scene_free_decorations(scene_decorations *decorations)
     for (int i = 0; i < decorations->words_count; i++) base_free(decorations->words[i].text);
     for (int i = 0; i < decorations->label_count; i++) base_free(decorations->labels[i]);
     base_free(decorations->words);
+    for (int i = 0; i < decorations->unit_count; i++) base_free(decorations->units[i]);
     base_free(decorations->labels);
+    base_free(decorations->units);
     base_free(decorations->title);
     base_free(decorations->scale_unit);
 }

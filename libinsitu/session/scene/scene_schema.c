@@ -102,15 +102,29 @@ DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
     X(CHOICE("at", scene_file_words, at, anchor_words), .help = "Where it stands.", .by_default = "`top_left`")
 DEFINE_MAPPING(words, "text", WORDS_KEYS);
 
+static const cyaml_strval_t notation_words[] = {
+    {"auto", SCENE_SHORTEST}, {"fixed", SCENE_FIXED}, {"scientific", SCENE_SCIENTIFIC}};
+
 #define COLOUR_BAR_KEYS(X)                                                                                             \
     X(CHOICE("at", scene_file_colour_bar, at, side_words), .help = "The side of the picture.",                         \
       .by_default = "`right`")                                                                                         \
     X(NAMES("labels"),                                                                                                 \
-      .help = "The words above a bar, units for instance; a list of them where there are several bars, in the order "  \
-              "of the layers: isosurfaces, surfaces, slices, volumes.",                                                \
-      .by_default = "the names of the fields, with their components")                                                  \
+      .help = "The words above a bar; a list of them where there are several bars, in the order of the layers: "       \
+              "isosurfaces, surfaces, slices, volumes.",                                                               \
+      .by_default = "the names of the fields, with their components: `v x`; `|v|` of a magnitude")                     \
     X(CYAML_FIELD_INT_PTR("ticks", OPTIONAL, scene_file_colour_bar, ticks),                                            \
-      .help = "At most so many ticks, at round numbers.", .by_default = "`6`", .low = 2, .high = 12)
+      .help = "At most so many ticks, at round numbers.", .by_default = "`6`", .low = 2, .high = 12)                   \
+    X(NAMES("units"),                                                                                                  \
+      .help = "The unit of a bar's numbers, which is written behind its words as `[m/s]`; a list of them where there " \
+              "are several bars, in the order of `labels`. One alone is that of all bars.",                            \
+      .by_default = "none")                                                                                            \
+    X(CHOICE("notation", scene_file_colour_bar, notation, notation_words),                                             \
+      .help =                                                                                                          \
+          "How numbers are written: `fixed` as 0.25, `scientific` as 2.5e-1; a number that has no room as `fixed`, "   \
+          "of more than 30 characters, is written as `scientific`.",                                                   \
+      .by_default = "`auto`: `fixed` where that is short")                                                             \
+    X(CYAML_FIELD_INT_PTR("digits", OPTIONAL, scene_file_colour_bar, digits), .help = "Digits behind the point.",      \
+      .by_default = "as many as tell neighbours apart", .low = 0, .high = 12)
 DEFINE_MAPPING(colour_bar, "colour_bar", COLOUR_BAR_KEYS);
 
 static const cyaml_schema_value_t words = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_words, words_fields)};
@@ -406,8 +420,9 @@ static const cyaml_schema_value_t derived = {
           "Numbers of fields, a file each and a line a step: cycle, time, how many cells, their volume, the least "    \
           "and the greatest value, mean and standard deviation, the last two of cells' values (their own, or the "     \
           "mean of their vertices') weighted by volume; then the histogram. Ghost cells, cells of no volume and "      \
-          "those with values that are not finite do not count. The same on any partition. Without any cell no "        \
-          "line is written.",                                                                                          \
+          "those with values that are not finite do not count. A field on triangles, quads and polygons alone has "    \
+          "their area in the place of the volume; beside cells with a volume they do not count. The same on any "      \
+          "partition. Without any cell no line is written.",                                                           \
       .by_default = "none", .child = &statistics_mapping)                                                              \
     X(CYAML_FIELD_SEQUENCE("fields", POINTER, scene_file, fields, &derived, 1, SCENE_MAX_DERIVED),                     \
       .help = "Fields that are made of the simulation's, or of each other: a mapping from their names to what they "   \

@@ -13,7 +13,8 @@ typedef enum scene_frame { SCENE_FRAME_CAMERA, SCENE_FRAME_WORLD } scene_frame;
 typedef struct scene_file_automatic {
     double *direction; /* 3 */
     double *zoom;
-    int *fit; /* scene_fit */
+    int *fit;            /* scene_fit */
+    double (*bounds)[3]; /* 2 */
 } scene_file_automatic;
 
 typedef enum scene_fit { SCENE_FIT_SPHERE, SCENE_FIT_BOX } scene_fit;
@@ -173,6 +174,8 @@ typedef struct scene_file_words {
 typedef struct scene_file_colour_bar {
     int *at; /* scene_anchor */
     int *ticks;
+    int *notation; /* scene_notation */
+    int *digits;
 } scene_file_colour_bar;
 
 typedef struct scene_file_scale_bar {

@@ -294,7 +294,9 @@ DEFINE_MAPPING(threshold, "threshold", THRESHOLD_KEYS);
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_surface, material, material_fields),                    \
       .help = "How the surface takes light; `{ambient: 1, diffuse: 0, specular: 0}` shows the colours of the map.",    \
-      .by_default = "a slight gloss", .child = &material_mapping)                                                      \
+      .by_default = "a slight gloss; of flat data (see `automatic`), where the image gives no `lights`, the colours "  \
+                    "as they are",                                                                                     \
+      .child = &material_mapping)                                                                                      \
     CLIP_KEY(X, scene_file_surface, "")
 DEFINE_MAPPING(surface, "surface", SURFACE_KEYS);
 

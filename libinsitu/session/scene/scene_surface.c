@@ -32,6 +32,7 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
 {
     convert_edges(in->edges, height, out);
     out->opacity = in->opacity ? (float)*in->opacity : 1;
+    out->has_material = in->material != NULL;
     out->material = scene_convert_material(in->material);
     out->has_colour_by = in->colour_by != NULL;
     for (int c = 0; c < 3; c++) out->colour[c] = colour_linear_from_srgb(in->colour ? (float)in->colour[c] : 0.8F);

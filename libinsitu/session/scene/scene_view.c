@@ -52,13 +52,30 @@ static insitu_status convert_explicit(const scene_document *d, const char *path,
                      out->focal[1], out->focal[2]);
 }
 
+static insitu_status convert_bounds(const scene_document *d, const char *path, const double (*in)[3], scene_camera *out)
+{
+    if (!in) return INSITU_OK;
+    out->has_bounds = true;
+    copy_vector(out->lower, in[0]);
+    copy_vector(out->upper, in[1]);
+    for (int a = 0; a < 3; a++)
+        if (!(out->lower[a] <= out->upper[a]))
+            return scene_bad(d, path, "automatic.bounds",
+                             "goes from %g to %g along %c, expected the first corner to be the lower one",
+                             out->lower[a], out->upper[a], "xyz"[a]);
+    return INSITU_OK;
+}
+
 static insitu_status convert_automatic(const scene_document *d, const char *path, const scene_file_automatic *in,
                                        scene_camera *out)
 {
-    if (in && in->direction) copy_vector(out->direction, in->direction);
+    out->has_direction = in && in->direction;
+    out->has_fit = in && in->fit;
+    if (out->has_direction) copy_vector(out->direction, in->direction);
     if (in && in->zoom) out->zoom = *in->zoom;
     out->fits_box = in && in->fit && *in->fit == SCENE_FIT_BOX;
-    if (scene_normalize(out->direction)) return INSITU_OK;
+    if (scene_normalize(out->direction))
+        return convert_bounds(d, path, in ? (const double(*)[3])in->bounds : NULL, out);
     return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
 }
 
@@ -84,7 +101,9 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
     *out = (scene_camera){.is_automatic = true, .direction = {1, 0.8, 1.2}, .angle = 40, .zoom = 1};
     if (!in) in = &none;
     if (in->angle) out->angle = *in->angle;
+    out->has_up = in->up != NULL;
     insitu_status status = convert_place(d, path, in, out);
+    out->has_projection = in->projection != NULL;
     out->is_orthographic = in->projection && *in->projection == SCENE_ORTHOGRAPHIC;
     out->height = in->height ? *in->height : 0;
     if (status == INSITU_OK && in->height && !out->is_orthographic)
@@ -122,6 +141,7 @@ insitu_status scene_convert_lights(const scene_document *d, const char *path, co
     out->lights = base_calloc((size_t)count, sizeof *out->lights);
     if (!out->lights) return scene_no_memory(d);
     out->light_count = count;
+    out->has_lights = in->lights != NULL;
     if (!in->lights) {
         default_lights(out->lights);
         return INSITU_OK;

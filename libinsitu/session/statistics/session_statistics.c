@@ -1,6 +1,6 @@
 /* Sums are of whole numbers, which add up to the same in any order: shares of the largest cell's volume, from 0 to 1,
- * times 2^52. A sum has two parts, multiples of 2^28 and the rest, so that 2^34 cells fit. Each cell is off by at most
- * 2^-53 of the largest. */
+ * times 2^52. Of shells areas take the place of volumes, where no other cell counts. A sum has two parts, multiples of
+ * 2^28 and the rest, so that 2^34 cells fit. Each cell is off by at most 2^-53 of the largest. */
 #include "session_statistics.h"
 
 #include <math.h>
@@ -16,13 +16,13 @@
 /* ---- one cell ------------------------------------------------------------------------------------------------ */
 
 typedef struct cell_value {
-    bool is_there;
+    bool is_there, is_shell;
     double least, most, mean, volume;
 } cell_value;
 
 static cell_value value_of(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
 {
-    cell_value out = {grid_is_drawn(g, cell), INFINITY, -INFINITY, 0, 0};
+    cell_value out = {grid_is_seen(g, cell), grid_is_shell(g, cell), INFINITY, -INFINITY, 0, 0};
     if (!out.is_there) return out;
     out.volume = session_cell_volume(g, cell, room);
     const int count = field->is_cell_centred ? 1 : room->vertex_count;
@@ -60,6 +60,7 @@ typedef struct sum_basis {
     double largest; /* volume */
     double about;   /* second pass: the mean as a share of the range */
     bool is_second;
+    bool is_of_shells; /* shells count, else cells with a volume */
 } sum_basis;
 
 /* A value's share of the range, from 0 at low to 1 at high, without overflow. */
@@ -107,33 +108,32 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
             const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
-            if (value.is_there) add_cell(b, &value, sums);
+            if (value.is_there && value.is_shell == b->is_of_shells) add_cell(b, &value, sums);
         }
         region_leave();
     }
 }
 
-/* Entries of the reduction by minimum: least, -most, -largest volume. */
-static void find_ends(const statistics_pass *p, double ends[3])
+/* Entries of the reduction by minimum: least, -most, -largest volume; of cells with a volume, then of shells. */
+enum { ENDS = 3, KINDS = 2 };
+
+static void find_ends(const statistics_pass *p, double ends[KINDS * ENDS])
 {
     const int threads = p->team->threads;
-    double least = ends[0], most = -ends[1], largest = -ends[2];
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
-#pragma omp for schedule(static) reduction(min : least) reduction(max : most, largest) nowait
+#pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
             const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
             if (!value.is_there) continue;
-            least = fmin(least, value.least);
-            most = fmax(most, value.most);
-            largest = fmax(largest, value.volume);
+            double *of = ends + (value.is_shell ? ENDS : 0);
+            of[0] = fmin(of[0], value.least);
+            of[1] = fmin(of[1], -value.most);
+            of[2] = fmin(of[2], -value.volume);
         }
         region_leave();
     }
-    ends[0] = least;
-    ends[1] = -most;
-    ends[2] = -largest;
 }
 
 /* ---- passes -------------------------------------------------------------------------------------------------- */
@@ -143,7 +143,7 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_wish *wishes;
     int count;
-    double *ends;       /* three a wish, then -1 where a rank's memory ran out, else 0 */
+    double *ends;       /* KINDS times ENDS a wish, then -1 where a rank's memory ran out, else 0 */
     int64_t *sums;      /* MAX_SUMS a wish, then two */
     volume_room *rooms; /* of threads; large enough after the first pass, since a thread's cells stay the same */
 } statistics_work;
@@ -159,30 +159,41 @@ static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_p
 /* Whether a room could not be made on any rank. */
 static insitu_status check_rooms(const statistics_work *w, base_error *error)
 {
-    if (w->ends[3 * w->count] == 0) return INSITU_OK;
+    if (w->ends[KINDS * ENDS * w->count] == 0) return INSITU_OK;
     for (int thread = 0; thread < w->team->threads; thread++)
         if (w->rooms[thread].is_out_of_memory)
             session_no_memory(error, (int64_t)w->rooms[thread].wanted, "a polyhedron");
     return session_agree(w->team->comm, error);
 }
 
+/* The ends of the cells that count: those with a volume, or, where there is none, shells. */
+static bool is_of_shells(const statistics_work *w, int wish)
+{
+    const double *ends = w->ends + KINDS * ENDS * wish;
+    return !(ends[0] <= -ends[1]) && ends[ENDS] <= -ends[ENDS + 1];
+}
+
+static const double *ends_of(const statistics_work *w, int wish)
+{
+    return w->ends + KINDS * ENDS * wish + (is_of_shells(w, wish) ? ENDS : 0);
+}
+
 static insitu_status reduce_ends(const statistics_work *w, base_error *error)
 {
+    const int size = KINDS * ENDS * w->count;
     for (int i = 0; i < w->count; i++) {
-        double *ends = w->ends + 3 * i;
-        ends[0] = ends[1] = INFINITY;
-        ends[2] = 0;
+        double *ends = w->ends + KINDS * ENDS * i;
+        for (int k = 0; k < KINDS * ENDS; k++) ends[k] = k % ENDS == 2 ? 0 : INFINITY;
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
             if (find_pass(w, i, m, &pass)) find_ends(&pass, ends);
         }
     }
-    w->ends[3 * w->count] = 0;
+    w->ends[size] = 0;
     for (int thread = 0; thread < w->team->threads; thread++)
-        if (w->rooms[thread].is_out_of_memory) w->ends[3 * w->count] = -1;
-    const insitu_status status =
-        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, w->ends, 3 * w->count + 1, MPI_DOUBLE, MPI_MIN, w->team->comm),
-                    "MPI_Allreduce");
+        if (w->rooms[thread].is_out_of_memory) w->ends[size] = -1;
+    const insitu_status status = session_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, w->ends, size + 1, MPI_DOUBLE, MPI_MIN, w->team->comm), "MPI_Allreduce");
     return status ? status : check_rooms(w, error);
 }
 
@@ -194,7 +205,7 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
     for (int i = 0; i < w->count; i++) {
         const double range = known[i].most - known[i].least;
         const double about = is_second && range > 0 ? share_of_range(known[i].mean, known[i].least, known[i].most) : 0;
-        const sum_basis basis = {&known[i], -w->ends[3 * i + 2], about, is_second};
+        const sum_basis basis = {&known[i], -ends_of(w, i)[2], about, is_second, known[i].is_of_shells};
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
             if (find_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
@@ -208,9 +219,10 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
 static void begin(const statistics_work *w, int wish, session_statistics *out)
 {
     const session_statistics_wish *of = &w->wishes[wish];
-    const double *ends = w->ends + 3 * wish;
+    const double *ends = ends_of(w, wish);
     const bool has_range = of->low <= of->high;
-    *out = (session_statistics){.least = ends[0], .most = -ends[1], .bin_count = of->bin_count};
+    *out = (session_statistics){
+        .is_of_shells = is_of_shells(w, wish), .least = ends[0], .most = -ends[1], .bin_count = of->bin_count};
     out->low = has_range ? of->low : out->least;
     out->high = has_range ? of->high : out->most;
 }
@@ -218,7 +230,7 @@ static void begin(const statistics_work *w, int wish, session_statistics *out)
 static void take_sums(const statistics_work *w, int wish, session_statistics *out)
 {
     const int64_t *sums = w->sums + MAX_SUMS * wish;
-    const double largest = -w->ends[3 * wish + 2], volume = sum_of(sums + VOLUME);
+    const double largest = -ends_of(w, wish)[2], volume = sum_of(sums + VOLUME);
     const double place = volume > 0 ? sum_of(sums + MOMENT) / volume : 0;
     out->cells = sums[0];
     out->volume = volume * largest;
@@ -235,7 +247,7 @@ static insitu_status find_all(const statistics_work *w, session_statistics *out,
     for (int i = 0; i < w->count && !status; i++) take_sums(w, i, &out[i]);
     if (!status) status = reduce_sums(w, out, true, error);
     for (int i = 0; i < w->count && !status; i++) {
-        const double volume = out[i].volume / -w->ends[3 * i + 2], range = out[i].most - out[i].least;
+        const double volume = out[i].volume / -ends_of(w, i)[2], range = out[i].most - out[i].least;
         out[i].deviation = volume > 0 ? range * sqrt(sum_of(w->sums + 2 * i) / volume) : 0;
     }
     return status;
@@ -247,7 +259,7 @@ insitu_status session_find_statistics(const session_meshes *meshes, const sessio
 {
     statistics_work work = {.meshes = meshes, .team = team, .wishes = wishes, .count = count};
     if (count == 0) return INSITU_OK;
-    work.ends = base_alloc(((size_t)count * 3 + 1) * sizeof *work.ends);
+    work.ends = base_alloc(((size_t)count * KINDS * ENDS + 1) * sizeof *work.ends);
     work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);
     work.rooms = base_calloc((size_t)team->threads, sizeof *work.rooms);
     if (!work.ends || !work.sums || !work.rooms)

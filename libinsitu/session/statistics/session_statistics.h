@@ -14,9 +14,11 @@ typedef struct session_statistics_wish {
     double low, high; /* the range that the bins cover; low > high: that of the values */
 } session_statistics_wish;
 
-/* A cell's value is its own, or the mean of its vertices'. Cells whose values are not all finite do not count. */
+/* A cell's value is its own, or the mean of its vertices'. Cells whose values are not all finite do not count. Shells
+ * count where no cell with a volume does; then areas take the place of volumes. */
 typedef struct session_statistics {
     int64_t cells;
+    bool is_of_shells;
     double volume;          /* of the cells */
     double least, most;     /* values, of vertices where the field is there; least > most: there are none */
     double mean, deviation; /* of cells' values, weighted by volume */

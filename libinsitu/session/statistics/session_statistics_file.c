@@ -10,10 +10,12 @@
 enum { MOST_BYTES = 1 << 28 }; /* of a file that is continued: some two million lines */
 
 /* The line of column names, without its end: from base_alloc(). NULL: no memory. */
-static char *make_header(int bin_count)
+static char *make_header(int bin_count, bool is_of_shells)
 {
-    static const char columns[] = "cycle,time,cells,volume,minimum,maximum,mean,deviation";
-    const size_t size = sizeof columns + (bin_count ? 16 + 8 * (size_t)bin_count : 0);
+    static const char solids[] = "cycle,time,cells,volume,minimum,maximum,mean,deviation";
+    static const char shells[] = "cycle,time,cells,area,minimum,maximum,mean,deviation";
+    const char *columns = is_of_shells ? shells : solids;
+    const size_t size = sizeof solids + (bin_count ? 16 + 8 * (size_t)bin_count : 0);
     char *out = base_alloc(size);
     if (!out) return NULL;
     size_t length = (size_t)snprintf(out, size, "%s%s", columns, bin_count ? ",low,high" : "");
@@ -106,7 +108,7 @@ insitu_status session_write_statistics(const char *path, bool is_first, int64_t 
     new_lines lines = {.cycle = cycle, .time = time, .values = values};
     if (!is_first && text_file_append(path, write_last, &lines, &failure)) return INSITU_OK;
     if (!failure.is_missing) return fail(path, "written", &failure, error);
-    char *header = make_header(values->bin_count);
+    char *header = make_header(values->bin_count, values->is_of_shells);
     if (!header) return session_no_memory(error, 1 << 12, "a line of statistics");
     lines.header = header;
     const insitu_status status = begin_file(path, &lines, error);

@@ -6,6 +6,8 @@
  *
  * A polyhedron is the sum of cones from any point over its faces, turned outward. The two triangulations of a quad
  * enclose a tet, which its bilinear patch halves, so that the cone over a patch is the mean of those over both.
+ *
+ * A shell's area is the length of its vector area, half the sum of the cross products around it.
  */
 #include "session_volume.h"
 
@@ -119,12 +121,48 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
     return fabs(volume) / 6;
 }
 
+/* ---- shells ---------------------------------------------------------------------------------------------------- */
+
+/* Lists the shell's vertices in the room. */
+static bool take_vertices(const grid *g, int64_t cell, volume_room *room)
+{
+    grid_walk walk = grid_walk_cell(g, cell);
+    const int64_t count = walk.end - walk.next;
+    int64_t *vertices = room->corners;
+    if (count > GRID_MAX_CELL_VERTICES) {
+        if (!make_room(room, (size_t)count * sizeof *vertices)) return false;
+        vertices = (int64_t *)(void *)room->bytes;
+    }
+    for (int64_t i = 0; i < count; i++) grid_walk_next(&walk, &vertices[i]);
+    room->vertices = vertices;
+    room->vertex_count = (int)count;
+    return true;
+}
+
+static double shell_area(const grid *g, int64_t cell, volume_room *room)
+{
+    double first[3], last[3], next[3], sum[3] = {0, 0, 0};
+    if (!take_vertices(g, cell, room)) return NAN;
+    grid_vertex(g, room->vertices[0], first);
+    for (int i = 1; i < room->vertex_count; i++) {
+        double place[3];
+        grid_vertex(g, room->vertices[i], place);
+        difference(place, first, next);
+        for (int a = 0; a < 3 && i > 1; a++) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            sum[a] += last[b] * next[c] - last[c] * next[b];
+        }
+        for (int a = 0; a < 3; a++) last[a] = next[a];
+    }
+    return 0.5 * hypot(hypot(sum[0], sum[1]), sum[2]);
+}
+
 double session_cell_volume(const grid *g, int64_t cell, volume_room *room)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
     const int type = grid_cell_type(g, cell);
     room->vertex_count = 0;
-    if (grid_is_shell_type(type)) return 0;
+    if (grid_is_shell_type(type)) return shell_area(g, cell, room);
     if (type == GRID_POLYHEDRON) return polyhedron_volume(g, cell, room);
     room->vertices = room->corners;
     room->vertex_count = grid_cell_vertices(g, cell, room->corners);

@@ -77,6 +77,7 @@ static int count_bars(const scene_image *image, double *letters)
     int count = image->slice_count + image->volume_count;
     *letters = 0;
     for (int i = 0; i < d->label_count; i++) *letters = fmax(*letters, (double)strlen(d->labels[i]));
+    for (int i = 0; i < d->unit_count; i++) *letters = fmax(*letters, (double)strlen(d->units[i]) + 2);
     for (int i = 0; i < image->isosurface_count; i++) count += image->isosurfaces[i].has_colour_by;
     for (int i = 0; i < image->surface_count; i++) count += image->surfaces[i].has_colour_by;
     return count;
@@ -246,7 +247,37 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
     return true;
 }
 
+/* ---- what the scene leaves to the data ------------------------------------------------------------------------- */
+
+/* Flat data is seen with the first of its axes to the right and the second one up. */
+static void face_flat_data(int axis, scene_camera *c)
+{
+    static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};
+    static const double upward[3][3] = {{0, 0, 1}, {0, 0, 1}, {0, 1, 0}};
+    if (!c->has_direction) memcpy(c->direction, towards[axis], sizeof c->direction);
+    if (!c->has_direction && !c->has_up) memcpy(c->up, upward[axis], sizeof c->up);
+    if (!c->has_projection) c->is_orthographic = true;
+    if (!c->has_fit) c->fits_box = true;
+}
+
+static bool camera_by_bounds(const session_extent *data, const scene_image *image, render_camera *out)
+{
+    session_extent extent = *data;
+    scene_image seen = *image;
+    scene_camera *c = &seen.camera;
+    if (c->has_bounds) {
+        double half[3];
+        memcpy(extent.lower, c->lower, sizeof extent.lower);
+        memcpy(extent.upper, c->upper, sizeof extent.upper);
+        for (int a = 0; a < 3; a++) half[a] = 0.5 * c->upper[a] - 0.5 * c->lower[a];
+        extent.half_diagonal = length(half);
+    }
+    const int axis = session_flat_axis(&extent);
+    if (axis >= 0 && c->orbit.view_count == 0) face_flat_data(axis, c);
+    return automatic_camera(&extent, &seen, out);
+}
+
 bool session_make_camera(const session_extent *extent, const scene_image *image, render_camera *out)
 {
-    return image->camera.is_automatic ? automatic_camera(extent, image, out) : explicit_camera(image, out);
+    return image->camera.is_automatic ? camera_by_bounds(extent, image, out) : explicit_camera(image, out);
 }

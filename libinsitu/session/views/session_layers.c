@@ -246,10 +246,17 @@ static bool place_gathered(const session_meshes *meshes, session_layers *layers,
     return true;
 }
 
+/* A picture of flat data is a map: if the scene names no light and no material, the colours are those of the bar. */
+static const scene_material *material_of_faces(const session_layer_basis *basis, const scene_surface *layer)
+{
+    static const scene_material bare = {.ambient = 1};
+    return basis->is_flat && !layer->has_material && !basis->image->has_lights ? &bare : &layer->material;
+}
+
 static insitu_status fill_outer(const session_layer_basis *basis, const scene_surface *layer, int surface,
                                 session_layers *layers, base_error *error)
 {
-    const scene_material *m = &layer->material;
+    const scene_material *m = material_of_faces(basis, layer);
     render_surface_layer *out = &layers->surfaces[surface];
     *out = (render_surface_layer){.field = place_faces(basis->meshes, layers, 2 * surface, layer),
                                   .value_count = 1,

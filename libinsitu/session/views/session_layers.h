@@ -30,6 +30,7 @@ typedef struct session_layer_basis {
     const session_meshes *meshes;
     const session_team *team;
     double half_diagonal; /* of the global bounds */
+    bool is_flat;         /* session_flat_axis() found an axis */
     session_report *report;
     session_image_ranges *run_ranges; /* NULL: no layer has one over the run */
     const scene_image *image;

@@ -14,14 +14,19 @@ static const cyaml_strval_t projection_words[] = {{"perspective", SCENE_PERSPECT
                                                   {"orthographic", SCENE_ORTHOGRAPHIC}};
 #define AUTOMATIC_KEYS(X)                                                                                              \
     X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
-      .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
+      .help = "From the middle of the data towards the eye. Any length but 0.",                                        \
+      .by_default = "`[1, 0.8, 1.2]`; the front of flat data")                                                         \
     X(CHOICE("fit", scene_file_automatic, fit, fit_words),                                                             \
       .help = "The body that fits into the image: the `box` of the data's bounds, which then fills 0.95 of the "       \
               "frame's width or height, less the room of a title, colour bars and rulers, or the `sphere` around it, " \
               "which looks the same size from every side and keeps off the same room.",                                \
-      .by_default = "`sphere`")                                                                                        \
+      .by_default = "`sphere`; `box` of flat data")                                                                    \
     X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom), .help = "1 fits; larger is nearer.",        \
-      .by_default = "`1`", .low = 1e-4, .high = 1000)
+      .by_default = "`1`", .low = 1e-4, .high = 1000)                                                                  \
+    X(CYAML_FIELD_SEQUENCE_FIXED("bounds", POINTER, scene_file_automatic, bounds, &colour, 2),                         \
+      .help = "Two corners, `[[x, y, z], [x, y, z]]`, the lower one first: the camera is placed by this box, and "     \
+              "stays where it is while the data moves.",                                                               \
+      .by_default = "the bounds of all the data, at each drawn step")
 DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
 
 #define ORBIT_KEYS(X)                                                                                                  \
@@ -70,7 +75,11 @@ static const cyaml_schema_value_t point = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .help = "The point looked at, in the middle of the image. Not where the eye is. With `position`.",               \
       .by_default = "automatic")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("automatic", OPTIONAL, scene_file_camera, automatic, automatic_fields),                  \
-      .help = "Place the eye by the bounds of all the data of all ranks, at each drawn step.",                         \
+      .help = "Place the eye by the bounds of all the data of all ranks, at each drawn step. Data is flat if all of "  \
+              "its cells are triangles, quads and polygons, and its bounds are at most 1e-6 as wide along x, y or z "  \
+              "as along the widest axis. It is seen from the front, orthographic, and fills the frame, unless "        \
+              "`direction`, `projection`, `fit` or an `orbit` say otherwise: in the plane of x and y, x goes to the "  \
+              "right and y up, of x and z, z up, of y and z, y to the right and z up.",                                \
       .by_default = "where no `position` is given", .child = &automatic_mapping)                                       \
     X(NUMBERS("up", scene_file_camera, up, 3),                                                                         \
       .help = "The direction that is up in the image, not parallel to the view.",                                      \
@@ -80,7 +89,7 @@ static const cyaml_schema_value_t point = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .is_high_excluded = true)                                                                                        \
     X(CHOICE("projection", scene_file_camera, projection, projection_words),                                           \
       .help = "`orthographic`: all rays are parallel, and equal lengths look equal wherever they are.",                \
-      .by_default = "`perspective`")                                                                                   \
+      .by_default = "`perspective`; `orthographic` of flat data with an automatic camera")                             \
     X(CYAML_FIELD_FLOAT_PTR("height", OPTIONAL, scene_file_camera, height),                                            \
       .help = "With `projection: orthographic`: the height of what the image shows, in scene units.",                  \
       .by_default = "what fits the data; with `position`, what a perspective image shows at `focal`", .low = 0,        \

@@ -1,0 +1,396 @@
+/* Plane runs: triangles, quads and polygons in the plane of x and y, handed over without z. Their pictures are the
+ * colour map of the field, pixel by pixel in closed form, with no camera and no material in the scene, and the same to
+ * the bit on any ranks. Statistics weigh cells by their area. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "test_session_fixture.h"
+
+enum { NX = 6, NY = 4, MAX_VERTICES = (NX + 1) * (NY + 1), MAX_CELLS = 2 * NX * NY, MAX_ENTRIES = 4 * MAX_CELLS };
+enum { WIDTH = 120, HEIGHT = 50, PIXELS = WIDTH * HEIGHT };
+static const double right = 3, top = 2; /* the plate is [0, 3] x [0, 2] */
+
+#define IMAGE(more, layer)                                                                                             \
+    "images:\n  - name: a\n    size: [120, 50]\n    background: [0, 0, 0, 0]\n" more "    layers: [" layer "]\n"       \
+    "    outputs: [{path: a.exr}]\n"
+#define MAP_OF(field) "{surface: {colour_by: {field: " field ", map: grey, range: [-2, 6]}}}"
+#define NEVER IMAGE("    when: {field: f, above: 1e9}\n", MAP_OF("f"))
+
+/* ---- plates --------------------------------------------------------------------------------------------------- */
+
+typedef enum plate_kind { QUADS, TRIANGLES, POLYGONS, PLATE_KINDS } plate_kind;
+
+/* This rank's cells of a plate, with all of its vertices. */
+typedef struct plate {
+    plate_kind kind;
+    int cell_count, entry_count;
+    double xy[2 * MAX_VERTICES], zeros[MAX_VERTICES], f[MAX_VERTICES], c[MAX_CELLS], v[3 * MAX_VERTICES];
+    int connectivity[MAX_ENTRIES], offsets[MAX_CELLS + 1];
+} plate;
+
+static double linear(double x, double y)
+{
+    return 2 * x - y;
+}
+
+/* A value for the lattice's square, and for both of its triangles. */
+static double value_of_square(int i, int j)
+{
+    return (3 * i + 5 * j) % 7 - 1;
+}
+
+static void add_cell(plate *p, double value, int count, const int *vertices)
+{
+    p->c[p->cell_count] = value;
+    memcpy(p->connectivity + p->entry_count, vertices, (size_t)count * sizeof *vertices);
+    p->entry_count += count;
+    p->offsets[++p->cell_count] = p->entry_count;
+}
+
+static void add_square(plate *p, int i, int j)
+{
+    const int a = j * (NX + 1) + i, b = a + NX + 1;
+    const int quad[4] = {a, a + 1, b + 1, b}, lower[3] = {a, a + 1, b + 1}, upper[3] = {b + 1, b, a};
+    if (p->kind != TRIANGLES) {
+        add_cell(p, value_of_square(i, j), 4, quad);
+    } else {
+        add_cell(p, value_of_square(i, j), 3, lower);
+        add_cell(p, value_of_square(i, j), 3, upper);
+    }
+}
+
+/* The squares that the rank has among so many ranks. */
+static void make_plate(plate_kind kind, int rank, int ranks, plate *out)
+{
+    *out = (plate){.kind = kind};
+    for (int n = 0; n < MAX_VERTICES; n++) {
+        const double x = right * (n % (NX + 1)) / NX, y = top * (n / (NX + 1)) / NY;
+        out->xy[2 * n] = x;
+        out->xy[2 * n + 1] = y;
+        out->f[n] = linear(x, y);
+        out->v[3 * n] = 0.6 * out->f[n];
+        out->v[3 * n + 2] = 0.8 * out->f[n];
+    }
+    for (int j = 0; j < NY; j++)
+        for (int i = 0; i < NX; i++)
+            if ((i * NY + j) % ranks == rank) add_square(out, i, j);
+}
+
+static insitu_mesh describe(const plate *p, bool with_z)
+{
+    static const insitu_cell_type types[] = {INSITU_QUAD, INSITU_TRIANGLE, INSITU_POLYGON};
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = MAX_VERTICES;
+    for (int axis = 0; axis < 2; axis++)
+        mesh.coordinates[axis] = (insitu_array){p->xy + axis, INSITU_FLOAT64, 2 * sizeof *p->xy};
+    if (with_z) mesh.coordinates[2] = (insitu_array){p->zeros, INSITU_FLOAT64, 0};
+    mesh.cell_count = p->cell_count;
+    mesh.cell_type = types[p->kind];
+    mesh.connectivity_count = p->entry_count;
+    mesh.connectivity = (insitu_array){p->connectivity, INSITU_INT32, 0};
+    if (p->kind == POLYGONS) mesh.offsets = (insitu_array){p->offsets, INSITU_INT32, 0};
+    return mesh;
+}
+
+static void set_field(insitu_session *session, const char *name, insitu_centring centring, int64_t count,
+                      int components, const double *values)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = name;
+    field.centring = centring;
+    field.count = count;
+    field.component_count = components;
+    field.values = (insitu_array){values, INSITU_FLOAT64, 0};
+    assert_int_equal(insitu_set_field(session, "plate", &field), INSITU_OK);
+}
+
+static insitu_session *open_with(MPI_Comm comm, const char *scene, const plate *p, bool with_z)
+{
+    insitu_session *session = open_session(comm, scene);
+    const insitu_mesh mesh = describe(p, with_z);
+    forget_pictures();
+    assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_OK);
+    set_field(session, "f", INSITU_VERTEX, MAX_VERTICES, 1, p->f);
+    set_field(session, "c", INSITU_CELL, p->cell_count, 1, p->c);
+    set_field(session, "v", INSITU_VERTEX, MAX_VERTICES, 3, p->v);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    return session;
+}
+
+static caught_picture draw(MPI_Comm comm, const char *scene, const plate *p, bool with_z)
+{
+    insitu_session *session = open_with(comm, scene, p, with_z);
+    if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
+    const caught_picture picture = take_caught();
+    insitu_destroy(&session);
+    return picture;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+/* The place in the plate of a pixel's middle: the plate is as wide as 0.95 of the frame or as high, whichever is less.
+ */
+static void place_of(int pixel, double *x, double *y)
+{
+    const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
+    *x = right / 2 + (pixel % WIDTH + 0.5 - WIDTH / 2.0) * size;
+    *y = top / 2 - (pixel / WIDTH + 0.5 - HEIGHT / 2.0) * size;
+}
+
+static bool is_near_edge(double at, double size, int cells)
+{
+    const double place = at / size * cells;
+    return fabs(place - round(place)) < 1e-4;
+}
+
+/* sRGB's code of linear light, as a PNG has it before it is rounded. */
+static double srgb_code(float light)
+{
+    const double c = (double)light;
+    return 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055);
+}
+
+/* Tells whether each channel of each pixel, in the 8 bits of a PNG, is that of the grey map at the field's value, or
+ * one off: a half of it is the code's own rounding, and the map's table, straight in linear light between 1024 grey
+ * codes, and values in float are off by far less than the other. */
+static bool is_map(const caught_picture *picture, bool is_of_cells)
+{
+    int hits = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        double x, y;
+        place_of(pixel, &x, &y);
+        const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
+        if (is_near_edge(x, right, NX) || is_near_edge(y, top, NY)) continue;
+        const bool is_hit = x > 0 && x < right && y > 0 && y < top;
+        const double value = is_of_cells ? value_of_square((int)(x / right * NX), (int)(y / top * NY)) : linear(x, y);
+        const double code = 255 * (value + 2) / 8;
+        bool is_well = own[3] == (is_hit ? 1 : 0);
+        for (int k = 0; k < 3 && is_hit; k++) is_well = is_well && fabs(srgb_code(own[k]) - code) <= 1;
+        hits += is_hit;
+        if (is_well) continue;
+        fprintf(stderr, "pixel %d at (%g, %g): %g, expected %g\n", pixel, x, y, srgb_code(own[0]), is_hit ? code : 0);
+        return false;
+    }
+    return hits > PIXELS / 3;
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
+}
+
+/* Without z and with zeros, on all ranks and on one. */
+static void pictures_are_the_colour_map_of_the_field(void **state)
+{
+    (void)state;
+    static const char *const scenes[2] = {IMAGE("", MAP_OF("f")), IMAGE("", MAP_OF("c"))};
+    for (plate_kind kind = 0; kind < PLATE_KINDS; kind++)
+        for (int of_cells = 0; of_cells < 2; of_cells++) {
+            const char *scene = write_scene(scenes[of_cells]);
+            plate part, whole;
+            make_plate(kind, own_rank, rank_count, &part);
+            make_plate(kind, 0, 1, &whole);
+            caught_picture ours = draw(MPI_COMM_WORLD, scene, &part, of_cells), alone = {0};
+            bool is_well = true;
+            if (own_rank == 0) {
+                alone = draw(MPI_COMM_SELF, scene, &whole, !of_cells);
+                is_well = is_map(&ours, of_cells) && are_same(&ours, &alone);
+            }
+            everywhere(is_well);
+            free_caught(&ours);
+            free_caught(&alone);
+        }
+}
+
+/* The magnitude of v is |f|: colours by a vector of three components in a plane run. A light of the scene is kept. */
+static void what_the_scene_says_comes_first(void **state)
+{
+    (void)state;
+    static const char *const scenes[] = {
+        IMAGE("    camera: {automatic: {direction: [0, 0, -1]}}\n", MAP_OF("f")),
+        IMAGE("    camera: {position: [1.5, 1, 3], focal: [1.5, 1, 0]}\n", MAP_OF("f")),
+        IMAGE("    lights: [{direction: [0, 0, 1], intensity: 0.5}]\n", MAP_OF("f")),
+        IMAGE("", "{surface: {colour_by: {field: f, map: grey, range: [-2, 6]}, material: {}}}")};
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    caught_picture plain = draw(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))), &part, false);
+    for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
+        caught_picture other = draw(MPI_COMM_WORLD, write_scene(scenes[i]), &part, false);
+        everywhere(own_rank != 0 || !are_same(&plain, &other));
+        free_caught(&other);
+    }
+    free_caught(&plain);
+}
+
+static void layers_that_show_nothing_are_told(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *scene, *word;
+    } cases[] = {{IMAGE("", "{isosurface: {field: f, values: [1]}}"), "the isosurface of \"f\""},
+                 {IMAGE("", "{volume: {field: f}}"), "the volume of \"f\""},
+                 {IMAGE("", "{slice: {field: f, planes: [{normal: [0, 0, 1]}]}}"), "the slice of \"f\""}};
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(cases[i].scene), &part, false);
+        const char *warnings = insitu_last_report(session)->warnings;
+        everywhere(strstr(warnings, cases[i].word) && strstr(warnings, "surface: {colour_by: {field: f}}"));
+        insitu_destroy(&session);
+    }
+}
+
+static void solids_need_z(void **state)
+{
+    (void)state;
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))));
+    insitu_mesh mesh = describe(&part, false);
+    mesh.cell_type = INSITU_TET; /* as many vertices as a quad */
+    assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_ERROR_MESH);
+    everywhere(strstr(insitu_error(session), "z coordinates are not given") != NULL);
+    mesh = describe(&part, false);
+    mesh.coordinates[1].data = NULL;
+    assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_ERROR_MESH);
+    everywhere(strstr(insitu_error(session), "y coordinates are not given") != NULL);
+    insitu_destroy(&session);
+}
+
+/* ---- statistics ----------------------------------------------------------------------------------------------- */
+
+enum { MOST = 1 << 12 };
+
+/* A number of the file's second line. */
+static double number_at(const char *text, int column)
+{
+    const char *at = strchr(text, '\n');
+    for (; column > 0 && at; column--) at = strchr(at + 1, ',');
+    return at ? strtod(at + 1, NULL) : NAN;
+}
+
+static bool is_near(double a, double b)
+{
+    if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* nine digits are written */
+    fprintf(stderr, "%.9g, expected %.9g\n", a, b);
+    return false;
+}
+
+/* A linear field's mean over the plate is its value in the middle, and its ends are at corners. */
+static bool are_of_plate(const char *text, plate_kind kind)
+{
+    enum { CELLS = 2, AREA, LEAST, GREATEST, MEAN };
+    return strncmp(text, "cycle,time,cells,area,minimum,", 30) == 0 &&
+           number_at(text, CELLS) == (kind == TRIANGLES ? 2 : 1) * NX * NY && is_near(number_at(text, AREA), 6) &&
+           is_near(number_at(text, LEAST), linear(0, top)) && is_near(number_at(text, GREATEST), linear(right, 0)) &&
+           is_near(number_at(text, MEAN), linear(right / 2, top / 2));
+}
+
+static void statistics_weigh_shells_by_area(void **state)
+{
+    (void)state;
+    static char text[MOST], alone[MOST];
+    for (plate_kind kind = 0; kind < PLATE_KINDS; kind++) {
+        plate part, whole;
+        make_plate(kind, own_rank, rank_count, &part);
+        make_plate(kind, 0, 1, &whole);
+        if (own_rank == 0) unlink("parts.csv"), unlink("whole.csv");
+        insitu_session *session =
+            open_with(MPI_COMM_WORLD, write_scene(NEVER "statistics: [{field: f, path: parts.csv}]\n"), &part, false);
+        insitu_destroy(&session);
+        const char *scene = write_scene(NEVER "statistics: [{field: f, path: whole.csv}]\n");
+        if (own_rank == 0) {
+            session = open_with(MPI_COMM_SELF, scene, &whole, true);
+            insitu_destroy(&session);
+        }
+        read_file("parts.csv", MOST, text);
+        read_file("whole.csv", MOST, alone);
+        everywhere(own_rank != 0 || (are_of_plate(text, kind) && strcmp(text, alone) == 0));
+    }
+}
+
+/* The mean by area is 2; by cells it is not, as one quad is made three times as wide. */
+static void conditions_weigh_shells_by_area(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *when;
+        int images;
+    } cases[] = {{IMAGE("    when: {field: f, of: mean, above: 1.99, below: 2.01}\n", MAP_OF("f")), 1},
+                 {IMAGE("    when: {field: f, of: mean, above: 2.01}\n", MAP_OF("f")), 0},
+                 {IMAGE("    when: {field: f, of: maximum, above: 5.9}\n", MAP_OF("f")), 1}};
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    for (int n = 0; n < MAX_VERTICES; n++) { /* the same plate by columns of other widths */
+        const int i = n % (NX + 1);
+        part.xy[2 * n] = i == NX ? right : 0.25 * i;
+        part.f[n] = linear(part.xy[2 * n], part.xy[2 * n + 1]);
+    }
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(cases[k].when), &part, false);
+        everywhere(insitu_last_report(session)->images == cases[k].images);
+        insitu_destroy(&session);
+    }
+}
+
+/* Beside a cell with a volume shells do not count: the numbers are those of the tet alone. */
+static void shells_beside_solids_do_not_count(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    static const double places[3][5] = {{0, 1, 0, 0, 3}, {0, 0, 1, 0, 3}, {0, 0, 0, 1, 0}};
+    static const double values[5] = {0, 1, 2, 3, 100};
+    static const int connectivity[7] = {0, 1, 2, 3, 1, 2, 4}, offsets[3] = {0, 4, 7};
+    static const unsigned char types[2] = {INSITU_TET, INSITU_TRIANGLE};
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    const bool has_cells = own_rank == rank_count - 1;
+    mesh.vertex_count = has_cells ? 5 : 0;
+    for (int axis = 0; axis < 3; axis++) mesh.coordinates[axis] = (insitu_array){places[axis], INSITU_FLOAT64, 0};
+    mesh.cell_count = has_cells ? 2 : 0;
+    mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
+    mesh.connectivity_count = has_cells ? 7 : 0;
+    mesh.connectivity = (insitu_array){connectivity, INSITU_INT32, 0};
+    mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
+    if (own_rank == 0) unlink("mixed.csv");
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene(NEVER "statistics: [{field: f, path: mixed.csv}]\n"));
+    assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_OK);
+    set_field(session, "f", INSITU_VERTEX, mesh.vertex_count, 1, values);
+    const insitu_status status = insitu_step(session, 0, 0);
+    everywhere(status == INSITU_OK);
+    insitu_destroy(&session);
+    read_file("mixed.csv", MOST, text);
+    everywhere(own_rank != 0 ||
+               (strstr(text, ",volume,") && number_at(text, 2) == 1 && is_near(number_at(text, 3), 1.0 / 6) &&
+                number_at(text, 5) == 3 && is_near(number_at(text, 6), 1.5)));
+}
+
+/* ---- the whole ------------------------------------------------------------------------------------------------ */
+
+static const char *work_folder = ".";
+
+static int run(void)
+{
+    if (!enter_folder(work_folder, "plane")) return 1;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pictures_are_the_colour_map_of_the_field), cmocka_unit_test(what_the_scene_says_comes_first),
+        cmocka_unit_test(layers_that_show_nothing_are_told),        cmocka_unit_test(solids_need_z),
+        cmocka_unit_test(statistics_weigh_shells_by_area),          cmocka_unit_test(conditions_weigh_shells_by_area),
+        cmocka_unit_test(shells_beside_solids_do_not_count)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) work_folder = argv[1];
+    return run_session_tests(argc, argv, run);
+}
