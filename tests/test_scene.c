@@ -1182,11 +1182,14 @@ static void scene_decorations_are_read(void **state)
     assert_true(d->words[0].at == SCENE_BOTTOM_RIGHT && d->words[1].at == SCENE_TOP_LEFT);
     assert_true(d->bars_at == SCENE_LEFT && d->tick_count == 4 && d->label_count == 2 && d->size == 0.04);
     assert_string_equal(d->labels[0], "p in Pa");
+    assert_true(d->unit_count == 2 && strcmp(d->units[1], "K") == 0);
+    assert_true(d->numbers.notation == SCENE_FIXED && d->numbers.has_digits && d->numbers.digits == 2);
     assert_true(d->colour[0] == 1 && d->colour[1] == 0 && d->colour[2] == colour_linear_from_srgb(0.5F));
     assert_true(!s.images[2].outputs[0].has_decorations && s.images[2].outputs[1].has_decorations);
     scene_free(&s);
     parse_good(fewest_keys, &s);
     assert_true(!s.images[0].decorations.is_given && s.images[0].outputs[0].has_decorations);
+    assert_true(!s.images[0].camera.has_bounds && !s.images[0].has_lights);
     scene_free(&s);
 }
 

@@ -353,6 +353,17 @@ static bool catch_pixels(const insitu_image *image, size_t pixels, caught_pictur
     return !image->deep || catch_deep(image->deep, pixels, out);
 }
 
+static void catch_bars(const insitu_decorations *decorations, char *out, size_t size)
+{
+    for (int i = 0; i < decorations->bar_count; i++) {
+        const insitu_colour_bar *bar = &decorations->bars[i];
+        snprintf(out + strlen(out), size - strlen(out), "%s:", bar->label);
+        for (int n = 0; n < bar->tick_count; n++)
+            snprintf(out + strlen(out), size - strlen(out), " %s", bar->ticks[n].text);
+        snprintf(out + strlen(out), size - strlen(out), "\n");
+    }
+}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {
@@ -364,6 +375,7 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     caught_picture picture = {.width = image->width, .height = image->height, .held = base_memory_held()};
     snprintf(picture.path, sizeof picture.path, "%s", path);
+    if (image->decorations) catch_bars(image->decorations, picture.bars, sizeof picture.bars);
     if (!catch_pixels(image, pixels, &picture)) {
         free_caught(&picture);
         return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);

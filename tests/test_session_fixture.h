@@ -108,7 +108,8 @@ typedef struct caught_picture {
     insitu_deep_sample *samples; /* of a deep picture, pixel by pixel; else NULL */
     int64_t *first;              /* pixels + 1: of samples */
     char path[256];
-    int64_t held; /* bytes that the library held when it was written */
+    char bars[400]; /* of decorations: a line each, the label, a colon and its ticks */
+    int64_t held;   /* bytes that the library held when it was written */
 } caught_picture;
 
 enum { MAX_CAUGHT = 64 };

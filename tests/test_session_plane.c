@@ -210,7 +210,7 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
         }
 }
 
-/* The magnitude of v is |f|: colours by a vector of three components in a plane run. A light of the scene is kept. */
+/* A direction from behind, an explicit camera, a light and a material each make another picture. */
 static void what_the_scene_says_comes_first(void **state)
 {
     (void)state;
@@ -263,6 +263,36 @@ static void solids_need_z(void **state)
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_ERROR_MESH);
     everywhere(strstr(insitu_error(session), "y coordinates are not given") != NULL);
     insitu_destroy(&session);
+}
+
+/* ---- colour bars ---------------------------------------------------------------------------------------------- */
+
+#define BARS(keys)                                                                                                     \
+    "images:\n  - name: a\n    size: [120, 50]\n    layers:\n" SURFACE_OF("field: v")                                  \
+        SURFACE_OF("field: v, component: x") SURFACE_OF("field: f")                                                    \
+            SURFACE_OF("field: f, component: magnitude, map: magma") "    decorations: {colour_bar: " keys             \
+                                                                     "}\n    outputs: [{path: a.png}]\n"
+#define SURFACE_OF(keys) "      - surface: {colour_by: {" keys ", range: [0, 1]}}\n"
+
+static void bars_say_what_they_show(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *scene, *bars;
+    } cases[] = {{BARS("{ticks: 3}"), "|v|: 0 0.5 1.0\nv x: 0 0.5 1.0\nf: 0 0.5 1.0\n|f|: 0 0.5 1.0\n"},
+                 {BARS("{ticks: 3, units: m/s, digits: 2, notation: fixed}"),
+                  "|v| [m/s]: 0 0.50 1.00\nv x [m/s]: 0 0.50 1.00\nf [m/s]: 0 0.50 1.00\n|f| [m/s]: 0 0.50 1.00\n"},
+                 {BARS("{ticks: 3, units: [m/s, K], labels: [speed], notation: scientific}"),
+                  "speed [m/s]: 0 5.0e-1 1.0e0\nv x [K]: 0 5.0e-1 1.0e0\nf: 0 5.0e-1 1.0e0\n|f|: 0 5.0e-1 1.0e0\n"}};
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        caught_picture picture = draw(MPI_COMM_WORLD, write_scene(cases[i].scene), &part, false);
+        const bool is_well = own_rank != 0 || strcmp(picture.bars, cases[i].bars) == 0;
+        if (!is_well) fprintf(stderr, "%sexpected\n%s", picture.bars, cases[i].bars);
+        everywhere(is_well);
+        free_caught(&picture);
+    }
 }
 
 /* ---- statistics ----------------------------------------------------------------------------------------------- */
@@ -381,11 +411,14 @@ static const char *work_folder = ".";
 static int run(void)
 {
     if (!enter_folder(work_folder, "plane")) return 1;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pictures_are_the_colour_map_of_the_field), cmocka_unit_test(what_the_scene_says_comes_first),
-        cmocka_unit_test(layers_that_show_nothing_are_told),        cmocka_unit_test(solids_need_z),
-        cmocka_unit_test(statistics_weigh_shells_by_area),          cmocka_unit_test(conditions_weigh_shells_by_area),
-        cmocka_unit_test(shells_beside_solids_do_not_count)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_colour_map_of_the_field),
+                                       cmocka_unit_test(what_the_scene_says_comes_first),
+                                       cmocka_unit_test(layers_that_show_nothing_are_told),
+                                       cmocka_unit_test(bars_say_what_they_show),
+                                       cmocka_unit_test(solids_need_z),
+                                       cmocka_unit_test(statistics_weigh_shells_by_area),
+                                       cmocka_unit_test(conditions_weigh_shells_by_area),
+                                       cmocka_unit_test(shells_beside_solids_do_not_count)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

@@ -1,4 +1,4 @@
-"""A plane run: heat on a square of quads a rank, side by side; the pictures of heat.c. mpirun -n 2 python3 heat.py heat.yaml"""
+"""A plane run: heat on a square of quads a rank, side by side; the pictures of plate.c. mpirun -n 2 python3 plate.py plate.yaml"""
 
 import sys
 
@@ -15,7 +15,7 @@ first = (numpy.arange(N) + (N + 1) * numpy.arange(N)[:, None]).ravel()
 quads = first[:, None] + [0, 1, N + 2, N + 1]
 heat = numpy.empty(len(xy))
 
-with insitu.Session(MPI.COMM_WORLD, sys.argv[1] if len(sys.argv) > 1 else "heat.yaml") as session:
+with insitu.Session(MPI.COMM_WORLD, sys.argv[1] if len(sys.argv) > 1 else "plate.yaml") as session:
     session.set_mesh("plate", coordinates=xy, connectivity=quads, cell_type=insitu.QUAD)  # vertices x 2: z is 0
     for cycle in range(3):
         time = 0.5 * cycle

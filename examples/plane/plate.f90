@@ -1,4 +1,4 @@
-! A plane run: heat on a square of quads a rank, side by side; the pictures of heat.c. mpirun -n 2 heat heat.yaml
+! A plane run: heat on a square of quads a rank, side by side; the pictures of plate.c. mpirun -n 2 plate plate.yaml
 program heat_in_a_plane
     use, intrinsic :: iso_fortran_env, only: real64, error_unit
     use mpi_f08
@@ -21,7 +21,7 @@ program heat_in_a_plane
     do concurrent(j=0:n - 1, i=0:n - 1)
         quads(:, 1 + i + n*j) = 1 + i + (n + 1)*j + [0, 1, n + 2, n + 1]
     end do
-    scene = 'heat.yaml'
+    scene = 'plate.yaml'
     if (command_argument_count() > 0) call get_command_argument(1, scene)
 
     call pictures%create(MPI_COMM_WORLD, scene, status)

@@ -1,4 +1,4 @@
-/* A plane run: heat on a square of quads a rank, side by side. mpirun -n 2 heat heat.yaml */
+/* A plane run: heat on a square of quads a rank, side by side. mpirun -n 2 plate plate.yaml */
 #include <insitu/insitu.h>
 
 #include <stdio.h>
@@ -36,7 +36,7 @@ int main(int argc, char **argv)
     make_mesh(rank);
 
     insitu_session *session = NULL;
-    if (insitu_create(MPI_COMM_WORLD, argc > 1 ? argv[1] : "heat.yaml", &session) != INSITU_OK) {
+    if (insitu_create(MPI_COMM_WORLD, argc > 1 ? argv[1] : "plate.yaml", &session) != INSITU_OK) {
         if (rank == 0) fprintf(stderr, "no pictures: %s\n", insitu_error(NULL));
         MPI_Finalize();
         return 1;
