@@ -39,6 +39,7 @@ static void run(const wave_options *options, const wave_mesh *mesh, wave_solver 
     wave_pictures_open(options, mesh, solver, comm, &pictures);
     for (int step = 1; step <= options->steps; ++step) {
         double begin = MPI_Wtime();
+        wave_pictures_steer(&pictures, &solver->setup.source);
         wave_solver_step(solver);
         double between = MPI_Wtime();
         insitu_report insitu = wave_pictures_step(&pictures, step, solver->time);

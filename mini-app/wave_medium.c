@@ -32,7 +32,8 @@ wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *
     double depth = lattice->origin[2];
     wave_source source = {.position = {0.2 * lattice->origin[0], 0.1 * lattice->origin[1], 0.52 * depth},
                           .frequency = 2.5,
-                          .delay = 0.36};
+                          .delay = 0.36,
+                          .strength = 1};
     int layer = wave_medium_layer(medium, source.position[2]);
     source.amplitude = 4 * pi * 0.5 / medium->density[layer];
     /* The radius is a ninth of a wavelength where cells resolve that, and never less than a cube, so that sampling
@@ -43,8 +44,9 @@ wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *
 
 double wave_source_rate(const wave_source *source, double time)
 {
-    double tau = time - source->delay, a = pi * source->frequency * tau;
-    return source->amplitude * tau * exp(-a * a);
+    double tau = (source->period > 0 ? fmod(time, source->period) : time) - source->delay;
+    double a = pi * source->frequency * tau;
+    return source->strength * source->amplitude * tau * exp(-a * a);
 }
 
 double wave_source_density(const wave_source *source, const double xyz[3])

@@ -124,6 +124,15 @@ void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, cons
     if (status != INSITU_OK && pictures->rank == 0) show_once(pictures, "no pictures", insitu_error(NULL));
 }
 
+void wave_pictures_steer(wave_pictures *p, wave_source *source)
+{
+    source->strength = 1;
+    source->period = 0;
+    if (!p->session) return;
+    insitu_parameter(p->session, "strength", &source->strength); /* stays 1 where the scene has none */
+    insitu_parameter(p->session, "period", &source->period);
+}
+
 insitu_report wave_pictures_step(wave_pictures *p, int64_t cycle, double time)
 {
     if (!p->session) return (insitu_report){0};

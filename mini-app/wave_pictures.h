@@ -26,6 +26,9 @@ typedef struct wave_pictures {
 void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, const wave_solver *solver, MPI_Comm comm,
                         wave_pictures *pictures);
 
+/* Take the source's strength and period from the scene's parameters; 1 and 0 (one pulse) where it has none. Local. */
+void wave_pictures_steer(wave_pictures *pictures, wave_source *source);
+
 /* Hand the arrays over and draw the images that are due. Returns this rank's report, all zero without a session.
  * Collective. */
 insitu_report wave_pictures_step(wave_pictures *pictures, int64_t cycle, double time);

@@ -15,20 +15,7 @@ import subprocess
 import sys
 import time
 
-try:
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-    from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
-except ImportError:
-    print("skipped: there is no python3-selenium")
-    sys.exit(77)
-
-BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-if not BROWSER or not DRIVER:
-    print("skipped: there is no chromium with chromium-driver")
-    sys.exit(77)
+from cinema_browser import ActionChains, By, Keys, start, wait
 
 program, folder = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 
@@ -49,25 +36,6 @@ def draw(database, **keys):
     scene = folder / "scene.yaml"
     scene.write_text(SCENE.format(name=NAME, database=database, **keys))
     subprocess.run([program, scene], cwd=folder, check=True)
-
-
-def start():
-    options = webdriver.ChromeOptions()
-    options.binary_location = BROWSER
-    for option in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
-                   "--disable-background-networking", "--disable-component-update", "--window-size=1200,900",
-                   f"--user-data-dir={folder / 'profile'}"):
-        options.add_argument(option)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    return webdriver.Chrome(service=Service(DRIVER), options=options)
-
-
-def wait(what, holds, seconds=20):
-    end = time.monotonic() + seconds
-    while not holds():
-        if time.monotonic() > end:
-            raise AssertionError(f"after {seconds} s it is not so: {what}")
-        time.sleep(0.02)
 
 
 class Page:
@@ -251,6 +219,34 @@ def new_pictures_are_found(page):
     assert page.value("phi") == 2 and page.message() == ""
 
 
+def the_newest_is_followed(page):
+    shutil.rmtree(folder / "run.cdb")
+    draw("run.cdb", every=4, views=3, values=[0.2, 0.5])  # one step: there is no slider of steps
+    page.open()
+    assert page.sliders() == ["phi", "theta", "isovalue"], page.sliders()
+    page.move("phi", 2)
+    page.move("isovalue", 1)
+    page.at("follow").click()
+    draw("run.cdb", every=1, views=3, values=[0.2, 0.5])
+    wait("the newest step is shown", lambda: "time" in page.sliders() and page.value("time") == page.last("time") == 3, 6)
+    assert (page.value("phi"), page.value("isovalue")) == (2, 1) and page.at("follow").is_selected()
+    row = page.caption()
+    assert "cycle 3, time 1.5, phi 240, theta 0, isovalue 0.5" in row and "nearest" not in row, row
+    last = folder / "run.cdb" / "data.js"  # the last step again, but without the side that is looked at
+    whole = last.read_text()
+    kept = [line for line in whole.splitlines() if not (line.startswith('"3,') and ",240," in line)]
+    last.write_text("\n".join(kept) + "\n")
+    wait("the newest of this side is shown", lambda: "cycle 2, time 1, phi 240" in page.caption(), 6)
+    page.key(Keys.ARROW_LEFT)
+    assert not page.at("follow").is_selected() and page.value("time") == 1
+    last.write_text(whole)
+    time.sleep(2.5)
+    assert page.value("time") == 1, "a step that was chosen stays"
+    page.open("?follow")
+    wait("the newest step is shown", lambda: page.value("time") == 3 and page.at("follow").is_selected())
+    page.shot("follow.png")
+
+
 def contrast(page, selector):
     """Of a text with the page's background, as WCAG 2 defines it."""
     colours = page.run("const of = e => getComputedStyle(e); return [of(document.querySelector(arguments[0])).color,"
@@ -297,12 +293,13 @@ def main():
     folder.mkdir(parents=True)
     draw("run.cdb", every=2, views=3, values=[0.2, 0.5])
     draw("other.cdb", every=1, views=2, values=[0.2])
-    driver = start()
+    driver = start(folder / "profile", (1200, 900))
     try:
         page = Page(driver)
         for test in (sliders_show_every_picture, keys_move_sliders, space_plays_over_time, two_runs_stand_side_by_side,
                      what_is_missing_is_told, runs_of_one_name_are_told_apart, light_and_dark_are_readable,
-                     new_pictures_are_found, nothing_comes_from_a_network, no_script_failed):
+                     new_pictures_are_found, the_newest_is_followed,
+                     nothing_comes_from_a_network, no_script_failed):
             test(page)
             print(test.__name__, "is so", flush=True)
     finally:

@@ -178,6 +178,7 @@ module insitu
         generic :: set_mesh_of_faces => set_faces_by_offsets, set_faces_by_lists
         procedure :: set_mesh, remove_mesh, set_field, set_filled_field, step, report, error, destroy
         procedure :: keep_pictures, pictures
+        procedure :: parameter => read_parameter
     end type insitu_session
 
     ! An array of any kind that the library takes: reals and integers of 4 and 8 bytes, integers of 1 byte; a list, or a
@@ -241,6 +242,12 @@ module insitu
             type(c_ptr), value :: session
             integer(c_int), value :: keep
         end function c_keep_pictures
+        integer(c_int) function c_parameter(session, name, value) bind(C, name='insitu_parameter')
+            import :: c_char, c_double, c_int, c_ptr
+            type(c_ptr), value :: session
+            character(kind=c_char), intent(in) :: name(*)
+            real(c_double), intent(inout) :: value
+        end function c_parameter
         type(c_ptr) function c_pictures(session, count) bind(C, name='insitu_last_pictures')
             import :: c_int, c_ptr
             type(c_ptr), value :: session
@@ -1051,6 +1058,18 @@ contains
         integer, intent(out) :: status
         call take_status(self, c_keep_pictures(self%handle, merge(1_c_int, 0_c_int, keep)), status)
     end subroutine keep_pictures
+
+    ! A number of the scene's parameters; value stays as it is where the scene has none of this name, which is an error. An
+    ! edit of the scene changes it in a step, on all ranks.
+    subroutine read_parameter(self, name, value, status)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        real(real64), intent(inout) :: value
+        integer, intent(out) :: status
+        status = INSITU_ERROR_ARGUMENT
+        if (is_refused(self, find_zero(name))) return
+        call take_status(self, c_parameter(self%handle, as_c_text(name), value), status)
+    end subroutine read_parameter
 
     ! The pictures of the last step; none on other ranks, or where none are kept.
     function pictures(self) result(out)

@@ -185,6 +185,7 @@ def _load():
         ("insitu_set_field", ctypes.c_int, [pointer, text, ctypes.POINTER(_Field)]),
         ("insitu_step", ctypes.c_int, [pointer, ctypes.c_int64, ctypes.c_double]),
         ("insitu_last_report", ctypes.POINTER(_Report), [pointer]),
+        ("insitu_parameter", ctypes.c_int, [pointer, text, ctypes.POINTER(ctypes.c_double)]),
         ("insitu_keep_pictures", ctypes.c_int, [pointer, ctypes.c_int]),
         ("insitu_last_pictures", ctypes.POINTER(_Picture), [pointer, ctypes.POINTER(ctypes.c_int)]),
         ("insitu_error", text, [pointer]),
@@ -489,6 +490,17 @@ class Session:
         values = {key: getattr(report, key) for key, _ in _Report._fields_}
         return {key: (value or b"").decode(errors="replace") if kind is ctypes.c_char_p else value
                 for (key, kind), value in zip(_Report._fields_, values.values())}
+
+    def parameter(self, name, default=None):
+        """A number of the scene's `parameters`, the same on all ranks; an edit of the scene changes it in a step. Where the
+        scene has none of this name, default, or without one Error. Local."""
+        value = ctypes.c_double()
+        status = _library.insitu_parameter(self._open(), _encoded("name", name), ctypes.byref(value))
+        self._refuse_if_running()
+        if status == 1 and default is not None:  # INSITU_ERROR_ARGUMENT
+            return default
+        _check(status, self._session, False)
+        return value.value
 
     def keep_pictures(self, keep=True):
         """Turn on or off that rank 0 keeps each step's pictures in memory. Collective; rank 0's keep counts."""

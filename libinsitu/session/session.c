@@ -68,6 +68,7 @@ static void free_session(insitu_session *session)
     session_drop_kept(&session->kept);
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
+    session_news_free(&session->news);
     session_overwrites_free(&session->overwrites);
     session_report_free(&session->report);
     comp_claims_free(session->team.claims);
@@ -163,6 +164,14 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, field, &error);
+    return keep_error(session, &error);
+}
+
+insitu_status insitu_parameter(insitu_session *session, const char *name, double *value)
+{
+    base_error error = {.status = INSITU_OK};
+    if (!session || is_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
+    session_read_parameter(&session->scene_file, &session->asked, name, value, &error);
     return keep_error(session, &error);
 }
 

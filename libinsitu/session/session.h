@@ -9,7 +9,9 @@
 #include "session_cinema.h"
 #include "session_events.h"
 #include "session_mesh.h"
+#include "session_news.h"
 #include "session_overwrites.h"
+#include "session_parameters.h"
 #include "session_picture.h"
 #include "session_report.h"
 #include "session_run_ranges.h"
@@ -24,6 +26,7 @@ struct insitu_session {
     session_team team;
     session_threads threads;
     session_scene_file scene_file;
+    session_asked asked;
     session_meshes meshes;
     session_catalogue catalogue;
     session_space space;
@@ -32,6 +35,7 @@ struct insitu_session {
     session_kept_pictures kept;
     session_run_ranges run_ranges;
     session_cinema cinema; /* rank 0 */
+    session_news news;     /* rank 0 */
     session_overwrites overwrites;
     session_events events;
     session_report report;

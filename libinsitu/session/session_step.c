@@ -4,6 +4,7 @@
  * (session_agree.h), so that all of them leave the step at the same place. The first phase is one small reduction;
  * nothing else is exchanged where no image is due and nothing has failed. */
 #include "cpu.h"
+#include "memory.h"
 #include "render.h"
 #include "render_isa.h"
 #include "session.h"
@@ -17,6 +18,7 @@
 #include "session_draw.h"
 #include "session_empty_layers.h"
 #include "session_events.h"
+#include "session_files.h"
 #include "session_filled.h"
 #include "session_guard.h"
 #include "session_indexed.h"
@@ -203,7 +205,10 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
                           base_error *error)
 {
     s->report.numbers.time = changes->time;
-    if (changes->of_scene) reload_scene(s);
+    if (changes->of_scene) {
+        reload_scene(s);
+        s->news.is_new = true;
+    }
     if (s->team.rank == 0) s->report.numbers.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
     session_begin_cinema(&s->cinema, changes->cycle);
     base_error refused = {.status = INSITU_OK};
@@ -234,6 +239,27 @@ static insitu_status tell_unwritten(insitu_session *s, base_error *error)
     return error->status;
 }
 
+/* On rank 0: gives the writer the news of the step for the databases. An error is told by the next step. */
+static void tell_news(insitu_session *s)
+{
+    const session_scene_file *file = &s->scene_file;
+    const session_news_scene source = {&file->scene, file->path, file->has_stamp ? &file->stamp : NULL, file->warning};
+    if (s->team.rank != 0 || file->scene.database_count == 0) return;
+    session_note_news(&s->news, &s->report, &s->error);
+    if (!s->news.is_new) return;
+    session_files *files = base_calloc(1, sizeof *files);
+    char *text = files ? session_make_news(&s->news, &source, &s->report.numbers) : NULL;
+    if (!text) {
+        base_free(files);
+        return;
+    }
+    base_error error = {.status = INSITU_OK};
+    *files = (session_files){.scene = &file->scene, .news = text};
+    files->moment.cycle = s->report.numbers.cycle;
+    session_writer_give(&s->writer, files, &s->report, &error);
+    session_writer_note(&s->writer, s->report.numbers.cycle, &error);
+}
+
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
 {
     if (!session || session_refuse_in_fill(&session->meshes, "insitu_step")) return INSITU_ERROR_ARGUMENT;
@@ -246,6 +272,8 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_changes changes;
     session_writer_collect(&session->writer, &session->report);
     warn_of_environment(&session->team, &session->report);
+    if (session->has_stepped && session->team.rank == 0)
+        session_warn_of_parameters(&session->scene_file.scene, &session->asked, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status && changes.telling_rank >= 0)
         status = session_share_lines(&session->report, changes.telling_rank, &session->team, &session->error);
@@ -254,6 +282,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
         session_drop_pending(&session->meshes);
         if (!status && changes.are_unwritten) status = tell_unwritten(session, &session->error);
     }
+    tell_news(session);
     session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
                       &session->report);
     session_forget_filled(&session->meshes);

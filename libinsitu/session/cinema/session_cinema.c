@@ -8,9 +8,8 @@
 
 enum { MOST_BYTES = 1 << 28 }; /* of a table that is continued: some four million pictures */
 
-/* `what`: "read" or "written". */
-static insitu_status fail(const scene_database *database, const char *file, const char *what,
-                          const file_failure *failure, base_error *error)
+insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
+                                    const file_failure *failure, base_error *error)
 {
     return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "cinema: %.300s/%s: cannot be %s: %s", database->path, file, what, failure->reason);
@@ -19,11 +18,10 @@ static insitu_status fail(const scene_database *database, const char *file, cons
 static insitu_status fail_memory(const scene_database *database, const char *file, const char *what, base_error *error)
 {
     const file_failure failure = {.is_memory = true, .reason = "cannot allocate memory"};
-    return fail(database, file, what, &failure, error);
+    return session_fail_database(database, file, what, &failure, error);
 }
 
-/* The file's name, from base_alloc(); NULL: no memory. */
-static char *file_in(const scene_database *database, const char *file)
+char *session_database_file(const scene_database *database, const char *file)
 {
     const size_t size = strlen(database->path) + strlen(file) + 2;
     char *path = base_alloc(size);
@@ -150,7 +148,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     table_line line = {t, true};
     file_content old;
     file_failure failure;
-    char *path = file_in(t->database, "data.csv");
+    char *path = session_database_file(t->database, "data.csv");
     t->size = 0;
     add_header(&line);
     if (!path || !line.is_well) {
@@ -159,7 +157,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     }
     insitu_status status = INSITU_OK;
     if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
-        status = fail(t->database, "data.csv", "read", &failure, error);
+        status = session_fail_database(t->database, "data.csv", "read", &failure, error);
     if (!status && old.size) status = take_over(t, &old, cycle, error);
     base_free(old.text);
     base_free(path);
@@ -269,11 +267,11 @@ static bool put_page(const session_table *t, const char *path, file_failure *fai
 static insitu_status write_file(const session_table *t, const char *name, table_writer *put, base_error *error)
 {
     file_failure failure;
-    char *path = file_in(t->database, name);
+    char *path = session_database_file(t->database, name);
     if (!path) return fail_memory(t->database, name, "written", error);
     const bool is_written = put(t, path, &failure);
     base_free(path);
-    return is_written ? INSITU_OK : fail(t->database, name, "written", &failure, error);
+    return is_written ? INSITU_OK : session_fail_database(t->database, name, "written", &failure, error);
 }
 
 insitu_status session_write_cinema(session_cinema *cinema, base_error *error)

@@ -14,6 +14,7 @@
 #include <stdbool.h>
 
 #include "error.h"
+#include "file.h"
 #include "scene.h"
 
 typedef struct session_table {
@@ -48,6 +49,13 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
 insitu_status session_write_cinema(session_cinema *cinema, base_error *error);
 
 void session_cinema_free(session_cinema *cinema);
+
+/* The path of a file of the database, from base_alloc(); NULL: no memory. */
+char *session_database_file(const scene_database *database, const char *file);
+
+/* Record that the file could not be `what`: "read" or "written". */
+insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
+                                    const file_failure *failure, base_error *error);
 
 /* index.html, from session_cinema_page.html. */
 extern const unsigned char session_cinema_page[];

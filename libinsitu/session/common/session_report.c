@@ -34,6 +34,15 @@ static bool reserve_text(session_text *text, size_t bytes)
     return true;
 }
 
+bool session_text_append(session_text *text, const char *bytes, size_t count)
+{
+    if (!reserve_text(text, count + 1)) return false;
+    memcpy(text->data + text->size, bytes, count);
+    text->size += count;
+    text->data[text->size] = '\0';
+    return true;
+}
+
 void session_text_add(session_text *text, const char *format, ...)
 {
     char line[1536];
@@ -45,9 +54,8 @@ void session_text_add(session_text *text, const char *format, ...)
     base_escape(line, sizeof line);
     const size_t size = strlen(line);
     if (!reserve_text(text, size + 2)) return;
-    if (text->size) text->data[text->size++] = '\n';
-    memcpy(text->data + text->size, line, size + 1);
-    text->size += size;
+    if (text->size) session_text_append(text, "\n", 1);
+    session_text_append(text, line, size);
 }
 
 static const char *text_of(const session_text *text)

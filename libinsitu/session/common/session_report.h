@@ -30,6 +30,9 @@ typedef struct session_report {
 /* Add a line. */
 void session_text_add(session_text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Add bytes as they are, and a NUL behind them. False: no memory, and the text stays as it was. */
+bool session_text_append(session_text *text, const char *bytes, size_t count);
+
 /* All texts empty; nothing to free yet. Local. */
 void session_report_create(session_report *report);
 
@@ -61,6 +64,7 @@ typedef enum session_warning_kind {
     WARNING_WORDS,       /* words of a picture are not drawn as they are written */
     WARNING_UNSAID,      /* values have changed though they were said not to have */
     WARNING_OUTPUTS,     /* an image goes nowhere */
+    WARNING_PARAMETER,   /* a parameter of the scene is not read */
     WARNING_WRITER,      /* rank 0 has no thread to write pictures */
     WARNING_THREADS,     /* fewer threads than the scene or OpenMP asks for */
     WARNING_ISA          /* INSITU_ISA of this rank's environment is not taken */

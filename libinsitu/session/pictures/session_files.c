@@ -5,6 +5,7 @@
 #include "memory.h"
 #include "session_deep.h"
 #include "session_image.h"
+#include "session_news.h"
 
 int64_t session_files_bytes(const session_files *files)
 {
@@ -62,7 +63,10 @@ static double milliseconds(void)
 void session_write_files(session_files *files)
 {
     const double start = milliseconds();
-    if (!files->has_picture) session_write_cinema(files->cinema, &files->error);
+    if (files->news)
+        session_write_news(files->scene, files->news, &files->error);
+    else if (!files->has_picture)
+        session_write_cinema(files->cinema, &files->error);
     for (int i = 0; files->has_picture && i < files->image.output_count; i++)
         write_output(files, &files->image.outputs[i]);
     files->ms = milliseconds() - start;
@@ -75,5 +79,6 @@ void session_files_free(session_files *files)
     session_free_channels(&files->channels);
     session_free_deep(&files->deep);
     session_free_decorations(files->decorations);
+    base_free(files->news);
     base_free(files);
 }

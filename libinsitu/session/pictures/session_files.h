@@ -18,7 +18,8 @@ typedef struct session_files {
     struct session_files *next; /* in a list of the writer's (session_writer.h) */
     const scene *scene;         /* of the image: it stays until this is written */
     session_cinema *cinema;
-    bool has_picture;  /* else these are the tables of databases, written after a step's pictures */
+    bool has_picture;  /* else this is news, or else the tables of databases, written after a step's pictures */
+    char *news;        /* owned: report.json's text (session_news.h); NULL: there are none */
     scene_image image; /* its camera is that of the step, its lists are the scene's */
     scene_moment moment;
     image frame;

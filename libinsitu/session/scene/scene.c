@@ -177,6 +177,7 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
     insitu_status status = scene_convert_derived(d, in, out);
     if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
+    if (status == INSITU_OK) status = scene_convert_parameters(d, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
 
@@ -294,6 +295,8 @@ void scene_free(scene *s)
     }
     base_free(s->statistics);
     scene_free_derived(s);
+    for (int i = 0; i < s->parameter_count; i++) base_free(s->parameters[i].name);
+    base_free(s->parameters);
     for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
     base_free(s->databases);
     *s = (scene){0};

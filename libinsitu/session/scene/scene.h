@@ -437,6 +437,12 @@ typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_wri
 /* Images of a file, which have a bit each in session_events.h; and pictures that they make in a step. */
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 
+/* A number of the scene for the simulation (insitu_parameter()). */
+typedef struct scene_parameter {
+    char *name;
+    double value;
+} scene_parameter;
+
 typedef struct scene {
     int derived_count;      /* 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* each after those that it is made of */
@@ -450,6 +456,8 @@ typedef struct scene {
     scene_database *databases;
     int statistics_count; /* 0 .. 64 */
     scene_statistics *statistics;
+    int parameter_count; /* 0 .. 64, of different names */
+    scene_parameter *parameters;
 } scene;
 
 /* Parse text (size bytes; file_name for messages, and paths in the scene are relative to its folder). attachments: NULL
@@ -459,6 +467,11 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
                           scene *out, base_error *error);
 
 void scene_free(scene *s);
+
+/* The parameter of this name; NULL: the scene has none. */
+const scene_parameter *scene_find_parameter(const scene *s, const char *name);
+/* What a message about a name that is no parameter's says of those that there are: what was meant, and all of them. */
+void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
 
 /* The values that placeholders stand for. */
 typedef struct scene_moment {

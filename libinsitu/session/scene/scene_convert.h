@@ -128,6 +128,7 @@ insitu_status scene_convert_statistics(const scene_document *d, const scene_file
 /* The derived fields, sorted: each after those that it is made of. */
 insitu_status scene_convert_derived(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_derived(scene *s);
+insitu_status scene_convert_parameters(const scene_document *d, scene *out);
 
 /* Refuse two outputs that would be one file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);

@@ -261,6 +261,16 @@ int scene_document_texts(const scene_document *d, const char *path, const char *
     return count;
 }
 
+int scene_document_names(const scene_document *d, const char *path, const char **names, int most)
+{
+    int line, count = 0;
+    const yaml_node_t *node = find_node(d, path, &line);
+    if (!node || node->type != YAML_MAPPING_NODE) return 0;
+    for (const yaml_node_pair_t *p = node->data.mapping.pairs.start; p < node->data.mapping.pairs.top; p++, count++)
+        if (count < most) names[count] = text_of(node_of(d, p->key));
+    return count;
+}
+
 scene_node scene_document_kind(const scene_document *d, const char *path)
 {
     int line;
@@ -559,6 +569,46 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     return bad_value(d, path, node, value, key);
 }
 
+/* A name that the scene gives stands in paths of messages and in calls of simulations. */
+static bool is_own_name(const yaml_node_t *name)
+{
+    static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
+    if (name->type != YAML_SCALAR_NODE || name->data.scalar.length > SCENE_KEY_BYTES) return false;
+    size_t i = 0;
+    for (const char *text = text_of(name); i < name->data.scalar.length; i++)
+        if (!text[i] || !(strchr(letters, text[i]) || (i && strchr(digits, text[i])))) return false;
+    return i > 0;
+}
+
+/* A mapping whose keys are names that the scene gives. */
+static insitu_status check_named(scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key)
+{
+    if (node->type != YAML_MAPPING_NODE) return bad_value(d, path, node, value, key);
+    const yaml_node_pair_t *first = node->data.mapping.pairs.start, *end = node->data.mapping.pairs.top;
+    if (end - first > SCENE_MAX_NAMES)
+        return scene_bad(d, path, "", "%d names are not allowed, expected at most %d", (int)(end - first),
+                         SCENE_MAX_NAMES);
+    insitu_status status = INSITU_OK;
+    for (const yaml_node_pair_t *p = first; p < end && !status; p++) {
+        const yaml_node_t *name = node_of(d, p->key);
+        char quoted[quote_size], own_path[path_size];
+        quote(name, quoted);
+        if (!is_own_name(name))
+            return base_fail(d->error, INSITU_ERROR_SCENE,
+                             "%.300s:%d: %s: the name %s is not allowed, expected a letter or _ and then letters, "
+                             "digits, _ or -, at most %d bytes",
+                             d->file_name, line_of(name), path, quoted, SCENE_KEY_BYTES);
+        if (find_pair(d, node, text_of(name), name->data.scalar.length) != p)
+            return base_fail(d->error, INSITU_ERROR_SCENE,
+                             "%.300s:%d: %s: the name %s is given twice, expected it once", d->file_name, line_of(name),
+                             path, quoted);
+        snprintf(own_path, sizeof own_path, "%s.%s", path, text_of(name));
+        status = check_value(d, own_path, node_of(d, p->value), &key->named->value, &key->named->key, NULL);
+    }
+    return status;
+}
+
 static insitu_status bad_key(scene_document *d, const char *path, const yaml_node_t *name, const scene_mapping *mapping,
                              const char *fault)
 {
@@ -642,7 +692,8 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
         return check_mapping(d, path, node, key->child, to);
     case CYAML_SEQUENCE:
     case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key, to);
-    case CYAML_IGNORE: return (key->forms ? check_forms : check_names)(d, path, node, value, key);
+    case CYAML_IGNORE:
+        return (key->named ? check_named : key->forms ? check_forms : check_names)(d, path, node, value, key);
     default:
         return is_scalar_right(node, value, key) ? store_scalar(d, node, value, to)
                                                  : bad_value(d, path, node, value, key);

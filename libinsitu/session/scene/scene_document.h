@@ -44,6 +44,9 @@ bool scene_is_plain_name(const char *name);
  * at most `most` are filled in. 0: nothing stands there. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
+/* The names that are the keys of a mapping at a path, as scene_document_texts(). */
+int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
+
 /* The text at a path, and a number of it; a node that passed the check is what its key asks for. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);

@@ -384,6 +384,8 @@ DEFINE_MAPPING(derived, "fields", DERIVED_KEYS);
 static const cyaml_schema_value_t derived = {
     CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_derived, derived_fields)};
 
+static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)}, {0}};
+
 #define TOP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_INT_PTR("threads", OPTIONAL, scene_file, threads),                                                   \
       .help =                                                                                                          \
@@ -427,7 +429,13 @@ static const cyaml_schema_value_t derived = {
     X(CYAML_FIELD_SEQUENCE("fields", POINTER, scene_file, fields, &derived, 1, SCENE_MAX_DERIVED),                     \
       .help = "Fields that are made of the simulation's, or of each other: a mapping from their names to what they "   \
               "are, as in [Derived fields](#derived-fields).",                                                         \
-      .by_default = "none", .child = &derived_mapping, .is_named = true)
+      .by_default = "none", .child = &derived_mapping, .is_named = true)                                               \
+    X(CYAML_FIELD_IGNORE("parameters", OPTIONAL),                                                                      \
+      .help = "Numbers for the simulation, which reads them by `insitu_parameter()`: `parameters: {inflow: 2.5}`. An " \
+              "edit of the scene changes them from the step on that reads it, on all ranks at once. A name is a "      \
+              "letter or `_` and then letters, digits, `_` or `-`, 63 at most. From the second step on, a parameter "  \
+              "that rank 0 has never asked for is a warning.",                                                         \
+      .by_default = "none", .named = &parameter_form)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
 static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};
 

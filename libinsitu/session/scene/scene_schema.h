@@ -279,6 +279,8 @@ typedef struct scene_key {
     const struct scene_mapping *child; /* of a mapping, or of a list of mappings */
     const struct scene_form *forms;    /* of a value that may be of several types: one of each; else NULL */
     int form_count;
+    const struct scene_form
+        *named; /* of a mapping whose keys are names that the scene gives: their values; else NULL */
 } scene_key;
 
 /* One of the forms that a value may have. */
@@ -295,9 +297,10 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* libcyaml has no type for "a name or a list of names", nor for values of several forms. CYAML_IGNORE stands for both
- * here, and they are read from the document (scene_document_texts(), scene_document_kind()). */
-enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64 };
+/* libcyaml has no type for "a name or a list of names", nor for values of several forms, nor for mappings with keys of
+ * the scene's own. CYAML_IGNORE stands for them here, and they are read from the document (scene_document_texts(),
+ * scene_document_kind(), scene_document_names()). The scene's own keys are of at most SCENE_KEY_BYTES. */
+enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
 /* The mapping at the top of a file, of a scene_file, and the same as a value. */
 extern const scene_mapping scene_top;

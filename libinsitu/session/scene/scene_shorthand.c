@@ -299,12 +299,24 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) node_of(r, number)->data.mapping.pairs.top = kept;
 }
 
+/* The node of the scene's parameters, whose keys are names of its own: they have no short forms. 0: there is none. */
+static int find_parameters(const rewrite *r)
+{
+    const yaml_node_t *root = node_of(r, 1);
+    if (!root || root->type != YAML_MAPPING_NODE) return 0;
+    for (const yaml_node_pair_t *p = root->data.mapping.pairs.start; p < root->data.mapping.pairs.top; p++) {
+        const char *key = text_of(r, p->key);
+        if (key && strcmp(key, "parameters") == 0) return p->value;
+    }
+    return 0;
+}
+
 bool scene_expand_shorthand(yaml_document_t *document)
 {
     rewrite r = {.document = document, .has_memory = true};
-    const int count = (int)(document->nodes.top - document->nodes.start);
+    const int count = (int)(document->nodes.top - document->nodes.start), parameters = find_parameters(&r);
     for (int number = 1; number <= count && r.has_memory; number++)
-        if (node_of(&r, number)->type == YAML_MAPPING_NODE) expand_mapping(&r, number);
+        if (number != parameters && node_of(&r, number)->type == YAML_MAPPING_NODE) expand_mapping(&r, number);
     return r.has_memory;
 }
 

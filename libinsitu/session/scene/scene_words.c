@@ -85,6 +85,12 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
     case CYAML_STRING: append(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
     case CYAML_ENUM: append_choices(words, value); break;
     case CYAML_IGNORE:
+        if (key->named) {
+            char each[SCENE_WORDS_SIZE];
+            scene_value_words(&key->named->value, &key->named->key, each);
+            append(words, "a mapping of at most %d names of your own, each with %s", SCENE_MAX_NAMES, each);
+            break;
+        }
         if (key->forms) {
             append_forms(words, key);
             break;

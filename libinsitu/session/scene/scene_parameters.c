@@ -1,0 +1,45 @@
+/* Numbers for the simulation, by names of the scene's own. */
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+#include "scene_shorthand.h"
+
+insitu_status scene_convert_parameters(const scene_document *d, scene *out)
+{
+    const char *names[SCENE_MAX_NAMES];
+    const int count = scene_document_names(d, "parameters", names, SCENE_MAX_NAMES);
+    out->parameters = base_calloc((size_t)count, sizeof *out->parameters);
+    if (!out->parameters) return scene_no_memory(d);
+    while (out->parameter_count < count) {
+        scene_parameter *parameter = &out->parameters[out->parameter_count];
+        char path[SCENE_PATH_SIZE];
+        snprintf(path, sizeof path, "parameters.%s", names[out->parameter_count]);
+        parameter->name = base_strdup(names[out->parameter_count]);
+        if (!parameter->name) return scene_no_memory(d);
+        parameter->value = scene_document_number(d, path);
+        out->parameter_count++;
+    }
+    return INSITU_OK;
+}
+
+const scene_parameter *scene_find_parameter(const scene *s, const char *name)
+{
+    for (int i = 0; i < s->parameter_count; i++)
+        if (strcmp(s->parameters[i].name, name) == 0) return &s->parameters[i];
+    return NULL;
+}
+
+void scene_list_parameters(const scene *s, const char *name, char *words, size_t size)
+{
+    const char *names[SCENE_MAX_NAMES];
+    for (int i = 0; i < s->parameter_count; i++) names[i] = s->parameters[i].name;
+    const char *meant = scene_nearest_word(name, names, s->parameter_count);
+    size_t used = 0;
+    words[0] = '\0';
+    if (meant) used = (size_t)snprintf(words, size, " (did you mean \"%s\"?)", meant);
+    for (int i = 0; i < s->parameter_count && used < size; i++)
+        used += (size_t)snprintf(words + used, size - used, "%s%s", i ? ", " : ", expected one of ", names[i]);
+    if (!s->parameter_count) snprintf(words, size, ": it has no parameters");
+}

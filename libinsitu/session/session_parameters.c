@@ -1,0 +1,51 @@
+#include "session_parameters.h"
+
+#include "session_hash.h"
+
+static uint64_t hash_of(const char *name)
+{
+    uint64_t key = SESSION_HASH_BEGIN;
+    session_hash_text(&key, name);
+    return key;
+}
+
+static bool is_asked(const session_asked *asked, const char *name)
+{
+    const uint64_t key = hash_of(name);
+    for (int i = 0; i < asked->count && i < SESSION_MOST_ASKED; i++)
+        if (asked->names[i] == key) return true;
+    return asked->count > SESSION_MOST_ASKED;
+}
+
+static void note_asked(session_asked *asked, const char *name)
+{
+    if (is_asked(asked, name)) return;
+    if (asked->count < SESSION_MOST_ASKED) asked->names[asked->count] = hash_of(name);
+    asked->count++;
+}
+
+insitu_status session_read_parameter(const session_scene_file *file, session_asked *asked, const char *name,
+                                     double *value, base_error *error)
+{
+    char others[512];
+    if (!name || !value)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: %s is NULL", name ? "value" : "name");
+    note_asked(asked, name);
+    const scene_parameter *found = scene_find_parameter(&file->scene, name);
+    if (found) {
+        *value = found->value;
+        return INSITU_OK;
+    }
+    scene_list_parameters(&file->scene, name, others, sizeof others);
+    return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: \"%.63s\" is no parameter of %.300s%s", name,
+                     file->path, others);
+}
+
+void session_warn_of_parameters(const scene *scene, const session_asked *asked, session_report *report)
+{
+    for (int i = 0; i < scene->parameter_count; i++) {
+        const char *name = scene->parameters[i].name;
+        session_warn_own(report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_asked(asked, name),
+                         "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0", name);
+    }
+}
