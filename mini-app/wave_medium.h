@@ -17,9 +17,9 @@ typedef struct wave_medium {
     double density[WAVE_LAYERS_MAX];
 } wave_medium;
 
-/* A point that injects volume at the rate Q(t) = strength amplitude tau exp(-(pi frequency tau)^2), tau = t - delay, again
- * and again each period, smeared over a Gaussian ball of this radius. Far away the pressure is density / (4 pi r) Q'(t - r / speed): Ricker's wavelet.
- * Over all time nothing is added: Q is odd about its delay. */
+/* A point that injects volume at the rate Q(t) = strength amplitude tau exp(-(pi frequency tau)^2), tau = t - delay,
+ * again and again each period, smeared over a Gaussian ball of this radius. Far away the pressure is density / (4 pi r)
+ * Q'(t - r / speed): Ricker's wavelet. Over all time nothing is added: Q is odd about its delay. */
 typedef struct wave_source {
     double position[3];
     double frequency;
@@ -27,7 +27,7 @@ typedef struct wave_source {
     double amplitude;
     double strength; /* 1 by default */
     double period;   /* 0: one pulse; a whole pulse takes twice the delay */
-    double radius; /* standard deviation of the ball */
+    double radius;   /* standard deviation of the ball */
 } wave_source;
 
 /* Four layers, stiffer and heavier with depth. */

@@ -34,6 +34,7 @@ holds libinsitu-dev 'insitu\.f90'
 holds libinsitu-dev 'insituConfig\.cmake'
 holds libinsitu-dev 'insitu\.pc'
 holds python3-insitu 'dist-packages/insitu\.py'
+holds insitu-view 'bin/insitu-view'
 needs libinsitu0 libopenmpi
 needs libinsitu-image libopenimageio
 needs libinsitu-image libfreetype6

@@ -127,9 +127,20 @@ if(INSITU_SYSTEM_PYTHON)
     $<TARGET_FILE:six_calls> ${CMAKE_CURRENT_BINARY_DIR}/cinema_page)
   set_tests_properties(session_cinema_page PROPERTIES
     ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 PROCESSORS 2 SKIP_RETURN_CODE 77)
+  # insitu-view: its server without a browser, and its page beside a running mini-app.
+  set(insitu_view ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/insitu-view)
+  add_test(NAME view_server COMMAND ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_view_server.py
+    ${insitu_view} ${CMAKE_CURRENT_BINARY_DIR}/view_server)
+  set_tests_properties(view_server PROPERTIES TIMEOUT 120)
+  add_test(NAME view_page COMMAND ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_view_page.py
+    ${insitu_view} $<TARGET_FILE:insitu-wave> ${CMAKE_CURRENT_BINARY_DIR}/view_page)
+  set_tests_properties(view_page PROPERTIES
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 PROCESSORS 2 SKIP_RETURN_CODE 77)
 else()
-  add_test(NAME session_cinema_page COMMAND ${CMAKE_COMMAND} -E echo "skipped: no /usr/bin/python3")
-  set_tests_properties(session_cinema_page PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped")
+  foreach(test session_cinema_page view_server view_page)
+    add_test(NAME ${test} COMMAND ${CMAKE_COMMAND} -E echo "skipped: no /usr/bin/python3")
+    set_tests_properties(${test} PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped")
+  endforeach()
 endif()
 
 insitu_session_program(test_session_thresholds)

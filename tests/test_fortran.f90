@@ -124,6 +124,7 @@ program test_fortran
         'values at corners by an index')
     call planes_go_without_z()
     call patches_have_values()
+    call parameters_are_read()
     call procedures_make_values()
     call errors_are_told()
     call MPI_Finalize()
@@ -410,6 +411,24 @@ contains
         call session%destroy(status)
         out = file_of('wall')
     end function wall_picture
+
+    subroutine parameters_are_read()
+        type(insitu_session) :: session
+        real(real64) :: value
+        value = -1
+        call session%parameter('inflow', value, status)
+        call expect(status == INSITU_ERROR_ARGUMENT .and. session%error() == 'the session is not open', session%error())
+        call session%create_from_text(MPI_COMM_WORLD, 'parameters: {inflow: 2.5}'//new_line('a')// &
+            'images: [{name: a, layers: [{volume: {field: p}}]}]', status)
+        call session%parameter('inflow  ', value, status)
+        call expect(status == INSITU_OK .and. abs(value - 2.5_real64) <= 0, 'a parameter is read')
+        call session%parameter('inflw', value, status)
+        call expect(status == INSITU_ERROR_ARGUMENT .and. abs(value - 2.5_real64) <= 0, 'an unknown one leaves the value')
+        call expect(index(session%error(), '(did you mean "inflow"?)') > 0, session%error())
+        call session%parameter('in'//achar(0)//'flow', value, status)
+        call expect(status == INSITU_ERROR_ARGUMENT .and. index(session%error(), 'character 0') > 0, session%error())
+        call session%destroy(status)
+    end subroutine parameters_are_read
 
     subroutine procedures_make_values()
         type(insitu_session), pointer :: session

@@ -264,6 +264,26 @@ static void source_adds_the_volume_it_promises(void **state)
     free_model(&m);
 }
 
+/* What steers a source: a factor on all that it sends, and a pulse again and again. */
+static void source_is_steered(void **state)
+{
+    (void)state;
+    const int size[3] = {4, 4, 4};
+    const wave_lattice lattice = wave_lattice_make(size, WAVE_HEXES, 0);
+    const wave_medium medium = wave_medium_layered(&lattice);
+    const wave_source once = wave_source_default(&lattice, &medium);
+    wave_source strong = once, again = once;
+    strong.strength = 2;
+    again.period = 2;
+    for (int i = 0; i < 16; i++) {
+        const double time = i * 0.0625, rate = wave_source_rate(&once, time);
+        assert_true(rate != 0);
+        assert_true(fabs(wave_source_rate(&strong, time) - 2 * rate) <= 0);
+        assert_true(fabs(wave_source_rate(&again, time + 6) - rate) <= 0); /* times are sums of powers of 2 */
+        assert_true(fabs(wave_source_rate(&once, time + 6)) < 1e-30);
+    }
+}
+
 /* Upwind fluxes only dissipate: for the first-order scheme within its time step this is a theorem, for any cells and
  * any layers. The second-order one is not proved to; it must not gain over the run. */
 static void energy_never_rises(void **state)
@@ -396,6 +416,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(mass_is_conserved_between_rigid_walls),
         cmocka_unit_test(source_adds_the_volume_it_promises),
         cmocka_unit_test(energy_never_rises),
+        cmocka_unit_test(source_is_steered),
         cmocka_unit_test(absorbing_walls_let_a_wave_go),
         cmocka_unit_test(moving_mesh_swells_without_turning_cells_inside_out),
         cmocka_unit_test(float_stays_near_double),

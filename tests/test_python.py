@@ -153,6 +153,16 @@ def what_cannot_be_borrowed_is_refused():
     raises(insitu.Error, "no/such.yaml", insitu.Session, comm, "no/such.yaml")
 
 
+def parameters_are_numbers():
+    with insitu.Session(comm, scene_text="parameters: {inflow: 2.5}\n" + SCENE.format(name="p", folder=folder)) as s:
+        everywhere(s.parameter("inflow") == 2.5 and s.parameter("inflow", 7) == 2.5, "a parameter is read")
+        error = raises(insitu.Error, '"inflw" is no parameter of scene text (did you mean "inflow"?)', s.parameter, "inflw")
+        everywhere(error.status == "INSITU_ERROR_ARGUMENT" and not error.on_all_ranks, "an unknown one is an error")
+        everywhere(s.parameter("inflw", 7) == 7, "or what was given for that")
+        raises(ValueError, "character 0", s.parameter, "in\0flow")
+    raises(ValueError, "closed", s.parameter, "inflow")
+
+
 def pictures_are_arrays():
     xyz, hexes, f = lattice()
     with insitu.Session(comm, scene_text=SCENE.format(name="kept", folder=folder)) as s:
@@ -367,6 +377,7 @@ def callables_are_asked_in_steps_that_need_them():
                 ("set_mesh", lambda: s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)),
                 ("set_mesh", lambda: s.remove_mesh("m")), ("set_field", lambda: s.set_field("m", "f", f.copy())),
                 ("step", lambda: s.step(1, 0.0)), ("keep_pictures", lambda: s.keep_pictures()), ("destroy", s.close),
+                ("parameter", lambda: s.parameter("a", 1)),
                 ("last_pictures", lambda: s.pictures), ("last_report", lambda: s.report)]):
             s.set_field("m", "f", lambda call=call: (call(), f.copy())[1])
             error = raises(insitu.Error, f"its fill called insitu_{name}()", s.step, 12 + 4 * i, 0.0)
@@ -443,6 +454,7 @@ comm.Barrier()
 layouts_draw_the_same_picture()
 planes_go_without_z()
 what_cannot_be_borrowed_is_refused()
+parameters_are_numbers()
 pictures_are_arrays()
 finite_volumes_are_their_hexes()
 boundaries_have_values_of_their_own()

@@ -174,6 +174,7 @@ static const char every_key[] =
     "  l: {lambda2: u}\n"
     "  s: {strain_rate: u}\n"
     "writing: step\n"
+    "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
 
 static const char fewest_keys[] = "images:\n"
@@ -486,6 +487,27 @@ static void statistics_and_conditions_are_read(void **state)
     scene_free(&s);
 }
 
+/* Names of parameters are the scene's own: no short form, and no other spelling, is meant by them. */
+static void parameters_are_read_by_their_names(void **state)
+{
+    (void)state;
+    static const scene_parameter expected[] = {
+        {"inflow", 2.5}, {"_k-2", -1e-3}, {"values", 3}, {"color", 4}, {"axis", 5}};
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.parameter_count, 5);
+    for (int i = 0; i < 5; i++) {
+        assert_string_equal(s.parameters[i].name, expected[i].name);
+        assert_ptr_equal(scene_find_parameter(&s, expected[i].name), &s.parameters[i]);
+        assert_true(fabs(s.parameters[i].value - expected[i].value) <= 0);
+    }
+    assert_null(scene_find_parameter(&s, "colour"));
+    scene_free(&s);
+    parse_good(fewest_keys, &s);
+    assert_int_equal(s.parameter_count, 0);
+    scene_free(&s);
+}
+
 static void surfaces_have_their_colours(void **state)
 {
     (void)state;
@@ -707,6 +729,19 @@ static const struct bad_file {
     {1, "statistics: [{field: f, path: a.csv, every: 0}]", 1, {"statistics[0].every: \"0\"", "1 to"}},
     {1, "statistics: [{field: f, path: a.csv, histogram: {bins: 300}}]", 1, {"histogram.bins: \"300\"", "1 to 256"}},
     {1, "statistics: [{field: f, path: a.csv, histogram: {range: [2, 2]}}]", 1, {"histogram.range: goes from 2"}},
+    {1, "parameters: {a: 1, inflow: fast}", 1, {"parameters.inflow: \"fast\" is not allowed, expected a number"}},
+    {1, "parameters: {inflow: }", 1, {"parameters.inflow: nothing is not allowed", "a number"}},
+    {1, "parameters: {inflow: [1]}", 1, {"parameters.inflow: a list", "a number"}},
+    {1, "parameters: {inflow: nan}", 1, {"parameters.inflow: \"nan\"", "a number"}},
+    {1, "parameters: {inflow: 1, a: 2, inflow: 3}", 1, {"parameters: the name \"inflow\" is given twice"}},
+    {1, "parameters: {a.b: 1}", 1, {"parameters: the name \"a.b\" is not allowed", "a letter or _"}},
+    {1, "parameters: {2a: 1}", 1, {"parameters: the name \"2a\" is not allowed"}},
+    {1, "parameters: {\"\": 1}", 1, {"parameters: the name nothing is not allowed"}},
+    {1, "parameters: {[a]: 1}", 1, {"parameters: the name a list is not allowed"}},
+    {1, "parameters: {aaaaaaaaaabbbbbbbbbbccccccccccddddddddddeeeeeeeeeeffffffffff1234: 1}", 1, {"at most 63 bytes"}},
+    {1, "parameters: [1, 2]", 1, {"parameters: a list is not allowed", "names of your own, each with a number"}},
+    {1, "parameters: 7", 1, {"parameters: \"7\" is not allowed"}},
+    {1, "parameter: {a: 1}", 1, {"\"parameter\" is unknown (did you mean parameters?)"}},
     {5, "    when: {field: f}", 5, {"images[0].when: has no bound", "above, below"}},
     {5, "    when: {above: 1}", 5, {"images[0].when.field: missing"}},
     {5, "    when: {field: f, above: 2, below: 1}", 5, {"when.below: is 1", "more than above"}},
@@ -1258,6 +1293,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(statistics_and_conditions_are_read),
+        cmocka_unit_test(parameters_are_read_by_their_names),
         cmocka_unit_test(clips_are_of_the_image_and_of_layers),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),

@@ -306,6 +306,83 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     input_free(&in);
 }
 
+/* ---- news ------------------------------------------------------------------------------------------------------ */
+
+/* Compares a database's news with a pattern, in which # stands for a stamp of the scene's file. */
+static bool is_news(const char *path, const char *pattern)
+{
+    static char text[MOST];
+    read_file(path, MOST, text);
+    const char *at = text;
+    for (; own_rank == 0 && *pattern; pattern++) {
+        if (*pattern == '#')
+            at += strspn(at, "0123456789.");
+        else if (*at++ != *pattern)
+            return false;
+    }
+    return !*at;
+}
+
+/* report.json tells what a program that watches the run cannot know otherwise: warnings, errors of steps and of edits.
+ */
+static void news_tell_of_warnings_and_edits(void **state)
+{
+    (void)state;
+    static const char news[] = "out/n.cdb/report.json";
+#define SCENE(keys, field)                                                                                             \
+    keys "images:\n" IMAGE("a", "    every: 2\n", "{isosurface: {field: " field ", values: [7]}}",                     \
+                           "{cinema: out/n.cdb}")
+    session_input in = {0};
+    make_input(&in);
+    if (own_rank == 0) unlink(news);
+    const char *scene = write_scene(SCENE("parameters: {a: 0.5, b: -2e+300}\n", "f"));
+    char expected[4096];
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    everywhere(insitu_step(session, 0, -0.25) == INSITU_OK);
+    const char *warning = insitu_last_report(session)->warnings;
+    everywhere(strncmp(warning, "image \"a\": the isosurface", 24) == 0 && !strpbrk(warning, "\n\\"));
+    char escaped[512];
+    size_t size = 0;
+    for (const char *c = warning; *c; c++) {
+        if (*c == '"') escaped[size++] = '\\';
+        escaped[size++] = *c;
+    }
+    escaped[size] = '\0';
+    snprintf(expected, sizeof expected,
+             "{\"cycle\": 0, \"time\": -0.25, \"error\": null,\n"
+             " \"scene\": {\"path\": \"%s\", \"modified\": \"#\", \"error\": null},\n"
+             " \"parameters\": {\"a\": 0.5, \"b\": -2.0000000000000001e+300},\n"
+             " \"warnings\": [\n  {\"cycle\": 0, \"text\": \"%s\"}]}\n",
+             scene, escaped);
+    everywhere(is_news(news, expected));
+    if (own_rank == 0) unlink(news);
+    everywhere(insitu_step(session, 1, 0) ==
+               INSITU_OK); /* nothing is due, nothing is new, but what was never asked for */
+    static char text[MOST];
+    read_file(news, MOST, text);
+    everywhere(own_rank != 0 ||
+               (strstr(text, "{\"cycle\": 1,") && strstr(text, "parameter \\\"b\\\" of the scene changes nothing")));
+    if (own_rank == 0) unlink(news);
+    everywhere(insitu_step(session, 1, 0) == INSITU_OK);
+    everywhere(own_rank != 0 || access(news, F_OK) != 0);
+    write_scene("images:\n  - nmae: \"x\"\n");
+    everywhere(insitu_step(session, 1, 0) == INSITU_OK); /* an edit is told at once */
+    read_file(news, MOST, text);
+    everywhere(own_rank != 0 ||
+               (strstr(text, "\"error\": \"") && strstr(text, ".yaml:2: images[0]: the key \\\"nmae\\\" is unknown") &&
+                strstr(text, "\"a\": 0.5") && !strstr(text, "last edit was not taken")));
+    write_scene(SCENE("", "g"));
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    told_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
+    read_file(news, MOST, text);
+    everywhere(own_rank != 0 || (strstr(text, "\"error\": null}") && strstr(text, "\"g\\\"") &&
+                                 strstr(text, "\"parameters\": {}") && strstr(text, "the scene file was edited")));
+    insitu_destroy(&session);
+    input_free(&in);
+#undef SCENE
+}
+
 /* ---- pictures -------------------------------------------------------------------------------------------------- */
 
 /* Rank 0's pictures of a scene at one cycle, kept while another is drawn. */
@@ -453,6 +530,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(tables_that_cannot_be_written_are_told_and_written_later),
                                        cmocka_unit_test(pictures_that_cannot_be_written_have_no_line),
                                        cmocka_unit_test(tables_stay_whole_where_memory_runs_out),
+                                       cmocka_unit_test(news_tell_of_warnings_and_edits),
                                        cmocka_unit_test(sweeps_draw_what_each_image_alone_would),
                                        cmocka_unit_test(orbits_draw_what_each_camera_alone_would),
                                        cmocka_unit_test(paths_draw_what_a_camera_there_would),

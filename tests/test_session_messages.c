@@ -448,6 +448,56 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     test_free(values);
 }
 
+static bool reads(insitu_session *session, const char *name, double expected)
+{
+    double value = -77;
+    return insitu_parameter(session, name, &value) == INSITU_OK && fabs(value - expected) <= 0;
+}
+
+/* A name that the scene does not have leaves the value, and says which it has. */
+static bool lacks(insitu_session *session, const char *name, const char *words)
+{
+    double value = -77;
+    return insitu_parameter(session, name, &value) == INSITU_ERROR_ARGUMENT && fabs(value + 77) <= 0 &&
+           strstr(insitu_error(session), words) != NULL;
+}
+
+static void parameters_change_with_the_scene_on_all_ranks(void **context)
+{
+    (void)context;
+    static const char *const unread[3] = {"parameter \"outflw\" of the scene changes nothing", NULL};
+    static const char *const none[3] = {NULL};
+    char text[1024];
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD, write_scene(IMAGE("[24, 16]", "", SURFACE, "") "parameters: {inflow: 2.5, outflw: 1}\n"));
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    everywhere(reads(session, "inflow", 2.5)); /* before any step */
+    everywhere(lacks(session, "outflow", "\"outflow\" is no parameter of ") &&
+               lacks(session, "outflow", " (did you mean \"outflw\"?), expected one of inflow, outflw"));
+    everywhere(insitu_parameter(session, NULL, &(double){0}) == INSITU_ERROR_ARGUMENT &&
+               insitu_parameter(session, "inflow", NULL) == INSITU_ERROR_ARGUMENT &&
+               strcmp(insitu_error(session), "insitu_parameter: value is NULL") == 0);
+    everywhere(insitu_parameter(NULL, "inflow", &(double){0}) == INSITU_ERROR_ARGUMENT);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    step_is_good(session, 0);
+    everywhere(is_warned(session, none)); /* the code may ask later */
+    step_is_good(session, 1);
+    everywhere(is_warned(session, unread));
+    for (int i = 0; i < 3; i++) {
+        snprintf(text, sizeof text, "%sparameters: {outflow: 0, inflow: %d}\n", plain, 10 + i);
+        write_scene(i == 1 ? "images: 7\n" : text);         /* a broken edit changes none */
+        everywhere(reads(session, "inflow", i ? 10 : 2.5)); /* nothing but a step does */
+        step_is_good(session, 2 + i);
+        everywhere(reads(session, "inflow", i == 2 ? 12 : 10) && reads(session, "outflow", 0));
+    }
+    write_scene(plain);
+    step_is_good(session, 5);
+    everywhere(lacks(session, "inflow", ": it has no parameters"));
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
 /* In the step that draws the words first, though they are written after it; none hides another. */
 static void faults_of_words_are_told_at_once(void **context)
 {
@@ -543,6 +593,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(warnings_come_back_with_what_they_are_about),
         cmocka_unit_test(pictures_that_would_take_hours_are_refused),
         cmocka_unit_test(control_characters_are_escaped),
+        cmocka_unit_test(parameters_change_with_the_scene_on_all_ranks),
         cmocka_unit_test(faults_of_words_are_told_at_once),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);

@@ -18,7 +18,7 @@ ROOT = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__)
 EXAMPLES = {"c": (".c", ".cpp"), "fortran": (".f90",), "python": (".py",), "sh": (".sh",)}
 # Blocks of these pages are run in other tests: the tutorial's, and the commands that compile a program.
 RUN_ELSEWHERE = {("docs/tutorial.md", "sh"), ("docs/fortran.md", "sh")}
-PROGRAMS = {"insitu-render": "tools", "insitu-wave": "mini-app"}
+PROGRAMS = {"insitu-render": "tools", "insitu-view": "tools/view", "insitu-wave": "mini-app"}
 faults = []
 
 
@@ -75,7 +75,7 @@ def scene_of(block):
     key = re.match(r"\s*([\w-]+)", block)[1]
     if key == "images":
         return block
-    if key in ("fields", "statistics"):
+    if key in ("fields", "statistics", "parameters"):
         return block if re.search(r"^images:", block, re.M) else image + layers + block
     return image + ("" if key == "layers" else layers) + textwrap.indent(block, "    ")
 
@@ -99,7 +99,7 @@ def commands(text):
 
 def source_of(program):
     if program in PROGRAMS:
-        return "\n".join(p.read_text() for p in sorted((ROOT / PROGRAMS[program]).glob("*.c*")))
+        return "\n".join(p.read_text() for p in sorted((ROOT / PROGRAMS[program]).glob("*.*")))
     at = ROOT / program
     if not at.is_file():
         return None

@@ -420,11 +420,11 @@ INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, dou
 INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
 
 /* Read a parameter of the scene (`parameters: {inflow: 2.5}`) into *value. Local, without communication: all ranks have
- * the same scene. Parameters are there as soon as the session is; an edit of the scene file changes them in the insitu_step()
- * that reads it, on all ranks, so that between two steps a parameter is one number. An edit that is not taken leaves
- * them as they were. A name that the scene does not have, as where it has no parameters, is INSITU_ERROR_ARGUMENT and
- * leaves *value as it is: set it to a default before. From the second step on, a parameter of the scene that rank 0 has
- * never asked for is a warning in the report. */
+ * the same scene. Parameters are there as soon as the session is; an edit of the scene file changes them in the
+ * insitu_step() that reads it, on all ranks, so that between two steps a parameter is one number. An edit that is not
+ * taken leaves them as they were. A name that the scene does not have, as where it has no parameters, is
+ * INSITU_ERROR_ARGUMENT and leaves *value as it is: set it to a default before. From the second step on, a parameter of
+ * the scene that rank 0 has never asked for is a warning in the report. */
 INSITU_API insitu_status insitu_parameter(insitu_session *session, const char *name, double *value);
 
 /* Turn on (keep is not 0) or off that rank 0 keeps each step's pictures in memory, beside the files that the scene asks

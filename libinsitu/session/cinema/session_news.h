@@ -1,6 +1,6 @@
-/* The news of a run, for a program that watches it from outside, such as insitu-view: report.json in each database of the
- * scene. It holds the last step's cycle, time and error, the scene's state with the error of its last edit, the scene's
- * parameters, and the last warnings. docs/live.md describes it.
+/* The news of a run, for a program that watches it from outside, such as insitu-view: report.json in each database of
+ * the scene. It holds the last step's cycle, time and error, the scene's state with the error of its last edit, the
+ * scene's parameters, and the last warnings. docs/live.md describes it.
  *
  * Rank 0 makes the text at the end of a step that has news or has drawn pictures; the writer puts it in place after the
  * step's pictures. A database without a folder, as before its first picture, gets none. */
@@ -19,9 +19,9 @@ enum { SESSION_NEWS_LINES = 64 };
 
 /* Rank 0's. */
 typedef struct session_news {
-    bool is_new;                       /* since the last text was made */
-    int64_t count;                     /* of warnings so far; the last SESSION_NEWS_LINES are kept */
-    char *lines[SESSION_NEWS_LINES];   /* warning i is at i % SESSION_NEWS_LINES; NULL: there was no memory for it */
+    bool is_new;                     /* since the last text was made */
+    int64_t count;                   /* of warnings so far; the last SESSION_NEWS_LINES are kept */
+    char *lines[SESSION_NEWS_LINES]; /* warning i is at i % SESSION_NEWS_LINES; NULL: there was no memory for it */
     int64_t cycles[SESSION_NEWS_LINES];
     base_error error; /* of the last step that had some error, or drew without */
 } session_news;
