@@ -406,11 +406,14 @@ static void shells_beside_solids_do_not_count(void **state)
 
 /* ---- the whole ------------------------------------------------------------------------------------------------ */
 
-static const char *work_folder = ".";
-
-static int run(void)
+static int begin_tests(void **state)
 {
-    if (!enter_folder(work_folder, "plane")) return 1;
+    (void)state;
+    return enter_folder("plane") ? 0 : 1;
+}
+
+int main(int argc, char **argv)
+{
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_colour_map_of_the_field),
                                        cmocka_unit_test(what_the_scene_says_comes_first),
                                        cmocka_unit_test(layers_that_show_nothing_are_told),
@@ -419,11 +422,5 @@ static int run(void)
                                        cmocka_unit_test(statistics_weigh_shells_by_area),
                                        cmocka_unit_test(conditions_weigh_shells_by_area),
                                        cmocka_unit_test(shells_beside_solids_do_not_count)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    if (argc > 1) work_folder = argv[1];
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

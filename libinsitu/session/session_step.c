@@ -256,7 +256,7 @@ static void tell_news(insitu_session *s)
     base_error error = {.status = INSITU_OK};
     *files = (session_files){.scene = &file->scene, .news = text};
     files->moment.cycle = s->report.numbers.cycle;
-    session_writer_give(&s->writer, files, &s->report, &error);
+    session_writer_give(&s->writer, files, &error);
     session_writer_note(&s->writer, s->report.numbers.cycle, &error);
 }
 

@@ -270,7 +270,7 @@ static bool camera_by_bounds(const session_extent *data, const scene_image *imag
         memcpy(extent.lower, c->lower, sizeof extent.lower);
         memcpy(extent.upper, c->upper, sizeof extent.upper);
         for (int a = 0; a < 3; a++) half[a] = 0.5 * c->upper[a] - 0.5 * c->lower[a];
-        extent.half_diagonal = length(half);
+        extent.half_diagonal = vector3_length(half);
     }
     const int axis = session_flat_axis(&extent);
     if (axis >= 0 && c->orbit.view_count == 0) face_flat_data(axis, c);
