@@ -86,7 +86,8 @@ static const char every_key[] =
     "           clip: {sphere: {centre: [1, -2, 3], radius: 2.5}, keep: outside}}\n"
     "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
     "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
-    "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}],\n"
+    "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1},\n"
+    "                {normal: [0, 1, 0], offsets: [1, 2]}, {normal: [0, 0, 1], count: 3}],\n"
     "                clip: {box: [[0, 0, 0], [9, 9, 9]], keep: inside}}\n"
     "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5,\n"
     "                  edges: {width: 2, colour: [0, 0.5, 1]},\n"
@@ -538,6 +539,31 @@ static void surfaces_have_their_colours(void **state)
 }
 
 /* A normal of any length, and of numbers whose squares are none. */
+/* An entry of the list may be many planes: at offsets, or spread over the data. */
+static void planes_come_in_numbers(void **state)
+{
+    (void)state;
+    static const double offsets[] = {-1, 0.5, 2}, shares[] = {-0.75, -0.25, 0.25, 0.75};
+    scene s;
+    parse_good("images:\n"
+               "- name: a\n"
+               "  layers:\n"
+               "  - slice: {field: p, planes: [{normal: x, point: [1, 2, 3], offsets: [-1, 0.5, 2]}, {normal: -z, "
+               "count: 4}]}\n"
+               "  - slice: {field: p, planes: {normal: y, count: 1}}\n",
+               &s);
+    const scene_slice *slice = s.images[0].slices;
+    assert_int_equal(slice[0].plane_count, 7);
+    for (int i = 0; i < 7; i++) {
+        const scene_plane *plane = &slice[0].planes[i];
+        check_vector(plane->normal, i < 3, 0, i < 3 ? 0 : -1);
+        assert_true(plane->has_point == (i < 3) && fabs(plane->offset - (i < 3 ? offsets[i] : 0)) <= 0);
+        assert_true(fabs(plane->share - (i < 3 ? 0 : shares[i - 3])) <= 0); /* quarters are exact */
+    }
+    assert_true(slice[1].plane_count == 1 && slice[1].planes[0].share == 0);
+    scene_free(&s);
+}
+
 static void slices_have_planes_of_unit_normals(void **state)
 {
     (void)state;
@@ -862,6 +888,39 @@ static const struct bad_file {
      "            - {normal: [0, 0, 0]}",
      15,
      {"planes[1].normal: [0, 0, 0] has no direction", "any length but 0"}},
+    {11, "      - slice: {field: f, planes: {normal: x, count: 0}}", 11, {"planes[0].count: \"0\"", "from 1 to 64"}},
+    {11,
+     "      - slice: {field: f, planes: {normal: x, count: 3, offset: 1}}",
+     11,
+     {"planes[0].count: given beside offset,"}},
+    {11,
+     "      - slice: {field: f, planes: {normal: x, count: 3, offsets: [1]}}",
+     11,
+     {"count: given beside offsets,"}},
+    {11,
+     "      - slice: {field: f, planes: {normal: x, count: 3, point: [0, 0, 0]}}",
+     11,
+     {"count: given beside point,"}},
+    {11,
+     "      - slice: {field: f, planes: {normal: x, offset: 0, offsets: [1]}}",
+     11,
+     {"offsets: given beside offset,"}},
+    {11,
+     "      - slice: {field: f, planes: {normal: x, offsets: []}}",
+     11,
+     {"planes[0].offsets: a list of 0", "1 to 64"}},
+    {11,
+     "      - slice: {field: f, planes: {normal: x, offsets: 1}}",
+     11,
+     {"planes[0].offsets: \"1\"", "a list of 1 to 64 numbers"}},
+    {11,
+     "      - slice: {field: f, planes: [{normal: x, count: 40}, {normal: y, count: 25}]}",
+     11,
+     {"67 isovalues, planes and outer"}},
+    {8,
+     "    clip: {planes: [{normal: x, count: 2}]}",
+     8,
+     {"clip.planes[0]: the key \"count\" is unknown", "normal, point, offset"}},
     {11, "      - slice: {field: f, planes: [{normal: w}]}", 11, {"planes[0].normal: \"w\"", "a list of 3 numbers"}},
     {11, "      - slice: {field: f, planes: [{normal: [0, 1]}]}", 11, {"normal: a list of 2", "a list of 3"}},
     {11, "      - slice: {field: f, planes: [{normal: [0, 1, 0], point: 3}]}", 11, {"planes[0].point: \"3\""}},
@@ -1290,6 +1349,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(sampling_is_by_what_is_said),
         cmocka_unit_test(shadows_are_by_all_lights_that_do_not_say_otherwise),
         cmocka_unit_test(scene_layer_defaults_hold),
+        cmocka_unit_test(planes_come_in_numbers),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(statistics_and_conditions_are_read),

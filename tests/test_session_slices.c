@@ -124,6 +124,32 @@ static const char three_planes[] =
               SLICE("", "{normal: [0, 3, 0], point: [0, -0.6, 0]}"));
 static const plane three[3] = {{{1. / 3, 2. / 3, -2. / 3}, -0.4}, {{1, 1, 4}, 0.1 + 0.3 + 2.4}, {{0, 1, 0}, -0.6}};
 
+/* Planes of a number are spread over the cube: along its diagonal this goes from -sqrt(3) to sqrt(3). */
+static void planes_in_numbers_are_true(void **state)
+{
+    (void)state;
+    static const char scene[] = IMAGE(
+        SLICE("", "{normal: [1, 1, 1], count: 3}, {normal: [0, -2, 0], point: [9, 0.5, 9], offsets: [-0.25, 0.75]}"));
+    const double n = 1 / sqrt(3);
+    const plane planes[5] = {{{1, 1, 1}, -2},
+                             {{1, 1, 1}, 0},
+                             {{1, 1, 1}, 2},
+                             {{0, -1, 0}, -0.75},
+                             {{0, -1, 0}, 0.25}}; /* 2 = 2/3 sqrt(3) / n */
+    session_input whole = {0};
+    bool is_well = true;
+    assert_true(fabs(2 * n - 2. / 3 * sqrt(3)) < 1e-15);
+    make_whole(TEST_HEXES, 0, &whole);
+    const char *file = write_scene(scene);
+    if (own_rank == 0) {
+        caught_picture picture = draw(MPI_COMM_SELF, file, &whole, NULL);
+        is_well = is_truth(&picture, planes, 5);
+        free_caught(&picture);
+    }
+    everywhere(is_well);
+    input_free(&whole);
+}
+
 static void planes_are_one_picture_of(test_mesh_kind kind)
 {
     session_input whole = {0};
@@ -398,6 +424,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(planes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(planes_in_numbers_are_true),
         cmocka_unit_test(many_isovalues_and_planes_are_all_drawn),
         cmocka_unit_test(planes_in_faces_are_drawn_once),
         cmocka_unit_test(planes_on_the_border_are_drawn),

@@ -46,7 +46,7 @@ typedef struct session_plane {
     double normal[3]; /* of length 1 */
     double point[3];  /* on it */
     bool is_central; /* the point is this far along the normal from the middle of the data's bounds, and goes with it */
-    double offset;
+    double offset, share; /* share: as a scene_plane has it */
 } session_plane;
 
 /* A scalar that a layer uses: a component or the magnitude of a field, as it is or recentred to vertices; or the

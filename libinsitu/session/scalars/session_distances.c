@@ -1,5 +1,6 @@
 #include "session_distances.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "memory.h"
@@ -16,14 +17,17 @@ static void move_along(const double from[3], const double normal[3], double offs
 
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3])
 {
-    double middle[3];
-    for (int axis = 0; axis < 3; axis++) middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
-    move_along(plane->has_point ? plane->point : middle, plane->normal, plane->offset, point);
+    double middle[3], half = 0; /* of the extent of the bounds along the normal */
+    for (int axis = 0; axis < 3; axis++) {
+        middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
+        half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);
+    }
+    move_along(plane->has_point ? plane->point : middle, plane->normal, plane->offset + plane->share * half, point);
 }
 
 static session_plane plane_of_scene(const scene_plane *in)
 {
-    session_plane out = {.is_central = !in->has_point, .offset = in->offset};
+    session_plane out = {.is_central = !in->has_point, .offset = in->offset, .share = in->share};
     memcpy(out.normal, in->normal, sizeof out.normal);
     move_along(in->point, in->normal, in->offset, out.point);
     return out;
@@ -37,7 +41,7 @@ static bool are_equal(const double a[3], const double b[3])
 static bool is_same_plane(const session_plane *a, const session_plane *b)
 {
     if (a->is_central != b->is_central || !are_equal(a->normal, b->normal)) return false;
-    return a->is_central ? a->offset == b->offset : are_equal(a->point, b->point);
+    return a->is_central ? a->offset == b->offset && a->share == b->share : are_equal(a->point, b->point);
 }
 
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)

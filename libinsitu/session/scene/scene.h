@@ -179,7 +179,10 @@ typedef struct scene_plane {
     bool has_point;   /* else it goes by the middle of the data's bounds */
     double point[3];
     double offset; /* along the normal, from the point to the plane */
+    double share; /* without a point: moved by this share of half the data's extent along the normal besides; -1 .. 1 */
 } scene_plane;
+
+enum { SCENE_MAX_PLANES = 64 };
 
 typedef enum scene_clip_kind { SCENE_CLIP_PLANE, SCENE_CLIP_BOX, SCENE_CLIP_SPHERE } scene_clip_kind;
 typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;

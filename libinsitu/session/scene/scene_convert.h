@@ -117,6 +117,8 @@ insitu_status scene_convert_plane(const scene_document *d, const char *path, int
 /* height: of the picture. */
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out);
+/* Counts the planes of all entries of its list. */
+int scene_count_planes(const scene_file_slice *in);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
                                   scene_slice *out);
 

@@ -134,7 +134,7 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
     counts->slices += layer->slice != NULL;
     counts->surfaces += layer->surface != NULL;
     counts->values += layer->isosurface ? layer->isosurface->values_count : 0;
-    counts->values += layer->slice ? layer->slice->planes_count : layer->surface != NULL;
+    counts->values += layer->slice ? scene_count_planes(layer->slice) : layer->surface != NULL;
     if (counts->values > max_isovalues)
         return scene_bad(d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
                          counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", max_isovalues);

@@ -80,6 +80,9 @@ typedef struct scene_file_colour_by {
 typedef struct scene_file_plane {
     double *normal, *point; /* 3 */
     double *offset;
+    double *offsets; /* of slices alone, as count is */
+    int offsets_count;
+    int *count;
 } scene_file_plane;
 
 typedef struct scene_file_sphere {

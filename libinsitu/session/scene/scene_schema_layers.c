@@ -109,13 +109,26 @@ static const scene_form range_forms[] = {
               "first output's pictures (of a sweep's others in NAME.1.ranges and so on), so that a run that is "       \
               "started again goes on with it (delete it to begin anew); or percentiles.",                              \
       .by_default = RANGE_DEFAULT, TAKES(range_forms))
-#define PLANE_KEYS(X)                                                                                                  \
+#define CLIP_PLANE_KEYS(X)                                                                                             \
     X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
       .help = "The direction at right angles to the plane, of any length but 0.")                                      \
     X(NUMBERS("point", scene_file_plane, point, 3), .help = "A point of the plane, in scene units.",                   \
       .by_default = "the middle of the bounds of all the data, at each drawn step")                                    \
     X(CYAML_FIELD_FLOAT_PTR("offset", OPTIONAL, scene_file_plane, offset),                                             \
       .help = "How far the plane is moved from `point` along `normal`, in scene units.", .by_default = "`0`")
+DEFINE_MAPPING(clip_plane, "planes", CLIP_PLANE_KEYS);
+
+static const cyaml_schema_value_t clip_plane = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_plane, clip_plane_fields)};
+
+#define PLANE_KEYS(X)                                                                                                  \
+    CLIP_PLANE_KEYS(X)                                                                                                 \
+    X(CYAML_FIELD_SEQUENCE("offsets", POINTER, scene_file_plane, offsets, &number, 1, SCENE_MAX_PLANES),               \
+      .help = "In place of `offset`: a plane for each.", .by_default = "by `offset`")                                  \
+    X(CYAML_FIELD_INT_PTR("count", OPTIONAL, scene_file_plane, count),                                                 \
+      .help = "In place of a place: so many planes, which cut the bounds of all the data along `normal` into layers "  \
+              "of equal thickness, of which each plane is in the middle; at each drawn step.",                         \
+      .by_default = "one plane", .low = 1, .high = SCENE_MAX_PLANES)
 DEFINE_MAPPING(plane, "planes", PLANE_KEYS);
 
 static const cyaml_schema_value_t plane = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_plane, plane_fields)};
@@ -130,10 +143,10 @@ static const cyaml_strval_t keep_words[] = {{"inside", SCENE_KEEP_INSIDE}, {"out
 DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
 
 #define CLIP_KEYS(X)                                                                                                   \
-    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_clip, planes, &plane, 1, 10),                                 \
+    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_clip, planes, &clip_plane, 1, 10),                            \
       .help = "Planes. What lies on the side of any of them that its `normal` points to is cut away. A slice in the "  \
               "plane itself is not.",                                                                                  \
-      .by_default = "none", .child = &plane_mapping)                                                                   \
+      .by_default = "none", .child = &clip_plane_mapping)                                                              \
     X(CYAML_FIELD_SEQUENCE_FIXED("box", POINTER, scene_file_clip, box, &colour, 2),                                    \
       .help = "Two corners, `[[x, y, z], [x, y, z]]`, the first less than the other along each axis. What lies "       \
               "outside of the box is cut away.",                                                                       \

@@ -34,14 +34,53 @@ insitu_status scene_convert_plane(const scene_document *d, const char *path, int
     return INSITU_OK;
 }
 
+int scene_count_planes(const scene_file_slice *in)
+{
+    int count = 0;
+    for (int i = 0; i < in->planes_count; i++) {
+        const scene_file_plane *plane = &in->planes[i];
+        count += plane->offsets ? plane->offsets_count : plane->count ? *plane->count : 1;
+    }
+    return count;
+}
+
+static insitu_status check_places(const scene_document *d, const char *path, int index, const scene_file_plane *in)
+{
+    char plane[SCENE_PATH_SIZE];
+    snprintf(plane, sizeof plane, "%s.planes[%d]", path, index);
+    if (in->offsets && in->offset)
+        return scene_bad(d, plane, "offsets", "given beside offset, expected one of the two");
+    if (in->count && (in->offset || in->offsets || in->point))
+        return scene_bad(d, plane, "count", "given beside %s, expected one of the two",
+                         in->point    ? "point"
+                         : in->offset ? "offset"
+                                      : "offsets");
+    return INSITU_OK;
+}
+
+/* An entry of the list, which may be several planes. */
+static insitu_status add_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
+                                scene_slice *out)
+{
+    scene_plane plane = {.share = 0};
+    insitu_status status = check_places(d, path, index, in);
+    if (!status) status = scene_convert_plane(d, path, index, in, &plane);
+    const int count = in->offsets ? in->offsets_count : in->count ? *in->count : 1;
+    for (int i = 0; i < count && !status; i++) {
+        if (in->offsets) plane.offset = in->offsets[i];
+        if (in->count) plane.share = (2.0 * i + 1) / count - 1;
+        out->planes[out->plane_count++] = plane;
+    }
+    return status;
+}
+
 static insitu_status convert_planes(const scene_document *d, const char *path, const scene_file_slice *in,
                                     scene_slice *out)
 {
     insitu_status status = INSITU_OK;
-    out->planes = base_calloc((size_t)in->planes_count, sizeof *out->planes);
+    out->planes = base_calloc((size_t)scene_count_planes(in), sizeof *out->planes);
     if (!out->planes) return scene_no_memory(d);
-    for (int i = 0; i < in->planes_count && !status; i++)
-        status = scene_convert_plane(d, path, i, &in->planes[i], &out->planes[out->plane_count++]);
+    for (int i = 0; i < in->planes_count && !status; i++) status = add_planes(d, path, i, &in->planes[i], out);
     return status;
 }
 
