@@ -27,7 +27,7 @@ typedef struct composition {
     comp_grid grid;
     comp_strips strips;
     comp_owners owners;
-    uint64_t *loads; /* of all ranks, in fragments */
+    uint64_t *loads; /* the loads of all ranks, in fragments */
 } composition;
 
 static composition composition_of(const comp_group *group, const float background[4], image *out,

@@ -22,13 +22,13 @@ extern const comp_machine comp_usual_machine;
 typedef struct comp_load {
     int64_t fragments;
     double bytes;          /* that a fragment takes on its way (comp_sheet.h) */
-    uint32_t block_pixels; /* of a block, all of which one rank owns (comp_grid.h) */
+    uint32_t block_pixels; /* the pixels of a block, all of which one rank owns (comp_grid.h) */
 } comp_load;
 
 /* The cost of a route for the busiest rank. */
 typedef struct comp_cost {
     double messages; /* that it sends, empty ones included */
-    double bytes;    /* of all messages */
+    double bytes;    /* bytes of all messages */
     double seconds;
 } comp_cost;
 

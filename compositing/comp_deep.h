@@ -12,7 +12,7 @@
 #include "image.h"
 
 typedef struct comp_deep_pixel {
-    uint32_t pixel, count; /* of samples */
+    uint32_t pixel, count; /* count: the number of samples */
 } comp_deep_pixel;
 
 /* A thread's samples on one owner, pixel after pixel. All zero: empty. */

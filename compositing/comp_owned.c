@@ -17,7 +17,7 @@ typedef struct merge_scratch {
     comp_sheet all, other, pixels;
     fragment_list left, listed;                                  /* left: .pixel is the number in the strip */
     uint16_t mixed[COMP_ROWS];                                   /* pixels that have something left */
-    uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS]; /* of such a pixel's fragments in the list */
+    uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS]; /* where such a pixel's fragments are in the list */
     comp_writer writer;
 } merge_scratch;
 

@@ -35,7 +35,7 @@ typedef enum comp_schedule {
 /* How ranks lie on nodes: the same number on each, either one node after the other or in turn. ranks is 1 where neither
  * is so. */
 typedef struct comp_nodes {
-    int ranks; /* of each node */
+    int ranks; /* the ranks of each node */
     bool is_cyclic;
 } comp_nodes;
 

@@ -42,7 +42,7 @@ typedef struct cell_view {
     const wave_cell_shape *shape;
     const local_index *vertex;
     const real *face;         /* normal and area of each */
-    const int32_t *neighbour; /* of each face */
+    const int32_t *neighbour; /* the neighbour across each face */
 } cell_view;
 
 static layer_table make_layers(const wave_grid *grid)

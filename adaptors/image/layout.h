@@ -28,12 +28,12 @@ struct placed_line {
 
 struct block {
     block_kind kind;
-    int index; /* of the decoration of its kind */
-    int size;  /* of its words, pixels */
+    int index; /* the decoration's number among those of its kind */
+    int size;  /* the height of its words, pixels */
     area room;
     std::vector<placed_line> lines;
-    area gradient;          /* of a bar */
-    std::vector<int> ticks; /* of a bar: those whose numbers have room, in rising order */
+    area gradient;          /* a bar's colours */
+    std::vector<int> ticks; /* the ticks of a bar whose numbers have room, in rising order */
 };
 
 struct layout {

@@ -20,7 +20,7 @@ enum { COMP_MESSAGE_BYTES = 1 << 17, COMP_MESSAGE_HEAD = 4, COMP_PARCEL_HEAD = 1
 typedef struct comp_message {
     struct comp_message *next;
     int rank;  /* that it comes from or goes to */
-    int bytes; /* of data, without the slack behind them */
+    int bytes; /* bytes of data, without the slack behind them */
     unsigned char data[];
 } comp_message;
 
@@ -46,7 +46,7 @@ bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *
 typedef struct comp_writer {
     comp_messages messages;
     int rank;
-    size_t room;   /* of the last message */
+    size_t room;   /* the room of the last message */
     size_t parcel; /* where the last parcel begins; 0: there is none */
 } comp_writer;
 

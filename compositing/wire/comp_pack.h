@@ -8,8 +8,8 @@
 
 /* Who owns the blocks of a picture. */
 typedef struct comp_owners {
-    int32_t *places; /* of each block; -1: nobody has anything there */
-    int count;       /* of places that may own some */
+    int32_t *places; /* the place of each block; -1: nobody has anything there */
+    int count;       /* the number of places that may own some */
 } comp_owners;
 
 /* Writes the rank's fragments for other owners into messages. *out gets those to the partners of the first round, or,

@@ -33,7 +33,7 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip);
 /* A thread's memory for comp_strips_sheets(). All zero: empty. */
 typedef struct comp_layers {
     comp_sheet sheet;
-    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* of each pixel's fragments in order */
+    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* the end of each pixel's fragments, in order */
     const fragment **order;
     int64_t capacity;
 } comp_layers;

@@ -16,7 +16,8 @@
 #include <stdbool.h>
 
 static _Thread_local fenv_t environment;
-static atomic_int first_core = -1; /* of the thread that opened the last region; another session's does no harm */
+/* The core of the thread that opened the last region; another session's does no harm. */
+static atomic_int first_core = -1;
 static atomic_llong regions;
 
 static void leave_core(int core)

@@ -40,8 +40,8 @@ struct insitu_session {
     session_events events;
     session_report report;
     bool has_stepped;
-    double last_time; /* of the last step */
-    base_error error; /* of the last call that failed since the last step began */
+    double last_time; /* the time of the last step */
+    base_error error; /* the error of the last call that failed since the last step began */
 };
 
 #endif

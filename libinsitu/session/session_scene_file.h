@@ -22,7 +22,7 @@ typedef struct session_scene_file {
 /* Where a scene comes from. Rank 0's counts. */
 typedef struct session_scene_source {
     const char *call; /* the public call, for messages */
-    const char *path; /* of a file; NULL where text is given, or nothing is */
+    const char *path; /* the file's path; NULL if text is given, or nothing */
     const char *text; /* YAML; NULL where a path is given, or nothing is */
 } session_scene_source;
 

@@ -12,7 +12,7 @@
 /* Cells exchanged with one other rank. */
 typedef struct wave_link {
     int rank;
-    int32_t send_begin, send_end;       /* of wave_mesh.sends */
+    int32_t send_begin, send_end;       /* the part of wave_mesh.sends */
     int32_t receive_begin, receive_end; /* halo cells */
 } wave_link;
 
@@ -31,8 +31,8 @@ typedef struct wave_mesh {
     void *offsets;                  /* cells + 1; NULL where uniform */
     int64_t connectivity_count;
     int64_t *face_offsets; /* own_cells + 1; NULL where uniform: faces of a cell are those of its shape, in order */
-    int32_t *neighbours;   /* of each face of each own cell: the cell beyond, or -1 at a wall */
-    int64_t face_count;    /* of own cells, each cell counting its own */
+    int32_t *neighbours;   /* for each face of each own cell, the cell beyond, or -1 at a wall */
+    int64_t face_count;    /* the faces of own cells, each cell counting its own */
     int64_t unmatched;     /* faces of own cells that lack their other cell, or have two: 0 for a mesh that conforms */
     int64_t *around_offsets; /* own_vertices + 1 */
     int32_t *around;         /* the cells around each vertex of an own cell, by rising cell id */

@@ -15,7 +15,7 @@ typedef struct wave_partition {
     wave_lattice lattice;
     wave_partition_kind kind;
     int ranks;
-    int blocks[3]; /* of WAVE_BLOCK */
+    int blocks[3]; /* the numbers of blocks of WAVE_BLOCK */
 } wave_partition;
 
 wave_partition wave_partition_make(const wave_lattice *lattice, wave_partition_kind kind, int ranks);

@@ -26,7 +26,7 @@ class ensight_stream
     int64_t integer();
     void integers(int64_t *values, int64_t count); /* in one record, none negative */
     int64_t sum_of_integers(int64_t count);        /* in one record */
-    void skip_numbers(int64_t count);              /* of 4 bytes, in one record */
+    void skip_numbers(int64_t count);              /* skips numbers of 4 bytes in one record */
 
     [[noreturn]] void refuse(const std::string &why) const;
 

@@ -31,8 +31,8 @@ typedef struct closed_faces {
     int *entry;        /* its vertex, by number */
     int *face_of;      /* an entry's face */
     int64_t *vertices; /* the grid's index of each number */
-    int *turn;         /* of faces: 1 or -1; from closed_faces_turn_outward() on, 1 where they run around outward */
-    int *piece;        /* of faces: the connected piece */
+    int *turn;         /* 1 or -1 for each face; from closed_faces_turn_outward() on, 1 if it runs around outward */
+    int *piece;        /* the connected piece of each face */
     closed_triangle *triangles;
     closed_edge *edges; /* 2 * table_size, by hash */
     /* For the functions below. */

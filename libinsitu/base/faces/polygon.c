@@ -20,7 +20,7 @@ typedef struct polygon_work {
     int *order;
     double (*places)[3]; /* from the least corner, about 1 wide */
     double (*flat)[2];   /* seen along the normal, around which the order runs counterclockwise */
-    int *next, *before;  /* of those that are left */
+    int *next, *before;  /* linked among the corners that are left */
     char *is_ear;
     int (*triangles)[3];
     int triangle_count;
@@ -115,7 +115,7 @@ static bool is_fan(const polygon_work *w, double normal[3])
     return true;
 }
 
-/* Of four corners: exactly one points inwards. */
+/* Tells whether exactly one of four corners points inwards. */
 static bool is_concave_quad(const polygon_work *w)
 {
     double areas[4][3], normal[3] = {0, 0, 0}, sides[4][3];

@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* of a table that is continued: some four million pictures */
+enum { MOST_BYTES = 1 << 28 }; /* the largest table that is continued: some four million pictures */
 
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error)

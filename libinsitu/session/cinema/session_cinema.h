@@ -18,20 +18,20 @@
 #include "scene.h"
 
 typedef struct session_table {
-    const scene_database *database; /* of the scene */
-    char *text;                     /* of data.csv: whole lines */
+    const scene_database *database; /* the scene's */
+    char *text;                     /* the whole lines of data.csv */
     size_t size, capacity;
     bool is_begun;      /* text has the folder's earlier lines */
     bool is_open;       /* a line of this step is in it */
     bool is_changed;    /* since the files were written */
     bool has_page;      /* this session has written index.html */
-    int64_t last_cycle; /* of its last line */
+    int64_t last_cycle; /* the cycle of its last line */
 } session_table;
 
 /* Rank 0's. */
 typedef struct session_cinema {
     bool has_begun;
-    int64_t first_cycle; /* of the session, or of the scene since it was edited */
+    int64_t first_cycle; /* the first cycle of the session, or of the scene since it was edited */
     int count;
     session_table *tables; /* one a database of the scene; none before the first picture */
 } session_cinema;

@@ -18,7 +18,7 @@ typedef struct session_team {
     int each_node_ranks; /* ranks on every node, if all nodes have as many and ranks are placed node by node or in turn;
                             else 1 */
     bool is_round_nodes; /* ranks are placed in turn: neighbours in rank are on different nodes */
-    int threads;         /* of this rank in this step; 0 before the first */
+    int threads;         /* this rank's threads in this step; 0 before the first */
 } session_team;
 
 /* Duplicates the caller's communicator, twice. What was duplicated when an error came is in *out, to be freed.

@@ -21,7 +21,7 @@ typedef struct session_decorations {
     insitu_colour_bar bars[SESSION_MAX_BARS];
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];
-    const scene_field *fields[SESSION_MAX_BARS]; /* of the bars */
+    const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the bars show */
     insitu_stroke *strokes;                      /* room for the outline's boxes and the rulers */
     insitu_label ruler_labels[SESSION_RULER_LABELS];
 } session_decorations;

@@ -11,7 +11,7 @@ enum { SESSION_MAX_TICKS = 12 };
 /* A range of values along a scale, low < high; a logarithmic one has low > 0. */
 typedef struct session_scale {
     render_scale kind;
-    double threshold; /* of RENDER_SYMLOG */
+    double threshold; /* the threshold of RENDER_SYMLOG */
     double low, high;
     scene_number_form numbers;
 } session_scale;

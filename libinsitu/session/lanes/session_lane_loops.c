@@ -21,8 +21,8 @@ typedef struct lane_source {
     const char *connectivity, *ghosts;
     uintptr_t axes[3]; /* address of what an index of 0 would be, that of no vertex where they count from 1 */
     int64_t connectivity_stride, ghosts_stride, stride;
-    int64_t base, last; /* of the indices */
-    int type, count;    /* of vertices */
+    int64_t base, last; /* bounds of the indices */
+    int type, count;    /* count: the number of vertices */
     bool wide_index, wide_number;
 } lane_source;
 
@@ -38,7 +38,7 @@ typedef struct lane_bounds {
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* Of a block's volumes, as sums of corners. */
+/* Volumes of a block's cells, as sums of corners. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
     doubles least;

@@ -13,7 +13,7 @@
 #if defined(__AVX512F__)
 #define LANE_WIDTH 8
 #else
-#define LANE_WIDTH 4 /* of two registers on SSE2 */
+#define LANE_WIDTH 4 /* two registers on SSE2 */
 #endif
 
 #define LANE_INLINE static inline __attribute__((always_inline))

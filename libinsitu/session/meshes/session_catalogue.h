@@ -21,7 +21,7 @@ typedef struct session_catalogue_field {
 
 /* A vertex that hangs on a face: its value is the sum of those of the face's corners, times weights. */
 typedef struct session_hanging_vertex {
-    int64_t group;      /* of the vertices that are this one (session_hanging.h) */
+    int64_t group;      /* the group of the vertices that are this one (session_hanging.h) */
     int64_t corners[4]; /* groups, or places among the values that come from other ranks */
     double weights[4];
     bool is_received;
@@ -38,7 +38,7 @@ typedef struct session_border {
     uint64_t cells; /* session_catalogue_mesh.cells that it is of; 0: not known */
     int64_t face_count, vertex_count;
     session_face *faces; /* that one cell alone has, over all ranks */
-    int64_t *vertices;   /* of faces that this rank has once */
+    int64_t *vertices;   /* vertices of faces that this rank has once */
     int64_t twin_count;  /* found again where vertices move: session_hanging.twins */
     session_twin *twins; /* in the order of vertices */
 } session_border;
@@ -46,7 +46,7 @@ typedef struct session_border {
 /* This rank's hanging vertices of the meshes of a joint, and what it sends to others for theirs. */
 typedef struct session_hanging {
     uint64_t places;         /* session_joint.places that it is of; 0: not known */
-    session_border *borders; /* of each mesh; NULL: none are known */
+    session_border *borders; /* one for each mesh; NULL: none are known */
     uint64_t twins;          /* the places that the borders' twins are of */
     int64_t count, total;    /* on this rank, on all */
     session_hanging_vertex *vertices;
@@ -62,7 +62,7 @@ typedef struct session_catalogue_mesh {
     base_error *fault;     /* likewise: then the step does without the mesh, but knows the names of its fields */
     int field_count;
     session_catalogue_field *fields;
-    uint64_t apart;         /* of meshes with ids, session_joint.name of this mesh alone; else 0 */
+    uint64_t apart;         /* session_joint.name of this mesh alone, if it has ids; else 0 */
     uint64_t cells, places; /* hashes of when cells and coordinates were last new on each rank; 0: not known */
     session_homes homes;    /* this rank's view of the parts; known where it has been asked for at these places */
 } session_catalogue_mesh;
@@ -73,9 +73,9 @@ typedef struct session_joint {
     uint64_t name; /* scene_field.joined, or session_catalogue_mesh.apart */
     int count;
     session_catalogue_mesh **meshes; /* by name */
-    bool by_id;                      /* of one mesh: its vertices are the same by global ids */
-    uint64_t places;                 /* of all its meshes */
-    session_homes own_homes;         /* of several meshes */
+    bool by_id;                      /* the joint is one mesh, whose vertices are the same by global ids */
+    uint64_t places;                 /* the places of all its meshes */
+    session_homes own_homes;         /* used by a joint of several meshes */
     const session_homes *homes;
     session_hanging hanging;
 } session_joint;
@@ -86,7 +86,7 @@ typedef struct session_catalogue {
     bool are_derived;     /* the derived fields of the present scene are in it */
     bool are_joined;      /* joints are those of the present scene */
     bool are_parts_known; /* the meshes' cells and places are the present ones */
-    base_error *fault;    /* of which it is not known what is wrong with it: no image can be drawn */
+    base_error *fault;    /* a fault whose cause is not known, with which no image can be drawn */
     int mesh_count, joint_count;
     session_catalogue_mesh *meshes;
     session_joint **joints;

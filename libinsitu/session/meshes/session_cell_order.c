@@ -37,7 +37,7 @@ static bool has_turned_cells(const session_mesh *mesh)
 /* Entries of the caller's connectivity that cells use, and where they stand. */
 typedef struct cell_rows {
     const grid_array *connectivity;
-    int64_t count, row, used; /* of each row so many are used */
+    int64_t count, row, used; /* `used` entries of each row are read */
 } cell_rows;
 
 static int64_t entry_of(const cell_rows *rows, int64_t i)

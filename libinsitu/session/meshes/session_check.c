@@ -47,7 +47,7 @@ typedef enum face_fault {
 } face_fault;
 
 typedef struct face_place {
-    int64_t count; /* of the cell's faces */
+    int64_t count; /* the number of the cell's faces */
     int64_t face;  /* index as it stands in the connectivity */
     int64_t first, next;
     int64_t vertex, other; /* at fault; the ends of an edge */

@@ -43,7 +43,7 @@ typedef struct session_extremes {
 
 /* A plane that meshes are cut by. */
 typedef struct session_plane {
-    double normal[3]; /* of length 1 */
+    double normal[3]; /* has length 1 */
     double point[3];  /* on it */
     bool is_central; /* the point is this far along the normal from the middle of the data's bounds, and goes with it */
     double offset, share; /* share: as a scene_plane has it */
@@ -76,7 +76,7 @@ typedef struct session_scalar {
     bool has_checksum;
     uint64_t checksum;
     uint64_t sample;     /* a checksum of a few of the values */
-    int64_t version;     /* of the values: one more after each change that checksums have seen */
+    int64_t version;     /* counts the changes of the values that checksums have seen */
     bool has_own_ranges; /* the tree nodes' own, else pairs */
     float *pairs;        /* NULL until computed */
     bool are_ranges_stale;
@@ -104,13 +104,13 @@ typedef struct session_threshold {
  * pyramids on them; a declared copy (session_outer_mesh.h). */
 typedef struct session_outer {
     session_threshold threshold;
-    int64_t version; /* of the values that the faces are of, where there is a threshold */
+    int64_t version; /* the version of the values that the threshold has tested, if there is one */
     bool is_wanted;  /* by an image of this step */
     bool are_faces_known;
     int64_t face_count;
     session_face *faces;       /* in the order of the cells */
     struct session_mesh *mesh; /* NULL until made; its name is the mesh's */
-    double *coordinates;       /* of the mesh's vertices × 3 */
+    double *coordinates;       /* the mesh's vertices × 3 */
     int64_t *connectivity, *offsets;
     unsigned char *types;
     int64_t *loops;                         /* as render_part.loops */
@@ -129,10 +129,10 @@ typedef struct session_topology {
     int cell_type;
     bool has_own_faces;                                  /* those next are read, else the caller's */
     grid_array face_offsets, face_connectivity;          /* no data: there are no polyhedra */
-    int64_t connectivity_count, face_connectivity_count; /* of the arrays that are read, the caller's or these */
+    int64_t connectivity_count, face_connectivity_count; /* lengths of what is read, the caller's or these */
     int64_t cell_bytes, face_bytes;
-    int64_t polyhedron_count; /* of the caller's */
-    int64_t recognised_count; /* of them: read as tets, hexes, wedges or pyramids */
+    int64_t polyhedron_count; /* how many the caller gave */
+    int64_t recognised_count; /* how many of them are read as tets, hexes, wedges or pyramids */
 } session_topology;
 
 /* Vertices of its own for each corner of each cell, read in place of those that cells share (session_torn.h). A
@@ -169,13 +169,13 @@ typedef struct session_mesh {
     int field_count;
     session_field *fields;
 
-    int64_t cells_stamp, places_stamp; /* of session_meshes.stamp, when cells and coordinates were last new */
+    int64_t cells_stamp, places_stamp; /* session_meshes.stamp when cells and coordinates were last new */
     bool is_check_stale;
     bool is_topology_stale;    /* the tree is of other cells */
     bool is_geometry_stale;    /* the tree is of other coordinates */
-    double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
+    double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count; /* shells are drawn and flat */
-    double size_sum; /* of drawn cells: cube roots of volumes */
+    double size_sum; /* the sum of the cube roots of drawn cells' volumes */
     uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
 
     uint64_t apart; /* session_catalogue_mesh.apart */

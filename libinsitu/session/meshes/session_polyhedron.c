@@ -6,7 +6,7 @@
 #include <string.h>
 
 typedef struct cell_frame {
-    double mean[3]; /* of the vertices, each as often as faces have it */
+    double mean[3]; /* the mean of the vertices, each as often as faces have it */
     double least[3];
     double box; /* volume */
 } cell_frame;

@@ -418,7 +418,7 @@ typedef struct recognition {
     bool is_faulty;                /* some cell is wrong in some way */
     int64_t polyhedra, recognised; /* the polyhedra that were, and those that are others now */
     int64_t of_type[TYPES];        /* cells by their type, now */
-    int64_t entries;               /* of all cells, now */
+    int64_t entries;               /* the entries of all cells, now */
     unsigned char *types;
 } recognition;
 

@@ -34,8 +34,8 @@ typedef struct session_cell_faces {
     const session_face_table *table; /* NULL: of polyhedra, and of shells but a lattice's */
     int64_t count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
-    int64_t first; /* of the entries of connectivity */
-    int64_t size;  /* of a shell: its vertices; 0: it is none */
+    int64_t first; /* the first entry of connectivity */
+    int64_t size;  /* the number of a shell's vertices; 0: the cell is no shell */
 } session_cell_faces;
 
 static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t cell)

@@ -5,10 +5,10 @@
 #include "session_mesh.h"
 
 typedef struct session_coarse_face {
-    int count;           /* of corners: 3 or 4 */
+    int count;           /* the number of corners: 3 or 4 */
     double places[4][3]; /* around, from the least on, towards the lesser of its neighbours; of a triangle the last is
                             the third */
-    double normal[3];    /* of length 1, away from the cell */
+    double normal[3];    /* has length 1 and points away from the cell */
     double lower[3], upper[3];
     double area, width;
 } session_coarse_face;

@@ -28,7 +28,7 @@ enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
     session_coarse_face face;
-    int64_t groups[4]; /* of this rank's own; else -1 */
+    int64_t groups[4]; /* the groups if the face is this rank's own; else -1 */
     int source;        /* the rank that sent it, */
     int64_t number;    /* and its place in that rank's message */
 } searched_face;
@@ -54,10 +54,10 @@ typedef struct hanging_search {
     int64_t face_count, own_count, candidate_count;
     searched_face *faces; /* this rank's, then received ones */
     candidate *candidates;
-    double rounding; /* of coordinates */
+    double rounding; /* the rounding of coordinates */
     int64_t contact_count, contact_room;
     contact *contacts;
-    session_bins bins; /* of candidates */
+    session_bins bins; /* hold the candidates */
 } hanging_search;
 
 static void search_free(hanging_search *s)

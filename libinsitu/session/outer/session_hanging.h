@@ -20,7 +20,7 @@
  * of their drawn cells' vertices, are numbered through. */
 typedef struct session_hanging_basis {
     session_joint *joint;
-    const session_mesh *const *meshes; /* of each of the joint's; NULL: this rank has no part */
+    const session_mesh *const *meshes; /* the joint's meshes; NULL: this rank has no part of one */
     const int64_t *firsts;             /* the number of each one's first vertex */
     const int64_t *of_vertex;          /* the group of each vertex; -1: of no drawn cell */
     int64_t group_count;

@@ -25,14 +25,14 @@ typedef struct face_search {
     const session_mesh *mesh;
     int threads;
     unsigned char *is_hidden; /* a byte a cell, not 0 for those beyond the threshold; NULL: there is no threshold */
-    uint64_t *hashes;         /* of the mesh's vertices */
+    uint64_t *hashes;         /* one for each vertex of the mesh */
     uint64_t *slots;
     uint64_t mask;
     int64_t count;
     session_face *faces; /* whose slots are not empty */
     session_key *keys;
-    int64_t *groups; /* of equal keys */
-    int64_t *sizes;  /* of groups: faces */
+    int64_t *groups; /* faces with equal keys share a group */
+    int64_t *sizes;  /* the number of faces in each group */
 } face_search;
 
 static void search_free(face_search *s)

@@ -302,7 +302,7 @@ static void add_face(outer_work *w, const session_face *face)
 typedef struct outer_counts {
     int64_t cells, entries; /* entries of connectivity */
     int64_t loops;          /* entries of polygons' loops */
-    int64_t corners;        /* of one face */
+    int64_t corners;        /* the corners of one face */
 } outer_counts;
 
 static outer_counts count_most(const grid *g, const session_outer *outer)

@@ -18,7 +18,7 @@ typedef struct patch_faces {
     const session_mesh *mesh;
     const session_field *field;
     const session_vertex_numbers *numbers;
-    int64_t count;   /* of all patches */
+    int64_t count;   /* faces of all patches */
     int64_t *starts; /* count + 1: where the groups of each face begin */
     int64_t *groups; /* -1: of a vertex of no drawn cell */
     unsigned char *is_drawn;
@@ -27,7 +27,7 @@ typedef struct patch_faces {
 /* The vertices around a face. */
 typedef struct patch_face {
     session_face_row row;
-    int64_t number; /* of the mesh's faces, from 0; -1: it is told by its vertices */
+    int64_t number; /* the face's number in the mesh, from 0; -1: it is given by its vertices */
 } patch_face;
 
 static insitu_status no_memory(int64_t entries, base_error *error)
@@ -180,7 +180,7 @@ static insitu_status ask_owners(patch_faces *p, base_error *error)
 /* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
 
 typedef struct cell_search {
-    session_key_table keys;  /* of faces all of whose vertices have groups */
+    session_key_table keys;  /* one for each face all of whose vertices have groups */
     int64_t *of_face;        /* its key, or -1 */
     int64_t *given, *cells;  /* for each key: how often it is given, and how many cells have it */
     unsigned char *is_drawn; /* one of these cells is drawn */
@@ -267,7 +267,7 @@ static insitu_status judge_faces(const cell_search *s, patch_faces *p, base_erro
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             const int64_t key = s->of_face[f];
-            if (key < 0) continue; /* of a ghost cell */
+            if (key < 0) continue; /* the face belongs to a ghost cell */
             if (s->cells[key] > s->given[key])
                 return tell(p, patch, i, "is between two cells, not on the boundary", error);
             if (s->cells[key] == 0) return tell(p, patch, i, "is no face of a cell", error);

@@ -29,7 +29,7 @@ typedef struct twin_search {
     const session_team *team;
     int64_t corner_count, vertex_count;
     face_corner *corners;    /* this rank's, then received ones */
-    border_vertex *vertices; /* of all meshes, in their order */
+    border_vertex *vertices; /* those of all meshes, in the meshes' order */
     double rounding;
     session_bins bins;
 } twin_search;

@@ -26,7 +26,7 @@ enum { overlap_fragments = 1 << 21 };
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {
     image frame;
-    session_picture memory; /* of the frame; the writer's, to which it goes with the picture */
+    session_picture memory; /* holds the frame; the writer owns it and takes it with the picture */
     float *depth;           /* the frame's, put by while it is drawn without */
     image samples;          /* where edges alone take more than one frame: those, and their sums */
     int64_t edge_count, *edges;
@@ -248,7 +248,7 @@ typedef struct frames_basis {
     session_frame_target target;
     canvas *canvas;
     int64_t overlaps; /* pixels, at most of any frame */
-    deep_image *deep; /* of the next frame; NULL: not wanted, or drawn */
+    deep_image *deep; /* the next frame fills it; NULL: it is not wanted, or is drawn */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)

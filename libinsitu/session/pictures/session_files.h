@@ -16,14 +16,14 @@
 /* Rank 0's. */
 typedef struct session_files {
     struct session_files *next; /* in a list of the writer's (session_writer.h) */
-    const scene *scene;         /* of the image: it stays until this is written */
+    const scene *scene;         /* the image's scene: it stays until this is written */
     session_cinema *cinema;
     bool has_picture;  /* else this is news, or else the tables of databases, written after a step's pictures */
     char *news;        /* owned: report.json's text (session_news.h); NULL: there are none */
     scene_image image; /* its camera is that of the step, its lists are the scene's */
     scene_moment moment;
     image frame;
-    session_picture memory; /* of the frame */
+    session_picture memory; /* holds the frame */
     session_channels channels;
     deep_image deep;                  /* without counts: there is none */
     session_decorations *decorations; /* NULL: none, and the frame has its background */

@@ -25,9 +25,9 @@ typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
     int rank, ranks;
-    render_occluders *occluders; /* of this rank */
+    render_occluders *occluders; /* this rank's */
     int64_t round_hits;
-    render_box *boxes; /* of all ranks */
+    render_box *boxes; /* one for each rank */
     int64_t count;
     int64_t *fragments; /* whose hits these are */
     render_hit *hits;

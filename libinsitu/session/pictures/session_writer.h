@@ -32,12 +32,12 @@ typedef struct session_writer {
     struct session_files *done, *last_done;
     int64_t written;                                    /* by the thread, whose it is */
     int waiting;                                        /* pictures in the queue */
-    int64_t waiting_bytes;                              /* of all that is in the queue */
+    int64_t waiting_bytes;                              /* bytes of all that is in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* for pictures that come */
     base_error failure;                                 /* the first that no step has told yet; the caller's thread's */
     int failures;                                       /* how many there were */
-    double loading_ms;                                  /* of insitu_create(), for the next report */
-    struct session_writer *next;                        /* of the process's */
+    double loading_ms;                                  /* what insitu_create() took, for the next report */
+    struct session_writer *next;                        /* the next of the process's writers */
 } session_writer;
 
 /* Nothing is started yet. Local. */

@@ -26,8 +26,8 @@ typedef struct planned_layer {
     const scene_isosurface *isosurface;
     const scene_volume *volume;
     const scene_surface *surface; /* with a threshold */
-    int number;                   /* of its first warning */
-    field_range range;            /* of the surface: of 0 if any cell is within the threshold, else empty */
+    int number;                   /* the number of its first warning */
+    field_range range;            /* the surface's range: 0 if any cell is within the threshold, else empty */
     bool is_empty;                /* the surface */
     bool is_news;                 /* it seems to show nothing by the trees, and no warning has said so yet */
 } planned_layer;
@@ -38,7 +38,7 @@ typedef struct planned_layer {
 enum { WINDOW = 128 };
 
 typedef struct layer_window {
-    int first, next; /* of all layers: the first in the window, the next to be listed */
+    int first, next; /* numbers of layers: the first in the window, and the next to be listed */
     int count;
     planned_layer layers[WINDOW];
 } layer_window;

@@ -18,12 +18,12 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* that can be drawn */
     const scene_image **images;
-    int slice_count, surface_count; /* of all of them, those of an orbit's views once */
+    int slice_count, surface_count; /* counts over all images, in which an orbit's views count once */
     int recentring_count;
     session_recentring *recentrings;
-    int *stale;         /* of each: for session_recentre() */
+    int *stale;         /* one for each, for session_recentre() */
     int64_t cell_count; /* drawn ones of all ranks */
-    base_error refusal; /* of the first due image that cannot be drawn */
+    base_error refusal; /* the refusal of the first due image that cannot be drawn */
 } session_plan;
 
 /* A step, and the time of the one before; the same on every rank. */

@@ -50,7 +50,7 @@ typedef struct vertex_groups {
     bool by_id;
     int part_count;
     mesh_part *parts;
-    const session_mesh **meshes; /* of each part; NULL: this rank has none of it */
+    const session_mesh **meshes; /* one for each part; NULL: this rank has none of it */
     int64_t *firsts;             /* part_count + 1: the number of each part's first vertex */
     session_key_table keys;
     int64_t *of_vertex; /* -1: a vertex of no drawn cell */

@@ -8,7 +8,7 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 20 }; /* of a file of ranges */
+enum { MOST_BYTES = 1 << 20 }; /* the largest file of ranges that is read */
 
 /* ---- which layers ---------------------------------------------------------------------------------------------- */
 

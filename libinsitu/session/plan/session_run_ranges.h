@@ -24,7 +24,7 @@ typedef struct session_run_range {
 
 typedef struct session_image_ranges {
     char *image, *path;
-    int layers; /* of the image's variants */
+    int layers; /* the layers of the image's variants */
     int count;
     session_run_range *items;
     bool is_changed; /* since the file was written */

@@ -15,11 +15,11 @@
 typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
-    const scene_field *scene_field; /* of the first layer that has it */
+    const scene_field *scene_field; /* the field of the first layer that has it */
     uint64_t joined;                /* session_joint_name() where values are recentred */
     int component;
     int value_count;
-    mmbvh_interval *values; /* of all layers that have it */
+    mmbvh_interval *values; /* the values of all layers that have it */
 } smooth_item;
 
 typedef struct smooth_items {

@@ -13,7 +13,7 @@ typedef struct session_transfer {
                          is outside of them */
     bool is_constant; /* the values are one, in the middle of low and high */
     double constant;
-    float *table; /* of its own; NULL: the map's */
+    float *table; /* its own table; NULL: the map's */
 } session_transfer;
 
 /* Makes the transfer function of a colour map over [low, high] (low > high: there are no values), and the opacity of

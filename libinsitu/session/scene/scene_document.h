@@ -50,7 +50,7 @@ int scene_document_names(const scene_document *d, const char *path, const char *
 /* The text at a path, and a number of it; a node that passed the check is what its key asks for. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);
-int scene_document_length(const scene_document *d, const char *path); /* of a list; 0: there is none */
+int scene_document_length(const scene_document *d, const char *path); /* the length of a list; 0: there is none */
 double scene_document_number(const scene_document *d, const char *path);
 
 /* Record "file:line: parent.key: ..." and return INSITU_ERROR_SCENE. key may be "", meaning the parent itself. */

@@ -22,7 +22,7 @@ typedef enum placeholder_kind {
 typedef struct placeholder {
     placeholder_kind kind;
     int digits;      /* least digits of a whole number, or digits of another; -1: as few as the number needs */
-    char conversion; /* of a number that is not whole: 'f', 'e' or 'g' */
+    char conversion; /* how a number that is not whole is written: 'f', 'e' or 'g' */
     size_t size;     /* bytes of the pattern it takes */
 } placeholder;
 

@@ -97,7 +97,7 @@ typedef struct statistics_pass {
     const grid *g;
     grid_field field;
     const session_team *team;
-    volume_room *rooms; /* of threads */
+    volume_room *rooms; /* one for each thread */
 } statistics_pass;
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
@@ -145,7 +145,7 @@ typedef struct statistics_work {
     int count;
     double *ends;       /* KINDS times ENDS a wish, then -1 where a rank's memory ran out, else 0 */
     int64_t *sums;      /* MAX_SUMS a wish, then two */
-    volume_room *rooms; /* of threads; large enough after the first pass, since a thread's cells stay the same */
+    volume_room *rooms; /* one for each thread; large enough after the first pass, as a thread's cells stay the same */
 } statistics_work;
 
 /* The pass over the wish's field on a mesh of this rank; false where it has none. */

@@ -10,7 +10,7 @@ enum { SESSION_MAX_BINS = 256 };
 
 typedef struct session_statistics_wish {
     const scene_field *field;
-    int bin_count;    /* of a histogram; 0: none */
+    int bin_count;    /* the number of the histogram's bins; 0: there is none */
     double low, high; /* the range that the bins cover; low > high: that of the values */
 } session_statistics_wish;
 
@@ -21,9 +21,9 @@ typedef struct session_statistics {
     bool is_of_shells;
     double volume;          /* of the cells */
     double least, most;     /* values, of vertices where the field is there; least > most: there are none */
-    double mean, deviation; /* of cells' values, weighted by volume */
+    double mean, deviation; /* mean and deviation of cells' values, weighted by volume */
     int bin_count;
-    double low, high;                /* of the first and last bin */
+    double low, high;                /* the ends of the first and last bin */
     double shares[SESSION_MAX_BINS]; /* each bin's share of the volume, by cells' values; values beyond the ends count
                                         in the outer bins */
 } session_statistics;

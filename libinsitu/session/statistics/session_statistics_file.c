@@ -7,7 +7,7 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* of a file that is continued: some two million lines */
+enum { MOST_BYTES = 1 << 28 }; /* the largest file that is continued: some two million lines */
 
 /* The line of column names, without its end: from base_alloc(). NULL: no memory. */
 static char *make_header(int bin_count, bool is_of_shells)

@@ -17,7 +17,7 @@ enum { ORDERS = 3, SAMPLES = 256 /* cells of a mesh that a rank looks at */ };
 enum { JUDGED = 4 };
 static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
 
-/* Of the cells of a type. */
+/* Counts of one type's cells. */
 enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };

@@ -8,7 +8,7 @@
 
 /* A thread's room; {0} at first. */
 typedef struct volume_room {
-    const int64_t *vertices; /* of the cell whose volume was found last, each once */
+    const int64_t *vertices; /* the vertices of the cell whose volume was found last, each once */
     int vertex_count;
     int64_t corners[GRID_MAX_CELL_VERTICES];
     char *bytes;           /* for polyhedra and polygons */

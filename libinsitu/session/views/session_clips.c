@@ -145,7 +145,7 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    bool has_nothing; /* of any layer */
+    bool has_nothing; /* nothing is left of any layer */
 } clip_basis;
 
 static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)

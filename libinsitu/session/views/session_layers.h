@@ -16,8 +16,8 @@ typedef struct session_layers {
     int surface_count;
     render_surface_layer *surfaces; /* isosurfaces, outer surfaces, planes of slices */
     render_volume_layer *volumes;
-    session_transfer *transfers; /* of surfaces, then of volumes */
-    double *distances;           /* of surfaces: the isovalues of planes; 0 */
+    session_transfer *transfers; /* those of surfaces, then those of volumes */
+    double *distances;           /* one for each surface: the isovalues of planes; 0 */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
     int64_t field_count;
     render_vertex_gradients *gradients; /* part_count an isosurface */

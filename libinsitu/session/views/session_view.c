@@ -120,7 +120,7 @@ static insitu_status check_time(const session_extent *e, const char *scene_path,
 
 /* Where the corners of the bounds lie in the picture. */
 typedef struct corner_bounds {
-    double low[2], high[2]; /* of places in the picture: -1 and 1 are its borders; of corners in front */
+    double low[2], high[2]; /* bounds of the corners in front of the eye, in the picture, whose borders are -1 and 1 */
     int behind;             /* corners */
     bool is_beside;         /* all of them beyond one border */
 } corner_bounds;
