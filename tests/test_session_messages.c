@@ -498,6 +498,36 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
     input_free(&in);
 }
 
+/* Two meshes of cell values: a layer of means at vertices is told of vertex ids, one of cells is not. */
+static void meshes_with_ids_among_others_are_told(void **context)
+{
+    (void)context;
+    static const struct {
+        bool has_ids;
+        const char *scene, *words[3];
+    } cases[] = {{true, plain, {"the isosurface of \"f\" may have a step where mesh \"m\" meets others"}},
+                 {false, plain, {NULL}},
+                 {true, IMAGE("[32, 16]", "", "{surface: {colour_by: {field: f}}}", ""), {NULL}}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        session_input in;
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(cases[i].scene));
+        input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+        in.field.centring = INSITU_CELL;
+        in.field.count = in.part.cell_count;
+        int64_t *ids = test_calloc((size_t)in.part.vertex_count + 1, sizeof *ids);
+        for (int64_t v = 0; v < in.part.vertex_count; v++) ids[v] = 1000000 * (int64_t)own_rank + v;
+        everywhere(insitu_set_mesh(session, "n", &in.mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "n", &in.field) == INSITU_OK);
+        if (cases[i].has_ids) in.mesh.vertex_ids = (insitu_array){ids, INSITU_INT64, 0};
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        step_is_good(session, 0);
+        everywhere(is_warned(session, cases[i].words));
+        insitu_destroy(&session);
+        input_free(&in);
+        test_free(ids);
+    }
+}
+
 /* In the step that draws the words first, though they are written after it; none hides another. */
 static void faults_of_words_are_told_at_once(void **context)
 {
@@ -591,6 +621,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_hardly_meant_is_told_once),
         cmocka_unit_test(warnings_come_back_with_what_they_are_about),
+        cmocka_unit_test(meshes_with_ids_among_others_are_told),
         cmocka_unit_test(pictures_that_would_take_hours_are_refused),
         cmocka_unit_test(control_characters_are_escaped),
         cmocka_unit_test(parameters_change_with_the_scene_on_all_ranks),

@@ -110,6 +110,22 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
     basis->let_images = session_let_images(&s->events, basis->scene);
 }
 
+static insitu_status name_derived(insitu_session *s, base_error *error)
+{
+    return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
+}
+
+/* Lists all ranks' meshes and fields, if names are new, names the derived ones, and which of them the scene joins. What
+ * fails of that is in *error. Collective. */
+static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    if (are_names_new) status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, is_shared, error);
+    if (!status) status = name_derived(s, error);
+    if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
+    return status;
+}
+
 /* Checks what changed of the meshes' contents, and takes note of all ranks' meshes and fields. Those that are at fault
  * are put aside: *refused is the first reason. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
@@ -117,23 +133,15 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
 {
     const session_team *team = &s->team;
     base_error reason = {.status = INSITU_OK};
-    insitu_status status = INSITU_OK;
     if (changes->of_cells) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
     const bool of_names = changes->of_names || refused->status || s->catalogue.has_faults;
     if (changes->of_cells) session_forget_homes(&s->catalogue);
-    if (of_names)
-        status = session_update_catalogue(&s->catalogue, &s->meshes, team,
-                                          changes->are_names_shared && !refused->status, error);
+    insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
     if (changes->of_cells && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if ((changes->of_cells || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
     return status;
-}
-
-static insitu_status name_derived(insitu_session *s, base_error *error)
-{
-    return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
 }
 
 /* Makes the plan; and another one without the images of fields that turn out to be wrong as their values are taken.
@@ -146,9 +154,7 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
         if (!refused->status) *refused = *error;
         *error = (base_error){0};
         session_take_back(&s->meshes);
-        status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, false, error);
-        if (!status) status = name_derived(s, error);
-        if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
+        status = list_meshes(s, true, false, error);
         if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
     }
     if (!status && refused->status) plan->refusal = *refused;
@@ -172,9 +178,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         &s->cinema, &s->overwrites,     &s->writer,     &s->catalogue, changes->writes_behind};
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, refused, error);
-    if (!status) status = name_derived(s, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
-    if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
     const session_derive_basis derived = derive_basis(s);

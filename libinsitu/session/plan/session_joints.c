@@ -106,16 +106,12 @@ static void find_apart(session_catalogue *catalogue, const session_meshes *meshe
     }
 }
 
-static bool join_image(session_catalogue *catalogue, scene_image *image)
+static bool join_image(session_catalogue *catalogue, const scene_image *image)
 {
+    scene_field_walk walk = {.image = image};
     bool is_done = true;
-    for (int i = 0; i < image->isosurface_count && is_done; i++)
-        is_done = join_field(catalogue, &image->isosurfaces[i].field) &&
-                  join_field(catalogue, &image->isosurfaces[i].colour_by);
-    for (int i = 0; i < image->volume_count && is_done; i++) is_done = join_field(catalogue, &image->volumes[i].field);
-    for (int i = 0; i < image->slice_count && is_done; i++) is_done = join_field(catalogue, &image->slices[i].field);
-    for (int i = 0; i < image->surface_count && is_done; i++)
-        is_done = join_field(catalogue, &image->surfaces[i].colour_by);
+    for (scene_field *field; is_done && (field = scene_next_field(&walk)) != NULL;)
+        is_done = walk.role == SCENE_THRESHOLD || join_field(catalogue, field);
     return is_done;
 }
 

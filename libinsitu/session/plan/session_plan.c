@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "memory.h"
-#include "render.h"
 #include "scene_shorthand.h"
 #include "session_agree.h"
 #include "session_candidates.h"
@@ -222,28 +221,17 @@ static insitu_status check_surface(const session_plan_basis *basis, const scene_
 
 static insitu_status check_image(const session_plan_basis *basis, const scene_image *image, base_error *error)
 {
-    int values = 0;
     insitu_status status = refuse_fault(basis->catalogue->fault, error);
     for (int i = 0; i < image->isosurface_count && !status; i++) {
         const scene_isosurface *layer = &image->isosurfaces[i];
-        values += layer->value_count;
         status = check_layer_field(basis, &layer->field, error);
         if (!status && layer->has_colour_by) status = check_field(basis, &layer->colour_by, &layer->field, error);
     }
     for (int i = 0; i < image->volume_count && !status; i++)
         status = check_layer_field(basis, &image->volumes[i].field, error);
-    for (int i = 0; i < image->slice_count && !status; i++) {
-        values += image->slices[i].plane_count;
+    for (int i = 0; i < image->slice_count && !status; i++)
         status = check_layer_field(basis, &image->slices[i].field, error);
-    }
     for (int i = 0; i < image->surface_count && !status; i++) status = check_surface(basis, &image->surfaces[i], error);
-    values += image->surface_count;
-    if (!status && (values > RENDER_MAX_ISOVALUES || image->volume_count > RENDER_MAX_VOLUMES))
-        status = base_fail(error, INSITU_ERROR_SCENE,
-                           "%s:%d: image \"%s\" has %d isovalues, planes and outer surfaces and %d volumes, at most %d "
-                           "and %d are supported",
-                           basis->scene_path, image->line, image->name, values, image->volume_count,
-                           RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES);
     return status;
 }
 
@@ -283,19 +271,10 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 {
     bool is_planned = true;
     for (int i = 0; i < plan->image_count; i++) {
-        const scene_image *image = plan->images[i];
-        if (image->variant.view > 0) continue; /* its layers are those of view 0 */
-        for (int s = 0; s < image->isosurface_count && is_planned; s++)
-            is_planned = add_recentrings(catalogue, plan, &image->isosurfaces[s].field) &&
-                         (!image->isosurfaces[s].has_colour_by ||
-                          add_recentrings(catalogue, plan, &image->isosurfaces[s].colour_by));
-        for (int v = 0; v < image->volume_count && is_planned; v++)
-            is_planned = add_recentrings(catalogue, plan, &image->volumes[v].field);
-        for (int n = 0; n < image->surface_count && is_planned; n++)
-            is_planned =
-                !image->surfaces[n].has_colour_by || add_recentrings(catalogue, plan, &image->surfaces[n].colour_by);
-        for (int n = 0; n < image->slice_count && is_planned; n++)
-            is_planned = add_recentrings(catalogue, plan, &image->slices[n].field);
+        if (plan->images[i]->variant.view > 0) continue; /* its layers are those of view 0 */
+        scene_field_walk walk = {.image = plan->images[i]};
+        for (const scene_field *field; is_planned && (field = scene_next_field(&walk)) != NULL;)
+            is_planned = walk.role == SCENE_THRESHOLD || add_recentrings(catalogue, plan, field);
     }
     plan->stale = base_calloc((size_t)plan->recentring_count + 1, sizeof *plan->stale);
     return is_planned && plan->stale;
@@ -378,14 +357,34 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
                  image->name, layer, field->name, name ? name : "", field->name);
 }
 
-static void warn_of_shells_alone(const session_catalogue *catalogue, const scene_image *image, session_report *report)
+/* Warns of a mesh with vertex ids among others that a layer shows by means at vertices: its vertices are not theirs. */
+static void warn_of_apart(const session_catalogue *catalogue, const scene_image *image, const char *layer,
+                          const scene_field *field, session_report *report)
 {
-    for (int i = 0; i < image->isosurface_count; i++)
-        warn_of_shells(catalogue, image, "isosurface", &image->isosurfaces[i].field, report);
-    for (int i = 0; i < image->volume_count; i++)
-        warn_of_shells(catalogue, image, "volume", &image->volumes[i].field, report);
-    for (int i = 0; i < image->slice_count; i++)
-        warn_of_shells(catalogue, image, "slice", &image->slices[i].field, report);
+    const char *name = NULL;
+    int count = 0;
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        const session_catalogue_field *shown = mesh->first_rank >= 0 ? find_shown(mesh, field) : NULL;
+        if (!shown || !session_is_recentred(field, shown->centring)) continue;
+        if (mesh->apart && !name) name = mesh->name;
+        count++;
+    }
+    const session_warning warning = {WARNING_APART, image->name, field->name, field->line};
+    session_warn(report, &warning, name && count > 1,
+                 "image \"%s\": the %s of \"%s\" may have a step where mesh \"%s\" meets others: its vertices are "
+                 "matched by their ids, among themselves alone; without vertex_ids those of all meshes are matched",
+                 image->name, layer, field->name, name ? name : "");
+}
+
+static void warn_of_fields(const session_catalogue *catalogue, const scene_image *image, session_report *report)
+{
+    scene_field_walk walk = {.image = image};
+    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
+        const char *layer = scene_layer_word(walk.kind);
+        if (walk.role == SCENE_SHOWN) warn_of_shells(catalogue, image, layer, field, report);
+        if (walk.role == SCENE_SHOWN) warn_of_apart(catalogue, image, layer, field, report);
+    }
 }
 
 static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_image *image, session_report *report)
@@ -402,7 +401,7 @@ static bool can_be_drawn(const session_plan_basis *basis, const scene_image *ima
     if (!has_anything(basis)) return true;
     if (check_image(basis, image, refusal) != INSITU_OK) return false;
     warn_of_grey_layers(basis->catalogue, image, report);
-    warn_of_shells_alone(basis->catalogue, image, report);
+    warn_of_fields(basis->catalogue, image, report);
     return true;
 }
 

@@ -8,20 +8,20 @@
 /* Visits the fields of the plan's isosurfaces and volumes. Views of an image share their layers. */
 typedef struct field_walk {
     const session_plan *plan;
-    int image, layer;
+    int image; /* the next one */
+    scene_field_walk fields;
 } field_walk;
 
 static const scene_field *next_field(field_walk *walk)
 {
-    for (; walk->image < walk->plan->image_count; walk->image++, walk->layer = 0) {
-        const scene_image *image = walk->plan->images[walk->image];
-        const int layer = walk->layer++;
-        if (image->variant.view > 0) continue;
-        if (layer < image->isosurface_count) return &image->isosurfaces[layer].field;
-        if (layer < image->isosurface_count + image->volume_count)
-            return &image->volumes[layer - image->isosurface_count].field;
+    for (;;) {
+        const scene_field *field = walk->fields.image ? scene_next_field(&walk->fields) : NULL;
+        if (field && walk->fields.role == SCENE_SHOWN && walk->fields.kind != SCENE_SLICE) return field;
+        if (field) continue;
+        if (walk->image == walk->plan->image_count) return NULL;
+        const scene_image *image = walk->plan->images[walk->image++];
+        walk->fields = (scene_field_walk){.image = image->variant.view > 0 ? NULL : image};
     }
-    return NULL;
 }
 
 static int64_t unusable_of(const session_mesh *mesh, const scene_field *field)

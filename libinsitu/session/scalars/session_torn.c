@@ -13,26 +13,17 @@
 
 static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
 {
-    if (!field->name || !scene_field_is_on(field, mesh->name)) return false;
+    if (!scene_field_is_on(field, mesh->name)) return false;
     const int index = session_find_field(mesh, field->name);
     return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER;
 }
 
 static bool is_in_image(const session_mesh *mesh, const scene_image *image)
 {
+    scene_field_walk walk = {.image = image};
     bool is_in = image->when.is_given && is_of_corners(mesh, &image->when.field);
-    for (int i = 0; i < image->isosurface_count; i++) {
-        const scene_isosurface *layer = &image->isosurfaces[i];
-        is_in = is_in || is_of_corners(mesh, &layer->field) ||
-                (layer->has_colour_by && is_of_corners(mesh, &layer->colour_by));
-    }
-    for (int i = 0; i < image->volume_count; i++) is_in = is_in || is_of_corners(mesh, &image->volumes[i].field);
-    for (int i = 0; i < image->slice_count; i++) is_in = is_in || is_of_corners(mesh, &image->slices[i].field);
-    for (int i = 0; i < image->surface_count; i++) {
-        const scene_surface *layer = &image->surfaces[i];
-        is_in = is_in || (layer->has_colour_by && is_of_corners(mesh, &layer->colour_by)) ||
-                (layer->threshold.is_given && is_of_corners(mesh, &layer->threshold.field));
-    }
+    for (const scene_field *field; !is_in && (field = scene_next_field(&walk)) != NULL;)
+        is_in = is_of_corners(mesh, field);
     return is_in;
 }
 

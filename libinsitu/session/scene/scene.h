@@ -406,6 +406,28 @@ typedef struct scene_image {
     bool once; /* drawn only in the first step in which it is due */
 } scene_image;
 
+/* The fields that an image's layers show, one after the other: of each kind of layers in turn, its fields and then what
+ * colours it. */
+typedef enum scene_layer_kind { SCENE_ISOSURFACE, SCENE_VOLUME, SCENE_SLICE, SCENE_SURFACE } scene_layer_kind;
+
+typedef enum scene_field_role {
+    SCENE_SHOWN,    /* the layer is made of its values */
+    SCENE_COLOURS,  /* it colours a surface */
+    SCENE_THRESHOLD /* it chooses cells */
+} scene_field_role;
+
+typedef struct scene_field_walk {
+    const scene_image *image;
+    int place; /* of the next field, of all that the layers may have */
+    scene_layer_kind kind;
+    scene_field_role role; /* of the last field */
+} scene_field_walk;
+
+/* The next field; NULL: there is none. A walk begins with the image alone. */
+scene_field *scene_next_field(scene_field_walk *walk);
+/* The kind's name for messages. */
+const char *scene_layer_word(scene_layer_kind kind);
+
 /* Results that all variants of an image share are found for the first of them. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {

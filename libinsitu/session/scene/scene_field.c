@@ -80,6 +80,44 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
     return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
 }
 
+/* ---- walks ------------------------------------------------------------------------------------------------------- */
+
+/* The layer's field of this role; NULL: it has none. */
+static scene_field *field_of(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
+{
+    scene_isosurface *isosurface = kind == SCENE_ISOSURFACE ? &image->isosurfaces[layer] : NULL;
+    scene_surface *surface = kind == SCENE_SURFACE ? &image->surfaces[layer] : NULL;
+    if (role == SCENE_THRESHOLD) return surface && surface->threshold.is_given ? &surface->threshold.field : NULL;
+    if (surface) return role == SCENE_COLOURS && surface->has_colour_by ? &surface->colour_by : NULL;
+    if (role == SCENE_COLOURS) return isosurface && isosurface->has_colour_by ? &isosurface->colour_by : NULL;
+    if (isosurface) return &isosurface->field;
+    return kind == SCENE_VOLUME ? &image->volumes[layer].field : &image->slices[layer].field;
+}
+
+scene_field *scene_next_field(scene_field_walk *walk)
+{
+    enum { KINDS = SCENE_SURFACE + 1, ROLES = SCENE_THRESHOLD + 1 };
+    const scene_image *image = walk->image;
+    const int counts[KINDS] = {image->isosurface_count, image->volume_count, image->slice_count, image->surface_count};
+    for (;;) {
+        int layer = walk->place / ROLES, kind = 0;
+        while (kind < KINDS && layer >= counts[kind]) layer -= counts[kind++];
+        if (kind == KINDS) return NULL;
+        walk->kind = (scene_layer_kind)kind;
+        walk->role = (scene_field_role)(walk->place++ % ROLES);
+        scene_field *field = field_of(image, walk->kind, layer, walk->role);
+        if (field) return field;
+    }
+}
+
+const char *scene_layer_word(scene_layer_kind kind)
+{
+    static const char *const words[] = {"isosurface", "volume", "slice", "surface"};
+    return words[kind];
+}
+
+/* ---- materials --------------------------------------------------------------------------------------------------- */
+
 static float given_or(const double *given, float otherwise)
 {
     return given ? (float)*given : otherwise;

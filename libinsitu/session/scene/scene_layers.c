@@ -7,8 +7,9 @@
 
 #include "colour_map.h"
 #include "memory.h"
+#include "render.h"
 
-enum { max_isovalues = 64, max_volumes = 4, cycle_length = 16 };
+enum { cycle_length = 16 };
 
 /* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
  * from green. */
@@ -135,12 +136,12 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
     counts->surfaces += layer->surface != NULL;
     counts->values += layer->isosurface ? layer->isosurface->values_count : 0;
     counts->values += layer->slice ? scene_count_planes(layer->slice) : layer->surface != NULL;
-    if (counts->values > max_isovalues)
+    if (counts->values > RENDER_MAX_ISOVALUES)
         return scene_bad(d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
-                         counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", max_isovalues);
-    if (counts->volumes > max_volumes)
+                         counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", RENDER_MAX_ISOVALUES);
+    if (counts->volumes > RENDER_MAX_VOLUMES)
         return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", counts->volumes,
-                         max_volumes);
+                         RENDER_MAX_VOLUMES);
     return INSITU_OK;
 }
 

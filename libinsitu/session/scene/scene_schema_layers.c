@@ -1,5 +1,6 @@
 /* The keys of layers and of what is clipped: scene_schema_lists.h. */
 #include "colour_map.h"
+#include "render.h"
 #include "scene.h"
 #include "scene_schema_lists.h"
 
@@ -196,10 +197,11 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(CHOICE("interpolate", scene_file_isosurface, interpolate, interpolation_words), .help = ISO_INTERPOLATE_HELP,    \
       .by_default = "`vertex`")                                                                                        \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
-    X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1, 64),               \
-      .help = "The values at which surfaces are drawn, none twice. At most 64 in all isosurfaces of an image "         \
+    X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1,                    \
+                           RENDER_MAX_ISOVALUES),                                                                      \
+      .help = "The values at which surfaces are drawn, none twice. The most are those of all isosurfaces of an image " \
               "together.")                                                                                             \
-    X(CYAML_FIELD_SEQUENCE("colours", POINTER, scene_file_isosurface, colours, &colour, 1, 64),                        \
+    X(CYAML_FIELD_SEQUENCE("colours", POINTER, scene_file_isosurface, colours, &colour, 1, RENDER_MAX_ISOVALUES),      \
       .help = "Colours of the values in turn, sRGB; the last serves all values that are left. Not with `colour_by`.",  \
       .by_default = "colours that differ, from a fixed cycle", .low = 0, .high = 1)                                    \
     X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_isosurface, colour_by, colour_by_fields),              \
@@ -213,7 +215,9 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(CHOICE("normals", scene_file_isosurface, normals, normal_words),                                                 \
       .help =                                                                                                          \
           "The normals that light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, " \
-          "or smooth: gradients at each `vertex`, over its cells on all ranks, interpolated within cells; or central " \
+          "or smooth: gradients at each `vertex`, over the cells of its mesh on all ranks, interpolated within "       \
+          "cells, "                                                                                                    \
+          "so that light may have a seam where two meshes meet; or central "                                           \
           "`differences` about the hit, in the cells of all ranks, slower.",                                           \
       .by_default = "`gradient`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
@@ -250,8 +254,9 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
     X(CHOICE("interpolate", scene_file_slice, interpolate, interpolation_words), .help = INTERPOLATE_HELP,             \
       .by_default = "`cell`")                                                                                          \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
-    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_slice, planes, &plane, 1, 64),                                \
-      .help = "The planes. At most 64 isovalues and planes in an image together. 4 bytes a vertex are held for each "  \
+    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_slice, planes, &plane, 1, RENDER_MAX_ISOVALUES),              \
+      .help = "The planes. The most are all isovalues and planes of an image together. 4 bytes a vertex are held for " \
+              "each "                                                                                                  \
               "plane. A plane that lies in faces of cells is drawn once, by the cells that its normal points away "    \
               "from; so that one on the border of the data is seen too, it is taken into them where it lies within a " \
               "millionth of half the diagonal of their bounds from it.",                                               \
