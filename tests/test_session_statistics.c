@@ -231,6 +231,33 @@ static void files_that_cannot_be_written_are_told(void **state)
     input_free(&in);
 }
 
+/* Statistics and conditions of a field that is missing keep no others from being found. */
+static void others_of_a_missing_field_are_found(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    if (own_rank == 0) unlink("there.csv");
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD,
+        write_scene(PICTURE("    when: {field: f, above: -1e9}\n") "  - name: b\n    size: [8, 6]\n"
+                                                                   "    when: {field: h, above: 0}\n    layers: "
+                                                                   "[{isosurface: {field: f, values: "
+                                                                   "[0.1]}}]\n    outputs: [{path: b.png}]\n"
+                                                                   "statistics: [{field: g, path: g.csv}, {field: f, "
+                                                                   "path: there.csv}]\n"));
+    forget_pictures();
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    everywhere(caught_count == (own_rank == 0) && insitu_last_report(session)->images == 1);
+    insitu_destroy(&session);
+    read_file("there.csv", MOST, text);
+    everywhere(own_rank != 0 || strstr(text, "\n0,0,"));
+    forget_pictures();
+    input_free(&in);
+}
+
 /* ---- conditions ------------------------------------------------------------------------------------------------ */
 
 /* The field's greatest value is the cycle's; pictures drawn at cycles 0 to 9, as bits. */
@@ -282,6 +309,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),
                                        cmocka_unit_test(files_that_cannot_be_written_are_told),
+                                       cmocka_unit_test(others_of_a_missing_field_are_found),
                                        cmocka_unit_test(conditions_hold_images_back)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -95,18 +95,21 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     return status ? status : session_derive(&basis, needed, error);
 }
 
-/* Finds the statistics that are due, and the images whose conditions hold. An error here does not keep images from
- * being drawn, and is returned afterwards. Collective. */
+/* Finds the statistics that are due, and the images whose conditions hold. An error here keeps neither the others nor
+ * images from being found and drawn, and is returned afterwards. Collective. */
 static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
 {
     const session_moment *moment = basis->moment;
     const session_event_time now = {moment->cycle, moment->time};
     const bool images = session_count_due(basis->scene, moment) > 0;
     s->events.held = 0;
-    if (session_has_events(basis->scene, moment->cycle, images) &&
-        session_check_event_fields(basis, images, error) == INSITU_OK &&
-        derive_for_events(s, moment, images, error) == INSITU_OK)
-        session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, error);
+    if (session_has_events(basis->scene, moment->cycle, images)) {
+        base_error own = {.status = INSITU_OK};
+        const session_sound_events sound = session_check_event_fields(basis, images, error);
+        if (derive_for_events(s, moment, images, &own) == INSITU_OK)
+            session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, &sound, &own);
+        if (!error->status) *error = own;
+    }
     basis->let_images = session_let_images(&s->events, basis->scene);
 }
 

@@ -10,6 +10,10 @@
 #include "session_thresholds.h"
 #include "session_transfer.h"
 
+_Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
+                   (int)SCENE_MAX_VOLUMES == (int)RENDER_MAX_VOLUMES,
+               "a scene may have as many surfaces and volumes as can be drawn");
+
 /* ---- which values show ---------------------------------------------------------------------------------------- */
 
 /* Fields of a sweep have their isosurfaces in common. */

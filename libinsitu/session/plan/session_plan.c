@@ -303,18 +303,25 @@ static bool has_anything(const session_plan_basis *basis)
     return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
 }
 
-insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error)
+session_sound_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error)
 {
     const scene *scene = basis->scene;
-    insitu_status status = INSITU_OK;
-    if (!has_anything(basis)) return INSITU_OK;
-    for (int i = 0; i < scene->statistics_count && !status; i++)
-        if (session_is_statistics_due(&scene->statistics[i], basis->moment->cycle))
-            status = check_layer_field(basis, &scene->statistics[i].field, error);
-    for (int i = 0; i < scene->image_count && images && !status; i++)
-        if (scene->images[i].when.is_given && scene_is_first_variant(&scene->images[i]))
-            status = check_layer_field(basis, &scene->images[i].when.field, error);
-    return status;
+    session_sound_events sound = {UINT64_MAX, UINT64_MAX};
+    if (!has_anything(basis)) return sound;
+    for (int i = 0; i < scene->statistics_count; i++) {
+        base_error own = {.status = INSITU_OK};
+        if (!session_is_statistics_due(&scene->statistics[i], basis->moment->cycle)) continue;
+        if (check_layer_field(basis, &scene->statistics[i].field, &own)) sound.statistics &= ~(UINT64_C(1) << i);
+        if (!error->status) *error = own;
+    }
+    for (int i = 0; i < scene->image_count && images; i++) {
+        const scene_image *image = &scene->images[i];
+        base_error own = {.status = INSITU_OK};
+        if (!image->when.is_given || !scene_is_first_variant(image)) continue;
+        if (check_layer_field(basis, &image->when.field, &own)) sound.images &= ~(UINT64_C(1) << image->variant.source);
+        if (!error->status) *error = own;
+    }
+    return sound;
 }
 
 int session_count_due(const scene *scene, const session_moment *moment)

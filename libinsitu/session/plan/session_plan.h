@@ -4,6 +4,7 @@
 
 #include "scene.h"
 #include "session_catalogue.h"
+#include "session_events.h"
 #include "session_report.h"
 #include "session_space.h"
 
@@ -48,9 +49,9 @@ typedef struct session_plan_basis {
 /* Counts the images that are due, without regard to conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
 
-/* Checks that the fields whose statistics the step wants are there, and, if images, those of conditions too. Local, the
- * same everywhere. */
-insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
+/* Finds the statistics that the step wants, and, if images, the conditions, whose fields are there. The first fault is
+ * in *error. Local, the same everywhere. */
+session_sound_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Find which of the due images can be drawn, mark on this rank's meshes and scalars what they need, and copy values
  * that have an index. An image that cannot be drawn is no error of this call, but values

@@ -189,6 +189,9 @@ typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;
 
 enum { SCENE_MAX_CLIPS = 32 };
 
+/* Of an image: isovalues, planes and outer surfaces together, and volumes. */
+enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
+
 /* Everything outside the half space, box or sphere is cut away; with is_outside, everything inside. */
 typedef struct scene_clip {
     scene_clip_kind kind;
@@ -371,7 +374,7 @@ typedef struct scene_image {
     float background[4]; /* linear premultiplied RGBA */
     int isosurface_count;
     scene_isosurface *isosurfaces;
-    int volume_count; /* at most 4 */
+    int volume_count;
     scene_volume *volumes;
     int surface_count;
     scene_surface *surfaces;

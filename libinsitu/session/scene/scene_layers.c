@@ -7,7 +7,6 @@
 
 #include "colour_map.h"
 #include "memory.h"
-#include "render.h"
 
 enum { cycle_length = 16 };
 
@@ -136,12 +135,12 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
     counts->surfaces += layer->surface != NULL;
     counts->values += layer->isosurface ? layer->isosurface->values_count : 0;
     counts->values += layer->slice ? scene_count_planes(layer->slice) : layer->surface != NULL;
-    if (counts->values > RENDER_MAX_ISOVALUES)
+    if (counts->values > SCENE_MAX_SURFACES)
         return scene_bad(d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
-                         counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", RENDER_MAX_ISOVALUES);
-    if (counts->volumes > RENDER_MAX_VOLUMES)
+                         counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", SCENE_MAX_SURFACES);
+    if (counts->volumes > SCENE_MAX_VOLUMES)
         return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", counts->volumes,
-                         RENDER_MAX_VOLUMES);
+                         SCENE_MAX_VOLUMES);
     return INSITU_OK;
 }
 

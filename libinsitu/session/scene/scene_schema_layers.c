@@ -1,6 +1,5 @@
 /* The keys of layers and of what is clipped: scene_schema_lists.h. */
 #include "colour_map.h"
-#include "render.h"
 #include "scene.h"
 #include "scene_schema_lists.h"
 
@@ -198,10 +197,10 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .by_default = "`vertex`")                                                                                        \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1,                    \
-                           RENDER_MAX_ISOVALUES),                                                                      \
+                           SCENE_MAX_SURFACES),                                                                        \
       .help = "The values at which surfaces are drawn, none twice. The most are those of all isosurfaces of an image " \
               "together.")                                                                                             \
-    X(CYAML_FIELD_SEQUENCE("colours", POINTER, scene_file_isosurface, colours, &colour, 1, RENDER_MAX_ISOVALUES),      \
+    X(CYAML_FIELD_SEQUENCE("colours", POINTER, scene_file_isosurface, colours, &colour, 1, SCENE_MAX_SURFACES),        \
       .help = "Colours of the values in turn, sRGB; the last serves all values that are left. Not with `colour_by`.",  \
       .by_default = "colours that differ, from a fixed cycle", .low = 0, .high = 1)                                    \
     X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_isosurface, colour_by, colour_by_fields),              \
@@ -254,7 +253,7 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
     X(CHOICE("interpolate", scene_file_slice, interpolate, interpolation_words), .help = INTERPOLATE_HELP,             \
       .by_default = "`cell`")                                                                                          \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
-    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_slice, planes, &plane, 1, RENDER_MAX_ISOVALUES),              \
+    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_slice, planes, &plane, 1, SCENE_MAX_SURFACES),                \
       .help = "The planes. The most are all isovalues and planes of an image together. 4 bytes a vertex are held for " \
               "each "                                                                                                  \
               "plane. A plane that lies in faces of cells is drawn once, by the cells that its normal points away "    \

@@ -35,7 +35,7 @@ static void work_free(event_work *w)
     base_free(w->of);
 }
 
-static bool work_create(const scene *scene, int64_t cycle, event_work *w)
+static bool work_create(const scene *scene, int64_t cycle, const session_sound_events *sound, event_work *w)
 {
     const size_t most = (size_t)scene->statistics_count + (size_t)scene->image_count;
     *w = (event_work){0, base_calloc(most, sizeof *w->wishes), base_calloc(most, sizeof *w->found),
@@ -43,12 +43,13 @@ static bool work_create(const scene *scene, int64_t cycle, event_work *w)
     if (!w->wishes || !w->found || !w->of) return false;
     for (int i = 0; i < scene->statistics_count; i++) {
         const scene_statistics *s = &scene->statistics[i];
-        if (!session_is_statistics_due(s, cycle)) continue;
+        if (!session_is_statistics_due(s, cycle) || !(sound->statistics >> i & 1)) continue;
         w->wishes[w->count] = (session_statistics_wish){&s->field, s->bin_count, s->low, s->high};
         w->of[w->count++] = i;
     }
     for (int i = 0; i < scene->image_count; i++) {
         if (!scene->images[i].when.is_given || !scene_is_first_variant(&scene->images[i])) continue;
+        if (!(sound->images >> scene->images[i].variant.source & 1)) continue;
         w->wishes[w->count] = (session_statistics_wish){&scene->images[i].when.field, 0, 0, -1};
         w->of[w->count++] = scene->statistics_count + i;
     }
@@ -89,10 +90,10 @@ static void note_conditions(session_events *events, const scene *scene, const ev
 
 insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
-                                    const session_event_time *now, base_error *error)
+                                    const session_event_time *now, const session_sound_events *sound, base_error *error)
 {
     event_work work;
-    if (!work_create(scene, now->cycle, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
+    if (!work_create(scene, now->cycle, sound, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
     for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
     insitu_status status = session_agree(team->comm, error); /* the functions that fill fields may be collective */
     if (!status) session_fill_fields(meshes, catalogue, false, error);
