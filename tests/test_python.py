@@ -438,6 +438,30 @@ def borrowed_arrays_live_as_long_as_they_are_read_and_no_longer():
     everywhere(of_session() is None, "no circle of references is left to the collector")
 
 
+def derived_fields_are_fields():
+    """One that is made of what a callable makes is drawn as the field itself: 4 f / 2 - f is f to the bit."""
+    xyz, hexes, f = lattice()
+    asked = []
+
+    def make():
+        asked.append(comm.rank)
+        return numpy.stack([f, 4 * f], axis=-1)
+
+    with insitu.Session(comm, scene_text=SCENE.format(name="given", folder=folder)) as s:
+        s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        s.set_field("m", "f", f)
+        s.step(0, 0.0)
+    scene = SCENE.replace("field: f", "field: g").format(name="derived", folder=folder) + "fields: {g: v.y / 2 - v.x}\n"
+    with insitu.Session(comm, scene_text=scene) as s:
+        s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        s.set_field("m", "v", make, components=2)
+        s.step(0, 0.0)
+        everywhere(asked == [comm.rank] and s.report["bytes_copied"] > 0, "the callable is asked once")
+    if comm.rank == 0:
+        pictures = [open(f"{folder}/{name}.png", "rb").read() for name in ("given", "derived")]
+    everywhere(comm.rank > 0 or pictures[0] == pictures[1], "a derived field's picture is the field's")
+
+
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
@@ -461,5 +485,6 @@ boundaries_have_values_of_their_own()
 finite_elements_are_their_hexes()
 corners_of_hexes_are_torn()
 callables_are_asked_in_steps_that_need_them()
+derived_fields_are_fields()
 borrowed_arrays_live_as_long_as_they_are_read_and_no_longer()
 structures_are_those_of_the_header()

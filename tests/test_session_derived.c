@@ -291,9 +291,9 @@ static int64_t find_vertex(const test_mesh *whole, const double place[3])
 }
 
 /* Marks the vertices of cells that are no ghosts; others need no values. */
-static bool *find_used(const insitu_session *session)
+static bool *find_used(const insitu_session *session, const char *mesh)
 {
-    const grid *g = &session_find_mesh(&session->meshes, "m")->cells;
+    const grid *g = &session_find_mesh(&session->meshes, mesh)->cells;
     bool *used = calloc((size_t)g->vertex_count + 1, sizeof *used);
     assert_non_null(used);
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -304,12 +304,12 @@ static bool *find_used(const insitu_session *session)
     return used;
 }
 
-static bool has_same_bits(const insitu_session *parts, const insitu_session *alone, const test_mesh *part,
-                          const test_mesh *whole, const char *name)
+static bool has_same_bits(const insitu_session *parts, const char *mesh, const insitu_session *alone,
+                          const test_mesh *part, const test_mesh *whole, const char *name)
 {
-    const session_field *a = derived_field(parts, "m", name), *b = derived_field(alone, "m", name);
+    const session_field *a = derived_field(parts, mesh, name), *b = derived_field(alone, "m", name);
     const int64_t size = a->values.stride;
-    bool *used = find_used(parts), is_same = a->values.stride == b->values.stride;
+    bool *used = find_used(parts, mesh), is_same = a->values.stride == b->values.stride;
     for (int64_t v = 0; v < part->vertex_count && is_same; v++) {
         if (!used[v]) continue;
         const int64_t there = find_vertex(whole, part->coordinates + 3 * v);
@@ -348,7 +348,7 @@ static void partitions_do_not_show(void **state)
             everywhere(insitu_step(parts, 0, 0) == INSITU_OK);
             everywhere(insitu_step(alone, 0, 0) == INSITU_OK);
             for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-                everywhere(has_same_bits(parts, alone, &in.part, &whole.part, names[i]));
+                everywhere(has_same_bits(parts, "m", alone, &in.part, &whole.part, names[i]));
             insitu_destroy(&parts);
             insitu_destroy(&alone);
             free(u.values);
@@ -360,10 +360,322 @@ static void partitions_do_not_show(void **state)
         }
 }
 
+/* ---- several meshes -----------------------------------------------------------------------------------------------
+ */
+
+/* Blocks of one mesh, on any ranks, are as the mesh whole: their border has the gradients of both sides. */
+static void blocks_show_no_seam(void **state)
+{
+    (void)state;
+    static const char *const meshes[] = {"m", "n"};
+    const char *const scene = SCENE("q: {q_criterion: u}", "q");
+    for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
+        session_input whole = {0}, parts[2] = {0};
+        vector_field whole_u, u[2];
+        test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole.part);
+        input_describe(&whole);
+        make_vector(&whole.part, swirl, INSITU_VERTEX, true, "u", &whole_u);
+        insitu_session *alone = open_stepped(MPI_COMM_SELF, scene, &whole, &whole_u), *session = NULL;
+        int *owners = calloc((size_t)whole.part.cell_count, sizeof *owners);
+        assert_non_null(owners);
+        test_partition(&whole.part, dealt, SIDE, 2 * rank_count, owners);
+        assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, scene, &session), INSITU_OK);
+        for (int i = 0; i < 2; i++) {
+            test_mesh_part(&whole.part, owners, 2 * own_rank + i, &parts[i].part);
+            input_describe(&parts[i]);
+            make_vector(&parts[i].part, swirl, INSITU_VERTEX, true, "u", &u[i]);
+            assert_int_equal(insitu_set_mesh(session, meshes[i], &parts[i].mesh), INSITU_OK);
+            assert_int_equal(insitu_set_field(session, meshes[i], &u[i].field), INSITU_OK);
+        }
+        everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+        for (int i = 0; i < 2; i++) {
+            everywhere(has_same_bits(session, meshes[i], alone, &parts[i].part, &whole.part, "q"));
+            free(u[i].values);
+        }
+        insitu_destroy(&session);
+        insitu_destroy(&alone);
+        free(whole_u.values);
+        free(owners);
+        input_free(&whole);
+        for (int i = 0; i < 2; i++) input_free(&parts[i]);
+    }
+}
+
+/* ---- shells, cells and corners ------------------------------------------------------------------------------------
+ */
+
+enum { SHEET = 4 };
+
+/* A sheet on the plane z = 0.3 x + 0.2 y, of quads and, in every second square, triangles: its gradients are those of
+ * space without what is across it. */
+static void gradients_of_shells_lie_in_them(void **state)
+{
+    (void)state;
+    enum { ROW = SHEET + 1 };
+    double coordinates[ROW * ROW * 3], u[ROW * ROW * 3];
+    int offsets[2 * SHEET * SHEET + 1] = {0}, connectivity[6 * SHEET * SHEET], cells = 0, entries = 0;
+    unsigned char types[2 * SHEET * SHEET];
+    for (int v = 0; v < ROW * ROW; v++) {
+        double *p = coordinates + 3 * (ptrdiff_t)v;
+        p[0] = 0.2 * (v % ROW) + 0.05 * test_uniform((uint64_t)v, 3);
+        p[1] = 0.3 * (double)(v / ROW) + 0.05 * test_uniform((uint64_t)v, 4);
+        p[2] = 0.3 * p[0] + 0.2 * p[1];
+        linear(p, u + 3 * (ptrdiff_t)v);
+    }
+    for (int i = 0; i < SHEET * SHEET; i++) {
+        const int at = i / SHEET * ROW + i % SHEET, quad[4] = {at, at + 1, at + ROW + 1, at + ROW};
+        const int triangles[6] = {at, at + 1, at + ROW + 1, at, at + ROW + 1, at + ROW};
+        for (int part = 0; part <= i % 2; part++) {
+            const int count = i % 2 ? 3 : 4;
+            memcpy(connectivity + entries, i % 2 ? triangles + 3 * (ptrdiff_t)part : quad,
+                   (size_t)count * sizeof *quad);
+            types[cells] = i % 2 ? INSITU_TRIANGLE : INSITU_QUAD;
+            offsets[++cells] = entries += count;
+        }
+    }
+    insitu_session *session = NULL;
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = ROW * ROW;
+    insitu_mesh_interleaved(&mesh, coordinates, INSITU_FLOAT64);
+    mesh.cell_count = cells;
+    mesh.connectivity_count = entries;
+    mesh.connectivity = (insitu_array){connectivity, INSITU_INT32, 0};
+    mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
+    mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
+    insitu_field_defaults(&field);
+    field.name = "u";
+    field.component_count = 3;
+    field.count = ROW * ROW;
+    field.values = (insitu_array){u, INSITU_FLOAT64, 0};
+    static const char scene[] = "fields: {g: {gradient: u.z}}\nimages: [{name: a, size: [8, 6], layers: [{surface: "
+                                "{colour_by: {field: g}}}], outputs: [{path: a.png}]}]\n";
+    assert_int_equal(insitu_create_from_text(MPI_COMM_SELF, scene, &session), INSITU_OK);
+    assert_int_equal(insitu_set_mesh(session, "m", &mesh), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "m", &field), INSITU_OK);
+    assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
+    const double normal[3] = {-0.3, -0.2, 1}, square = 1.13, *g = slopes[2];
+    const double across = (g[0] * normal[0] + g[1] * normal[1] + g[2] * normal[2]) / square;
+    double worst = 0;
+    for (int v = 0; v < ROW * ROW; v++)
+        for (int k = 0; k < 3; k++)
+            worst = test_worse(worst, fabs(value_of(session, "g", k, v) - (g[k] - across * normal[k])));
+    everywhere(worst < 1e-12);
+    insitu_destroy(&session);
+}
+
+/* Velocities of cells are means at the vertices first, exact in a lattice but at its border; those of corners are exact
+ * as they are. */
+static void velocities_of_cells_and_corners_are_taken(void **state)
+{
+    (void)state;
+    enum { LONG = 6 };
+    for (int is_of_corners = 0; is_of_corners < 2; is_of_corners++) {
+        session_input in = {0};
+        vector_field u;
+        double worst = 0;
+        int64_t count = 0;
+        test_mesh_lattice(TEST_HEXES, LONG, 0, test_wave, &in.part);
+        input_describe(&in);
+        make_vector(&in.part, linear, INSITU_CELL, true, "u", &u);
+        if (is_of_corners) {
+            double *values = calloc((size_t)in.part.connectivity_count * 4, sizeof *values);
+            assert_non_null(values);
+            for (int64_t i = 0; i < in.part.connectivity_count; i++)
+                linear(in.part.coordinates + 3 * in.part.connectivity[i], values + 4 * i);
+            free(u.values);
+            u.values = values;
+            u.field.values.data = values;
+            u.field.count = in.part.connectivity_count;
+            u.field.centring = INSITU_CORNER;
+        }
+        insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE("w: {vorticity: u}, a: \"w.y + f\"", "a"), &in, &u);
+        const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+        for (int64_t v = 0; v < session_vertex_count(mesh); v++) {
+            double p[3];
+            grid_vertex(&mesh->cells, v, p);
+            if (!is_of_corners && fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))) > 0.5) continue;
+            count++;
+            worst = test_worse(worst, fabs(value_of(session, "w", 1, v) - (slopes[0][2] - slopes[2][0])));
+            worst =
+                test_worse(worst, fabs(value_of(session, "a", 0, v) - (slopes[0][2] - slopes[2][0] + test_wave(p))));
+        }
+        everywhere(worst < 1e-12 && count >= 27);
+        insitu_destroy(&session);
+        free(u.values);
+        input_free(&in);
+    }
+}
+
+/* ---- what changes
+ * ---------------------------------------------------------------------------------------------------- */
+
+static int64_t version_of(const insitu_session *session, const char *name)
+{
+    return derived_field(session, "m", name)->version;
+}
+
+static void step_again(insitu_session *session, vector_field *u, unsigned changed, int cycle)
+{
+    u->field.changed = changed;
+    assert_int_equal(insitu_set_field(session, "m", &u->field), INSITU_OK);
+    everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
+}
+
+static void what_stays_is_not_made_again(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    vector_field u;
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_vector(&in.part, linear, INSITU_VERTEX, true, "u", &u);
+    insitu_session *session =
+        open_stepped(MPI_COMM_WORLD, SCENE("d: {divergence: u}, x: u.x + 0, e: d + x", "e"), &in, &u);
+    const double trace = slopes[0][0] + slopes[1][1] + slopes[2][2];
+    const int64_t of_d = version_of(session, "d"), of_x = version_of(session, "x"), of_e = version_of(session, "e");
+    step_again(session, &u, INSITU_CHANGED_NOTHING, 1);
+    everywhere(version_of(session, "d") == of_d && version_of(session, "x") == of_x &&
+               version_of(session, "e") == of_e);
+    for (int64_t i = 0; i < 4 * u.field.count; i++) ((double *)u.values)[i] *= 2;
+    step_again(session, &u, INSITU_CHANGED_VALUES, 2);
+    everywhere(version_of(session, "d") > of_d && version_of(session, "e") > of_e);
+    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "d", 0, 0) - 2 * trace) < 1e-9);
+    /* A mesh twice as long has half the slopes; values alone stay. */
+    const int64_t before = version_of(session, "x");
+    for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) in.part.coordinates[i] *= 2;
+    in.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    assert_int_equal(insitu_set_mesh(session, "m", &in.mesh), INSITU_OK);
+    step_again(session, &u, INSITU_CHANGED_NOTHING, 3);
+    everywhere(version_of(session, "x") == before);
+    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "d", 0, 0) - trace) < 1e-9);
+    insitu_destroy(&session);
+    free(u.values);
+    input_free(&in);
+}
+
+/* An edited scene has its own derived fields, also under names of the old one. */
+static void an_edited_scene_has_its_own(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    vector_field u;
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_vector(&in.part, linear, INSITU_VERTEX, true, "u", &u);
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene(SCENE("a: u.x + 0, b: {gradient: a}, c: b.y + f", "c")));
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    step_again(session, &u, INSITU_CHANGED_ALL, 0);
+    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "b", 1, 0) - slopes[0][1]) < 1e-9);
+    write_scene(SCENE("longer: u.z + 0, a: {gradient: longer, component: y}, c: a - longer", "c"));
+    step_again(session, &u, INSITU_CHANGED_NOTHING, 1);
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    everywhere(session_find_field(mesh, "b") < 0);
+    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "a", 0, 0) - slopes[2][1]) < 1e-9);
+    insitu_destroy(&session);
+    free(u.values);
+    input_free(&in);
+}
+
+/* ---- what is wrong
+ * --------------------------------------------------------------------------------------------------- */
+
+typedef struct wrong_case {
+    const char *fields, *words[3];
+} wrong_case;
+
+static const wrong_case wrong[] = {
+    {"q: {q_criterion: f}",
+     {"fields.q.q_criterion", "field \"f\" has 1 component on mesh \"m\"", "expected a vector of 2 or 3"}},
+    {"q: {vorticity: uu}", {"fields.q: no mesh has the field \"uu\"", "there are", "\"u\" (mesh \"m\")"}},
+    {"q: {divergence: velocty}", {"fields.q: no mesh has the field \"velocty\"", "(did you mean velocity?)", ""}},
+    {"p: a + 1, a: 2 * nosuch, q: p / 2", {"fields.a: no mesh has the field \"nosuch\"", "of which it is made", ""}},
+    {"q: u + 1", {"fields.q: ", "field \"u\" has 3 components on mesh \"m\"", "as u.x, or mag(u)"}},
+    {"q: u.3 + 1", {"fields.q: ", "component 3 of field \"u\"", "expected 0 to 2"}},
+    {"q: {gradient: u}", {"fields.q.gradient: ", "field \"u\" has 3 components", "expected a scalar, as u.x"}},
+    {"q: {lambda2: [f, u, f]}", {"fields.q.lambda2: ", "field \"u\" has 3 components", "expected a scalar, as u.x"}},
+    {"q: {field: u, component: 7}", {"fields.q.field: ", "component 7 of field \"u\"", "expected 0 to 2"}},
+    {"w: {vorticity: u}, q: w.4 * 2", {"fields.q: ", "component 4 of field \"w\"", "expected 0 to 2"}},
+    {"u: f + 1, q: f / 2", {"", "", ""}},
+};
+
+/* Each is told in the step, to all ranks alike, with the line; an image of other fields is drawn all the same. */
+static void what_is_wrong_is_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    vector_field u, velocity;
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, swirl, INSITU_VERTEX, true, "velocity", &velocity);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        char scene[1000];
+        const bool is_right = !*wrong[i].words[0];
+        snprintf(scene, sizeof scene,
+                 "fields: {%s}\nimages:\n  - {name: a, size: [8, 6], layers: [{slice: {field: q}}], outputs: [{path: "
+                 "a.png}]}\n  - {name: b, size: [8, 6], layers: [{slice: {field: f}}], outputs: [{path: b.png}]}\n",
+                 wrong[i].fields);
+        insitu_session *session = begin(MPI_COMM_WORLD, scene, &in, &u);
+        assert_int_equal(insitu_set_field(session, "m", &velocity.field), INSITU_OK);
+        for (int cycle = 0; cycle < 2; cycle++) {
+            forget_pictures();
+            const insitu_status status = insitu_step(session, cycle, 0);
+            if (is_right)
+                everywhere(status == INSITU_OK);
+            else
+                told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
+                                wrong[i].words[2]);
+            everywhere(own_rank != 0 || caught_count == (is_right ? 2 : 1));
+        }
+        insitu_destroy(&session);
+    }
+    free(u.values);
+    free(velocity.values);
+    input_free(&in);
+}
+
+/* A name that the simulation has, too; and a field whose components differ on one rank. */
+static void clashes_are_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    vector_field u;
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
+    insitu_session *session = begin(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
+    insitu_status status = insitu_step(session, 0, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: fields.f: mesh \"m\" has a field of this name already",
+                    "expected another name");
+    insitu_destroy(&session);
+    /* It may come later. */
+    session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);
+    insitu_field late = in.field;
+    late.name = "late";
+    assert_int_equal(insitu_set_field(session, "m", &late), INSITU_OK);
+    status = insitu_step(session, 1, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, "fields.late: mesh \"m\" has a field of this name already");
+    insitu_destroy(&session);
+    if (rank_count > 1) {
+        session = begin(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &in, NULL);
+        if (own_rank == rank_count - 1) u.field.component_count = 2;
+        assert_int_equal(insitu_set_field(session, "m", &u.field), INSITU_OK);
+        status = insitu_step(session, 0, 0);
+        told_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
+                        "another centring or number of components");
+        insitu_destroy(&session);
+    }
+    free(u.values);
+    input_free(&in);
+}
+
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(linear_velocities_are_exact),
-                                       cmocka_unit_test(expressions_are_those_of_c),
-                                       cmocka_unit_test(partitions_do_not_show)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(linear_velocities_are_exact),     cmocka_unit_test(expressions_are_those_of_c),
+        cmocka_unit_test(partitions_do_not_show),          cmocka_unit_test(blocks_show_no_seam),
+        cmocka_unit_test(gradients_of_shells_lie_in_them), cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
+        cmocka_unit_test(what_stays_is_not_made_again),    cmocka_unit_test(an_edited_scene_has_its_own),
+        cmocka_unit_test(what_is_wrong_is_told_to_all),    cmocka_unit_test(clashes_are_told_to_all),
+    };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -35,23 +35,23 @@ static const char full_scene[] =
         IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01, reproducible: true}\n" DECORATIONS)
             IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
 
-static const char edited_scene[] =
-    "threads: 1\nimages:\n" IMAGE("e", "[24, 16]",
-                                  "      - isosurface: {field: f, values: [0.2], normals: differences}\n"
-                                  "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], clip: {sphere: {centre: "
-                                  "[0, 0, 0], radius: 0.5}}}\n"
-                                  "      - surface: {opacity: 0.5, colour_by: {field: c, discrete: 4,\n"
-                                  "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
-                                  "          range: run, below: [0, 0, 0]}}\n"
-                                  "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: "
-                                  "symlog,\n"
-                                  "          threshold: 0.1, above: [1, 1, 1]}\n",
-                                  "    sampling: {step_cells: 0.5}\n    shadows: true\n    ambient_occlusion: "
-                                  "{samples: 2}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
-                                                    "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
-                                                    "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: "
-                                                    "{field: f}}\n"
-                                                    "    outputs: [{cinema: memory.cdb}]\n";
+static const char edited_scene[] = "threads: 1\nfields: {l: {lambda2: [f, f, c]}, h: l * f + c}\nimages:\n" IMAGE(
+    "e", "[24, 16]",
+    "      - isosurface: {field: f, values: [0.2], normals: differences}\n"
+    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], clip: {sphere: {centre: "
+    "[0, 0, 0], radius: 0.5}}}\n"
+    "      - surface: {opacity: 0.5, colour_by: {field: h, discrete: 4,\n"
+    "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
+    "          range: run, below: [0, 0, 0]}}\n"
+    "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: "
+    "symlog,\n"
+    "          threshold: 0.1, above: [1, 1, 1]}\n",
+    "    sampling: {step_cells: 0.5}\n    shadows: true\n    ambient_occlusion: "
+    "{samples: 2}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
+                      "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
+                      "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: "
+                      "{field: f}}\n"
+                      "    outputs: [{cinema: memory.cdb}]\n";
 
 typedef struct memory_case {
     const char *name;
@@ -138,8 +138,8 @@ static bool are_of(const picture_set *set)
     for (int i = 0; i < caught_count; i++) {
         bool is_one = false;
         for (int k = 0; k < set->count; k++)
-            is_one = is_one || (same_pictures(&caught[i], &set->pictures[k]) &&
-                                !strcmp(caught[i].path, set->pictures[k].path));
+            is_one = is_one ||
+                     (same_pictures(&caught[i], &set->pictures[k]) && !strcmp(caught[i].path, set->pictures[k].path));
         are_all = are_all && is_one;
     }
     return are_all;
