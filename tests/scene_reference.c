@@ -82,7 +82,7 @@ static const char introduction[] =
     "moved at random an error of first order, of their amount, remains. On meshes of triangles, quads and polygons alone\n"
     "gradients lie in the cells' planes. Values in cells are taken to the vertices first, which has an error of second\n"
     "order of its own, and of first at the border unless the field has values there (`insitu_patch`). An expression of\n"
-    "fields in cells alone is a field in cells.\n"
+    "fields in cells alone is a field in cells, without values on the boundary.\n"
     "\n"
     "Values are made in the steps that need them, and again where what they are made of, or for gradients the mesh, has\n"
     "changed. A component takes 4 bytes a vertex or cell, 8 where a field that it is made of has 8; the report says so.\n"

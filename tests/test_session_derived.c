@@ -320,13 +320,15 @@ static bool has_same_bits(const insitu_session *parts, const char *mesh, const i
     return is_same;
 }
 
-/* Rank by rank, other numbers of vertices and cells, turned cells, and ghosts do not matter. */
+#define PARTITION_SCENE                                                                                                \
+    SCENE("q: {q_criterion: u}, w: {vorticity: u}, l: {lambda2: u}, mixed: q + w.z + l + c.x", "mixed")
+
+/* Threads, ranks, other numbers of vertices and cells, turned cells, and ghosts do not matter. */
 static void partitions_do_not_show(void **state)
 {
     (void)state;
     static const char *const names[] = {"q", "w", "l", "mixed"};
-    const char *const scene =
-        SCENE("q: {q_criterion: u}, w: {vorticity: u}, l: {lambda2: u}, mixed: q + w.z + l + c.x", "mixed");
+    static const char scene[] = "threads: 1\n" PARTITION_SCENE, two_threads[] = "threads: 2\n" PARTITION_SCENE;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
             session_input whole = {0}, in = {0};
@@ -338,12 +340,11 @@ static void partitions_do_not_show(void **state)
             input_describe(&in);
             make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
             make_vector(&whole.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
-            /* Cells' values are of places that only they know, whose sums' order does not matter: constants. */
             make_vector(&in.part, linear, INSITU_VERTEX, true, "c", &c);
             make_vector(&whole.part, linear, INSITU_VERTEX, true, "c", &whole_c);
             insitu_session *parts = begin(MPI_COMM_WORLD, scene, &in, &u);
             assert_int_equal(insitu_set_field(parts, "m", &c.field), INSITU_OK);
-            insitu_session *alone = begin(MPI_COMM_SELF, scene, &whole, &whole_u);
+            insitu_session *alone = begin(MPI_COMM_SELF, two_threads, &whole, &whole_u);
             assert_int_equal(insitu_set_field(alone, "m", &whole_c.field), INSITU_OK);
             everywhere(insitu_step(parts, 0, 0) == INSITU_OK);
             everywhere(insitu_step(alone, 0, 0) == INSITU_OK);
