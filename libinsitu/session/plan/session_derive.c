@@ -68,33 +68,12 @@ static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mes
     return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
 }
 
-/* Tells whether the one input is a vector, whose components are taken in turn. */
-static bool is_vector(const scene_derived *derived)
-{
-    return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
-}
-
 static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *input)
 {
     return session_joint_name(mesh, input->joined);
 }
 
 /* ---- values at vertices of those of cells ---------------------------------------------------------------------- */
-
-static bool add_recentring(derive_work *w, const session_recentring *item)
-{
-    for (int i = 0; i < w->recentring_count; i++) {
-        const session_recentring *other = &w->recentrings[i];
-        if (other->joint == item->joint && strcmp(other->field, item->field) == 0 &&
-            other->component == item->component)
-            return true;
-    }
-    session_recentring *more = base_realloc(w->recentrings, (size_t)(w->recentring_count + 1) * sizeof *w->recentrings);
-    if (!more) return false;
-    w->recentrings = more;
-    more[w->recentring_count++] = *item;
-    return true;
-}
 
 /* Adds the scalar that is recentred to this rank's part of the mesh. */
 static bool add_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
@@ -118,13 +97,14 @@ static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, c
 {
     if (!is_recentred(w, mesh, input)) return true;
     const int count = session_catalogue_find(mesh, input->name)->component_count;
-    const int first = is_vector(w->derived) ? 0 : component_of(input, count);
-    const int end = is_vector(w->derived) ? count : first + 1;
+    const int first = session_takes_vector(w->derived) ? 0 : component_of(input, count);
+    const int end = session_takes_vector(w->derived) ? count : first + 1;
     session_joint *joint = session_find_joint(w->basis->catalogue, joint_of(mesh, input));
     bool is_done = joint != NULL;
     for (int c = first; c < end && is_done; c++) {
         const session_recentring item = {joint, input->name, c};
-        is_done = add_recentring(w, &item) && add_recentred(w, mesh, input, c);
+        is_done =
+            session_add_recentring(&w->recentrings, &w->recentring_count, &item) && add_recentred(w, mesh, input, c);
     }
     return is_done;
 }
@@ -403,10 +383,10 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
 {
     const scene_derived *derived = w->derived;
     const int first = session_find_field(part, derived->inputs[0].name);
-    const int count = is_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
+    const int count = session_takes_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
     for (int c = 0; c < count; c++)
-        out[c] = input_values(w, mesh, part, is_vector(derived) ? 0 : c,
-                              is_vector(derived) ? c : component_of(&derived->inputs[c], 1));
+        out[c] = input_values(w, mesh, part, session_takes_vector(derived) ? 0 : c,
+                              session_takes_vector(derived) ? c : component_of(&derived->inputs[c], 1));
     return count;
 }
 
@@ -421,7 +401,7 @@ static const session_catalogue_mesh *first_sound(const derive_work *w, const ses
 /* A number that ranks without a part of a mesh have to know, too. */
 static int count_scalars(const derive_work *w, const session_joint *joint)
 {
-    if (!is_vector(w->derived)) return w->derived->input_count;
+    if (!session_takes_vector(w->derived)) return w->derived->input_count;
     return session_catalogue_find(first_sound(w, joint), w->derived->inputs[0].name)->component_count;
 }
 

@@ -6,6 +6,11 @@
 #include "session_agree.h"
 #include "session_events.h"
 
+bool session_takes_vector(const scene_derived *derived)
+{
+    return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
+}
+
 int session_find_derived(const scene *scene, const char *name)
 {
     for (int i = 0; i < scene->derived_count && name; i++)
@@ -103,11 +108,6 @@ static insitu_status refuse_components(const derived_place *at, const scene_fiel
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-static bool is_vector(const scene_derived *derived)
-{
-    return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
-}
-
 /* Vectors on meshes that are taken as one have as many components. */
 static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
@@ -127,7 +127,7 @@ static insitu_status check_components(const derived_place *at, const scene_field
                                       const session_catalogue_field *found, base_error *error)
 {
     const int count = found->component_count;
-    if (is_vector(at->derived)) {
+    if (session_takes_vector(at->derived)) {
         if (count == 2 || count == 3) return check_other_meshes(at, input, found, error);
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "field \"%s\" has %d component%s on mesh \"%s\", expected a vector of 2 or 3, or a list of "

@@ -21,6 +21,9 @@ uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool image
 /* Marks on this rank's meshes the fields that the derived ones are made of, so that they are filled and copied. */
 void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes);
 
+/* Tells whether the field is made of one vector, whose components' gradients are taken. */
+bool session_takes_vector(const scene_derived *derived);
+
 /* The field's place in the scene's derived fields; -1: it is none of them. */
 int session_find_derived(const scene *scene, const char *name);
 

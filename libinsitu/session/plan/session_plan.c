@@ -14,6 +14,7 @@
 #include "session_events.h"
 #include "session_filled.h"
 #include "session_indexed.h"
+#include "session_recentre.h"
 #include "session_scalars.h"
 
 /* ---- can the image be drawn? --------------------------------------------------------------------------------- */
@@ -237,21 +238,6 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
 
 /* ---- what is to be recentred --------------------------------------------------------------------------------- */
 
-static bool add_recentring(session_plan *plan, session_recentring item)
-{
-    for (int i = 0; i < plan->recentring_count; i++) {
-        const session_recentring *other = &plan->recentrings[i];
-        if (other->joint == item.joint && strcmp(other->field, item.field) == 0 && other->component == item.component)
-            return true;
-    }
-    session_recentring *items =
-        base_realloc(plan->recentrings, (size_t)(plan->recentring_count + 1) * sizeof *plan->recentrings);
-    if (!items) return false;
-    plan->recentrings = items;
-    items[plan->recentring_count++] = item;
-    return true;
-}
-
 static bool add_recentrings(const session_catalogue *catalogue, session_plan *plan, const scene_field *field)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
@@ -262,7 +248,7 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
             is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joined)) : NULL;
         if (!joint) continue;
         const session_recentring item = {joint, field->name, session_resolve_component(field, shown->component_count)};
-        if (!add_recentring(plan, item)) return false;
+        if (!session_add_recentring(&plan->recentrings, &plan->recentring_count, &item)) return false;
     }
     return true;
 }

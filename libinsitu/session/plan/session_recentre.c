@@ -578,6 +578,21 @@ static bool is_stale(const session_recentring *item, const session_meshes *meshe
     return false;
 }
 
+bool session_add_recentring(session_recentring **items, int *count, const session_recentring *item)
+{
+    for (int i = 0; i < *count; i++) {
+        const session_recentring *other = &(*items)[i];
+        if (other->joint == item->joint && strcmp(other->field, item->field) == 0 &&
+            other->component == item->component)
+            return true;
+    }
+    session_recentring *more = base_realloc(*items, (size_t)(*count + 1) * sizeof *more);
+    if (!more) return false;
+    *items = more;
+    more[(*count)++] = *item;
+    return true;
+}
+
 insitu_status session_recentre(const session_recentring *items, int count, int *stale, const session_meshes *meshes,
                                const session_team *team, base_error *error)
 {
