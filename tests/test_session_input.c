@@ -96,6 +96,11 @@ static void no_coordinates(session_input *in)
 {
     in->mesh.coordinates[2].data = NULL;
 }
+static void no_coordinates_of_hexes(session_input *in)
+{
+    in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
+    no_coordinates(in);
+}
 static void no_connectivity(session_input *in)
 {
     in->mesh.connectivity.data = NULL;
@@ -193,7 +198,12 @@ static const spoilt_case cases[] = {
     {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
     {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 41"}},
     {"one type's count", one_type_wrong_count, INSITU_ERROR_MESH, true, {"connectivity_count is ", "of 6 vertices"}},
-    {"no coordinates", no_coordinates, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},
+    {"no coordinates", no_coordinates_of_hexes, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},
+    {"no coordinates of mixed cells",
+     no_coordinates,
+     INSITU_ERROR_MESH,
+     false,
+     {"z coordinates are not given, but cell 0 (hex) needs them"}},
     {"no connectivity", no_connectivity, INSITU_ERROR_MESH, true, {"connectivity indices are not given"}},
     {"negative count", count_negative, INSITU_ERROR_ARGUMENT, true, {"vertex_count is -1"}},
     {"too many cells", cells_too_many, INSITU_ERROR_ARGUMENT, true, {"cell_count is 4294967295"}},

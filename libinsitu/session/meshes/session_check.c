@@ -443,6 +443,21 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
     return INSITU_OK;
 }
 
+/* Cells of three dimensions in a mesh without z have no volume. The first drawn one is told; mixed cells alone come
+ * here, as the set call knows the type of others. */
+static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
+{
+    const grid *g = &mesh->cells;
+    if (mesh->given.coordinates[2].data || tally->drawn == tally->shells) return INSITU_OK;
+    int64_t cell = 0;
+    while (cell + 1 < g->cell_count && (grid_is_ghost(g, cell) || grid_is_shell_type(grid_cell_type(g, cell)))) cell++;
+    return base_fail(
+        error, INSITU_ERROR_MESH,
+        "mesh \"%s\": z coordinates are not given, but cell %lld (%s) needs them: only triangles, quads and "
+        "polygons go without",
+        mesh->name, (long long)cell, given_name(mesh, cell));
+}
+
 static bool is_far(const mesh_tally *tally)
 {
     bool far = false;
@@ -490,6 +505,7 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     const int64_t bad = check_cells(mesh, threads, &tally);
     if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
     insitu_status status = is_far(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
+    if (!status) status = check_plane(mesh, &tally, error);
     if (!status) status = update_flat(mesh, tally.flat, threads, error);
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
