@@ -124,38 +124,12 @@ static void measure(studio *s, accuracy_row *row)
     accuracy_print(s->context, row);
 }
 
-/* The ways in which rays find the cells: the picture at once, or as in the thesis. All draw the same bits. */
-typedef struct surface_way {
-    render_traversal traversal;
-    const char *neubauer, *robust;
-} surface_way;
-
-static void root_rows(studio *s, const surface_way *way)
-{
-    s->scene.job.traversal = way->traversal;
-    s->scene.surface.root = RENDER_NEUBAUER;
-    for (int n = 0; n <= 4; n++) {
-        accuracy_row row = {.layer = "isosurface", .method = way->neubauer};
-        s->scene.surface.root_steps = n;
-        snprintf(row.setting, sizeof row.setting, "N = %d", n);
-        measure(s, &row);
-    }
-    s->scene.surface.root = RENDER_ROBUST;
-    measure(s, &(accuracy_row){.layer = "isosurface", .method = way->robust, .setting = "robust"});
-}
-
-/* Packets and SPMD are measured only on a lattice of tets and one of hexes; the ratios are the same elsewhere. */
 void accuracy_surface_rows(const accuracy_context *context)
 {
-    static const surface_way ways[] = {{RENDER_BINNED, "Neubauer", "robust"},
-                                       {RENDER_PACKETS, "Neubauer packets", "robust packets"},
-                                       {RENDER_SPMD, "Neubauer SPMD", "robust SPMD"}};
-    const char *name = context->subject->name;
-    const bool is_lattice = !strncmp(name, "tets:", 5) || !strncmp(name, "hexes:", 6);
     if (context->effort->is_brief) return;
     studio s = open_studio(context);
     accuracy_scene_surface(&s.scene, context->subject);
-    for (size_t i = 0; i < (is_lattice ? sizeof ways / sizeof *ways : 1); i++) root_rows(&s, &ways[i]);
+    measure(&s, &(accuracy_row){.layer = "isosurface", .method = "robust", .setting = "robust"});
     close_studio(&s);
 }
 

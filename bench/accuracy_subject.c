@@ -262,8 +262,7 @@ void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *s)
                                             .values = &s->isovalue,
                                             .colours = colour,
                                             .opacity = 1,
-                                            .material = {0.15f, 0.75f, 0.25f, 32},
-                                            .root = RENDER_ROBUST};
+                                            .material = {0.15f, 0.75f, 0.25f, 32}};
     scene->job.lights = &light;
     scene->job.light_count = 1;
     scene->job.surfaces = &scene->surface;

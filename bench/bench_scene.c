@@ -56,8 +56,7 @@ static void set_layers(bench_scene *s)
                                         .values = bench_isovalues,
                                         .colours = colours[0],
                                         .opacity = 1,
-                                        .material = {0.15f, 0.75f, 0.25f, 32},
-                                        .root = RENDER_ROBUST};
+                                        .material = {0.15f, 0.75f, 0.25f, 32}};
     s->transfer = (render_transfer){.low = bench_knots[0],
                                     .high = bench_knots[BENCH_KNOTS - 1],
                                     .opacity_count = BENCH_KNOTS,

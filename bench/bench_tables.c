@@ -22,8 +22,7 @@ static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 static const struct {
     const char *name;
     render_traversal traversal;
-} traversals[] = {
-    {"binned", RENDER_BINNED}, {"tiles", RENDER_TILES}, {"packets", RENDER_PACKETS}, {"spmd", RENDER_SPMD}};
+} traversals[] = {{"binned", RENDER_BINNED}, {"tiles", RENDER_TILES}};
 
 static void build(bench_scene *s)
 {
@@ -59,14 +58,13 @@ static void measure_volume(bench_scene *s, const char *name, const bench_command
     bench_scene_integral_error(s, name);
 }
 
-/* Groups do not matter to tiles, which look up as many samples as they can. */
+/* A tile's window has as many samples as a group, or fewer. */
 static void measure_groups(bench_scene *s, const char *prefix, const bench_command *command)
 {
     char name[64];
     s->job.traversal = RENDER_TILES;
     snprintf(name, sizeof name, "%s tiles", prefix);
     measure_volume(s, name, command);
-    s->job.traversal = RENDER_PACKETS;
     for (int i = 0; i < GROUPS; i++) {
         snprintf(name, sizeof name, "%s group %d", prefix, groups[i]);
         s->job.sample_group = groups[i];

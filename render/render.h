@@ -111,12 +111,6 @@ typedef struct render_field {
     const mmbvh_ranges *ranges;
 } render_field;
 
-/* The method that finds crossings in a cell along a ray. Tets have at most one, which both find exactly. */
-typedef enum render_root {
-    RENDER_NEUBAUER, /* root_steps of regula falsi; two crossings of one interval are missed, of three one is found */
-    RENDER_ROBUST    /* every crossing, isolated and then polished: render/kernel_roots.h */
-} render_root;
-
 typedef enum render_normal {
     RENDER_GRADIENT,    /* of the cell that holds the hit */
     RENDER_DIFFERENCES, /* central ones (thesis, 4.3.4): one-sided where a sample is in no cell, the cell's gradient
@@ -176,8 +170,6 @@ typedef struct render_surface_layer {
     const render_transfer *colour_map;
     float opacity; /* 0 .. 1; 1 ends the ray */
     render_material material;
-    render_root root;
-    int root_steps; /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
     render_normal normal;
     double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
     const render_vertex_gradients *gradients; /* of RENDER_VERTEX: part by part */
@@ -212,16 +204,12 @@ typedef struct render_part {
     const int64_t *loops;
 } render_part;
 
-/* The way that rays find isosurfaces and the cells of samples. The picture is the same to the last bit; the speed
- * differs. Tiles of 16 x 16 rays serve where they can; packets are taken instead where transparent surfaces cut
- * segments. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most; by samples and
- * without surfaces tiles and packets round the values of cells with quads in different ways, 2e-6 at most. */
+/* The way that tiles of 16 x 16 rays find the cells that they show. The picture is the same to the last bit; the speed
+ * differs. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most. */
 typedef enum render_traversal {
-    RENDER_BINNED,  /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
+    RENDER_BINNED, /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
                       tile, unless more show than pay; several volumes as by RENDER_TILES */
-    RENDER_TILES,   /* a tile of the picture goes down the trees at once */
-    RENDER_PACKETS, /* as many rays as a vector has lanes, together (thesis, 4.3.1) */
-    RENDER_SPMD     /* every lane on its own */
+    RENDER_TILES   /* a tile of the picture goes down the trees at once */
 } render_traversal;
 
 /* The method that integrates volumes: samples (thesis, 4.4), whose error goes with the step, or segments, which are

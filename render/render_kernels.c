@@ -1,6 +1,6 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
  * its surfaces first, so that volumes know where opaque ones end them. It is traced by the cells that are binned there,
- * in one traversal, or packet by packet. */
+ * or in one traversal. */
 #include <stddef.h>
 
 #include "grid.h"
@@ -29,7 +29,6 @@
 #include "kernel_tile_trace.h"
 #include "kernel_tile_volume.h"
 #include "kernel_types.h"
-#include "kernel_volume.h"
 #include "pixel_set.h"
 #include "render.h"
 #include "simd.h"
@@ -304,7 +303,6 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
 /* The memory that a thread keeps from tile to tile. */
 typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
-    kernel_curved curved_cells[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
     kernel_cell tile_cell;
     kernel_curved tile_curved;
     kernel_tile_trace tile;
@@ -320,47 +318,6 @@ static int volume_turns(const kernel_frame *f)
     return f->volume_turns ? f->volume_turns : 1;
 }
 
-static void trace_packet_turn(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
-{
-    if (p->frame->has_segments) {
-        p->is_pencil = false; /* packet by packet, lines would not be used often enough to pay */
-        if (p->frame->job->separate_samples)
-            kernel_trace_apart(p);
-        else
-            kernel_trace_segments(p, first_fragment);
-    } else {
-        kernel_trace_volumes(p, hits);
-    }
-}
-
-static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
-{
-    kernel_thread *thread = p->thread;
-    const double start = thread->now();
-    for (int turn = 0; turn < volume_turns(p->frame); turn++) {
-        if (p->frame->volume_turns) kernel_packet_clip_volumes(p, turn);
-        trace_packet_turn(p, hits, first_fragment);
-    }
-    thread->volume_seconds += thread->now() - start;
-}
-
-static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread, int x0, int y0)
-{
-    kernel_packet p;
-    kernel_hits hits;
-    const int64_t first_fragment = thread->out->count;
-    kernel_packet_begin(&p, f, tile, thread, x0, y0);
-    kernel_packet_complete(&p);
-    kernel_hits_begin(&hits);
-    if (f->surface_count) {
-        const double start = thread->now();
-        kernel_trace_surfaces(&p, &hits);
-        kernel_emit_opaque(&p, &hits);
-        thread->surface_seconds += thread->now() - start;
-    }
-    if (f->volume_count) trace_packet_volumes(&p, &hits, first_fragment);
-}
-
 /* Tells whether one of the rectangle's pixels is to be traced. */
 static bool is_wanted(const render_job *job, int x0, int y0, int columns, int rows)
 {
@@ -370,17 +327,6 @@ static bool is_wanted(const render_job *job, int x0, int y0, int columns, int ro
         for (int x = x0; x < x1 && x < job->camera.width; x++)
             if (pixel_set_has(job->pixels, (int64_t)y * job->camera.width + x)) return true;
     return false;
-}
-
-static void trace_packets(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
-{
-    kernel_tile tile;
-    kernel_tile_setup(&tile, f, x0, y0);
-    kernel_tile_rays(&tile, f);
-    for (int y = y0; y < y0 + KERNEL_TILE; y += KERNEL_PACKET_ROWS)
-        for (int x = x0; x < x0 + KERNEL_TILE; x += KERNEL_PACKET_COLUMNS)
-            if (is_wanted(f->job, x, y, KERNEL_PACKET_COLUMNS, KERNEL_PACKET_ROWS))
-                trace_packet(f, &tile, thread, x, y);
 }
 
 static unsigned wanted_blocks(const render_job *job, int x0, int y0)
@@ -406,20 +352,6 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
             kernel_emit_opaque(&t->packets[i], &t->hits[i]);
         }
     t->thread->surface_seconds += t->thread->now() - start;
-}
-
-/* Traces volumes packet by packet, each sample or segment as a fragment of its own. */
-static void trace_tile_apart(kernel_tile_trace *t)
-{
-    for (unsigned left = t->wanted; left; left &= left - 1) {
-        const int block = __builtin_ctz(left);
-        kernel_block_begin(t, block);
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-            const int i = block * KERNEL_BLOCK_PACKETS + n;
-            kernel_packet_complete(&t->packets[i]);
-            trace_packet_volumes(&t->packets[i], &t->hits[i], t->thread->out->count);
-        }
-    }
 }
 
 static void trace_tile_segments(kernel_tile_trace *t)
@@ -466,10 +398,6 @@ static bool begins_run(const kernel_frame *f, int x0, int y0)
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
-    if (!f->by_tiles) {
-        trace_packets(f, thread, x0, y0);
-        return;
-    }
     if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
     const bool fogs = has_volume(f, thread, x0, y0);
@@ -479,9 +407,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);
     if (!fogs) return;
-    if (f->has_segments && f->job->separate_samples)
-        trace_tile_apart(t);
-    else if (f->has_segments)
+    if (f->has_segments)
         trace_tile_segments(t);
     else
         trace_tile_samples(t);
@@ -502,7 +428,6 @@ static void begin(kernel_thread *thread)
 {
     kernel_memory *m = thread->memory;
     thread->cells = &m->packet_cells;
-    thread->curved_cells = m->curved_cells;
     thread->tile = &m->tile;
     thread->tile_cells = &m->cells;
     thread->tile_volume = &m->volume;

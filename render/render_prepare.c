@@ -220,9 +220,6 @@ static insitu_status check_job(const render_job *job, base_error *error)
         if (job->surfaces[i].value_count < 1)
             return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: %d isovalues, expected 1 or more", i,
                              job->surfaces[i].value_count);
-        if (job->surfaces[i].root_steps < 0 || job->surfaces[i].root_steps > 64)
-            return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: %d root steps, expected 0 to 64", i,
-                             job->surfaces[i].root_steps);
         if (job->surfaces[i].normal == RENDER_DIFFERENCES && !(job->surfaces[i].difference > 0))
             return base_fail(error, INSITU_ERROR_ARGUMENT,
                              "isosurface %d: differences over %g cell sizes, expected more than 0", i,
@@ -352,8 +349,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
     const insitu_status segments = prepare_segments(frame, error);
     if (segments != INSITU_OK) render_unprepare(frame);
-    frame->by_tiles = job->traversal <= RENDER_TILES && !(frame->has_segments && frame->has_transparent);
-    const bool bins = frame->by_tiles && job->traversal == RENDER_BINNED && !job->pixels;
+    const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
     /* A tile's list of cells is used up by one turn. */
     frame->bins_volume =

@@ -391,6 +391,30 @@ static void find_active(course *c, const stretch *list, int64_t count, double fr
         if (list[i].z_in <= from && list[i].z_out >= to) c->active[c->count++] = &list[i];
 }
 
+/* Is the ray's place within what the job's clips of volumes leave? */
+static bool is_kept(const course *c, double z)
+{
+    const render_job *job = c->scene->job;
+    const render_camera *camera = &job->camera;
+    const double x = c->line.base[0] + c->line.slope[0] * z, y = c->line.base[1] + c->line.slope[1] * z;
+    for (int i = 0; i < job->clip_count; i++) {
+        const render_clip *clip = &job->clips[i];
+        double square = 0, along = 0;
+        bool is_in_box = true;
+        for (int a = 0; a < 3; a++) {
+            const double place = camera->eye[a] + x * camera->right[a] + y * camera->up[a] + z * camera->forward[a];
+            square += (place - clip->centre[a]) * (place - clip->centre[a]);
+            along += place * clip->normal[a];
+            is_in_box = is_in_box && clip->lower[a] <= place && place <= clip->upper[a];
+        }
+        const bool is_within = clip->kind == RENDER_CLIP_SPHERE  ? square <= clip->radius * clip->radius
+                               : clip->kind == RENDER_CLIP_PLANE ? along <= clip->distance
+                                                                 : is_in_box;
+        if (job->volume_clips >> i & 1 && is_within == clip->is_outside) return false;
+    }
+    return true;
+}
+
 void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
                               const reference_hit *hits, int hit_count, double rgba[4])
 {
@@ -403,7 +427,7 @@ void reference_integral_trace(const reference_integral *scene, int x, int y, con
     c.active = reference_reserve(NULL, (size_t)count * sizeof *c.active);
     for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {
         for (; next < hit_count && hits[next].depth <= z[i]; next++) blend_hit(&sum, &hits[next]);
-        if (i + 1 == cuts || !(z[i] < z[i + 1])) continue;
+        if (i + 1 == cuts || !(z[i] < z[i + 1]) || !is_kept(&c, 0.5 * (z[i] + z[i + 1]))) continue;
         find_active(&c, list, count, z[i], z[i + 1]);
         if (!c.count) continue;
         const light part = integrate(&c, z[i], z[i + 1]);

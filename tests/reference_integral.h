@@ -12,7 +12,8 @@ typedef struct reference_integral reference_integral;
 reference_integral *reference_integral_create(const render_job *job, double tolerance);
 void reference_integral_free(reference_integral *scene);
 
-/* The pixel over the background, hits (by depth, the last one may be opaque) included. */
+/* The pixel over the background, hits (by depth, the last one may be opaque) included. Clips of the job's volumes are
+ * followed where the ray is cut at their ends as well, by hits that are clear. */
 void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
                               const reference_hit *hits, int hit_count, double rgba[4]);
 

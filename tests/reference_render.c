@@ -180,44 +180,6 @@ static double bisect(trace *t, const placed_cell *c, const double *values, doubl
     return 0.5 * (low + high);
 }
 
-/* Neubauer's method: regula falsi from the faces' values, for its error alone. */
-static double falsi(trace *t, const placed_cell *c, const double *values, double iso, const reference_crossing ends[2],
-                    const double face[2], int steps)
-{
-    double z0 = ends[0].z, z1 = ends[1].z, v0 = face[0] - iso, v1 = face[1] - iso;
-    double z = z0 - v0 * (z1 - z0) / (v1 - v0), last = (double)INFINITY;
-    for (int n = 0; n < steps && fabs(z - last) > 1e-12 * c->size; n++) {
-        const double v = value_along(t, c, values, z) - iso;
-        if ((v < 0) == (v0 < 0)) {
-            z0 = z;
-            v0 = v;
-        } else {
-            z1 = z;
-            v1 = v;
-        }
-        last = z;
-        z = z0 - v0 * (z1 - z0) / (v1 - v0);
-    }
-    return z;
-}
-
-/* More sign changes than the one that the ends promise? */
-static bool is_ambiguous(trace *t, const placed_cell *c, const double *values, double iso, double z_in, double z_out,
-                         bool side_in)
-{
-    enum { PIECES = 16 };
-    bool side = side_in;
-    int changes = 0;
-    for (int i = 0; i <= PIECES; i++) {
-        const double z = z_in + (z_out - z_in) * ((1e-9 + i) / (PIECES + 2e-9));
-        const bool now = value_along(t, c, values, z) >= iso;
-        if (i == 0 && now != side_in) return true;
-        changes += now != side;
-        side = now;
-    }
-    return changes != 1;
-}
-
 /* ---- every crossing ---- */
 
 typedef struct along {
@@ -298,26 +260,6 @@ static int profile_fence(const along *a, double z[REFERENCE_MAX_BREAKS], double 
     return count;
 }
 
-/* A polyhedron's first root: on the first piece of the profile whose end has the other side. */
-static double first_root(trace *t, const placed_cell *c, const double *values, double iso, bool side_in)
-{
-    double breaks[REFERENCE_MAX_BREAKS];
-    const int count = reference_profile_breaks(&c->cell, &t->line, c->ends, breaks);
-    int k = 1;
-    while (k < count - 1 && (value_along(t, c, values, breaks[k]) >= iso) == side_in) k++;
-    return bisect(t, c, values, iso, breaks[k - 1], breaks[k], side_in);
-}
-
-/* Tells whether the inside at an end contradicts the face. */
-static bool is_contradicted(trace *t, const placed_cell *c, const double *values, double iso, const bool side[2])
-{
-    double inside[2];
-    for (int i = 0; i < 2; i++)
-        if (!reference_profile_value(&c->cell, &t->line, c->ends, values, c->ends[i].z, &inside[i]))
-            t->out->map_failed = true;
-    return (inside[0] >= iso) != side[0] || (inside[1] >= iso) != side[1];
-}
-
 static void keep_off_sheets(trace *t, const placed_cell *c, double z)
 {
     double point[3];
@@ -383,8 +325,8 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     return &e->hit;
 }
 
-/* All crossings, where the layer asks for robust roots. Where the interpolant at a face has another side than the
- * face's value, the crossing is at the face. */
+/* All crossings. Where the interpolant at a face has another side than the face's value, the crossing is at the face.
+ */
 static void cross_every(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, int surface,
                         const double *values, const reference_crossing ends[2], const double face[2])
 {
@@ -401,11 +343,16 @@ static void cross_every(trace *t, const placed_cell *c, const render_surface_lay
         if (now == side) continue;
         if (is_end || i == 0) t->out->ambiguous = true;
         double depth = is_end ? ends[1].z : ends[0].z;
-        if (!is_end && i > 0) depth = bisect(t, c, values, a.iso, z[i - 1], z[i], side);
+        const bool is_inner = !is_end && i > 0;
+        if (is_inner) depth = bisect(t, c, values, a.iso, z[i - 1], z[i], side);
         side = now;
         lessen(&t->out->eye_margin, fabs(depth) / c->size);
         if (is_polyhedron) keep_off_sheets(t, c, depth);
-        if (depth >= 0) add_hit(t, c, layer, value_index, surface, values, depth);
+        if (depth < 0) continue;
+        reference_hit *hit = add_hit(t, c, layer, value_index, surface, values, depth);
+        /* The last piece of a profile ends on a quad's patch, which may stand out of the tets, so that the tets'
+         * gradient does not tell the piece's slope. */
+        if (is_polyhedron && is_inner) hit->slowness = a.range * (z[i] - z[i - 1]) / (fabs(v[i] - v[i - 1]) * c->size);
     }
 }
 
@@ -423,25 +370,15 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         const double iso = layer->values[i];
         for (int end = 0; end < 2 && high > low; end++)
             lessen(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
-        if (layer->root == RENDER_ROBUST && c->cell.type != GRID_TET) {
+        if (c->cell.type != GRID_TET) {
             cross_every(t, c, layer, i, first_surface + i, values, ends, face);
             continue;
         }
         const bool side = face[0] >= iso;
         if (side == (face[1] >= iso) || ends[1].z < 0) continue;
-        const bool is_polyhedron = c->cell.type == GRID_POLYHEDRON;
-        const double z =
-            is_polyhedron ? first_root(t, c, values, iso, side) : bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
-        const bool is_ambiguous_here = is_polyhedron ? is_contradicted(t, c, values, iso, (const bool[2]){side, !side})
-                                                     : is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side);
-        if (is_ambiguous_here) t->out->ambiguous = true;
+        const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
         lessen(&t->out->eye_margin, fabs(z) / c->size);
-        /* In polyhedra kernels solve each linear piece, and the normal jumps from piece to piece. */
-        const double found = is_polyhedron ? z : falsi(t, c, values, iso, ends, face, layer->root_steps);
-        if (is_polyhedron) keep_off_sheets(t, c, z);
-        if ((found < 0) != (z < 0)) t->out->ambiguous = true;
-        if (z < 0) continue;
-        add_hit(t, c, layer, i, first_surface + i, values, z)->falsi_error = fabs(found - z);
+        if (z >= 0) add_hit(t, c, layer, i, first_surface + i, values, z);
     }
 }
 

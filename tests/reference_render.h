@@ -11,7 +11,8 @@ typedef struct reference_hit {
     double normal[3]; /* world, towards the eye */
     double colour[3]; /* shaded, not premultiplied */
     double opacity;
-    double falsi_error; /* how far Neubauer's method in double with the layer's root_steps is from depth */
+    double slowness; /* the cell's range of values over its size, by the field's slope along the ray; 0 where the normal
+                        tells it */
     int part;
     int64_t cell;
     double conditioning; /* |gradient| / |its component along the ray|: how an error of position becomes one of depth */

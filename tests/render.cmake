@@ -64,6 +64,8 @@ insitu_add_mpi_test(hanging test_hanging_mpi 1 3 WHOLE 2 7)
 
 insitu_render_program(test_segments)
 insitu_add_split_test(segments $<TARGET_FILE:test_segments>)
+insitu_render_program(test_clipped_segments)
+add_test(NAME clipped_segments COMMAND test_clipped_segments)
 set_tests_properties(segments PROPERTIES TIMEOUT 180)
 
 insitu_render_program(test_opaque_media)

@@ -34,7 +34,6 @@ static void surfaces_and_samples_are_the_reference(void **state)
         render_fixture f;
         cells_fixture(&f);
         fixture_add_surface(&f, pass ? clear : opaque, pass ? 2 : 1, pass ? 0.4f : 1);
-        f.surfaces[0].root = pass ? RENDER_NEUBAUER : RENDER_ROBUST;
         fixture_set_volume(&f, 1);
         const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, pass ? "clear" : "opaque");
         fprintf(stderr, "%d rays, %d hits, %d excluded: depth %.2g cells, colour %.2g\n", (int)o.rays, (int)o.hits,

@@ -298,7 +298,11 @@ static void assert_reference(const test_mesh *mesh, fixture_camera camera, const
     render_fixture f;
     drawn_frame drawn;
     open_scene(&f, mesh, SURFACES_IN_SAMPLES, camera, 49, 43);
-    const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, what);
+    /* A hit on the sheets of a face of no area, which lie in one plane, is as near to an edge of a tet, and is left
+     * out. */
+    fixture_bounds bounds = fixture_usual_bounds;
+    bounds.excluded = 3e-3;
+    const fixture_outcome o = fixture_compare(&f, &bounds, what);
     assert_true(o.hits > 20);
     fixture_free(&f);
     open_scene(&f, mesh, SEGMENTS, camera, 23, 19);

@@ -54,7 +54,6 @@ static void duals_are_the_reference(void **state)
                        (const double[]){0, 0, 0});
         fixture_look(&f, camera, 33, 29);
         fixture_add_surface(&f, values, 2, 0.5f);
-        f.surfaces[0].root = RENDER_ROBUST;
         const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
         assert_true(o.hits > 100);
         fixture_free(&f);

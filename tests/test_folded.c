@@ -26,7 +26,7 @@ static void tangle(test_mesh_kind kind, test_mesh *out)
             out->coordinates[3 * v + a] += (4.0 / 3 * test_uniform((uint64_t)(3 * v + a), 11) - 2.0 / 3) * 2 / SIDE;
 }
 
-typedef enum scene_kind { ROBUST, NEUBAUER, OPAQUE, DIFFERENCES, SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
+typedef enum scene_kind { CLEAR, OPAQUE, DIFFERENCES, SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
 static void set_scene(render_fixture *f, scene_kind scene)
 {
@@ -36,7 +36,6 @@ static void set_scene(render_fixture *f, scene_kind scene)
         return;
     }
     fixture_add_surface(f, values, 3, scene == OPAQUE ? 1 : 0.4f);
-    f->surfaces[0].root = scene == NEUBAUER ? RENDER_NEUBAUER : RENDER_ROBUST;
     f->surfaces[0].normal = scene == DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT;
     f->surfaces[0].difference = 1;
 }
@@ -111,10 +110,10 @@ static void draw_dealt(const test_mesh *mesh, scene_kind scene, drawn_frame *out
 
 static void numbers_of_cells_and_ranks_do_not_show(void **state)
 {
-    static const scene_kind scenes[3] = {ROBUST, NEUBAUER, SAMPLES};
+    static const scene_kind scenes[2] = {CLEAR, SAMPLES};
     (void)state;
     for (int k = 0; k < 4; k++)
-        for (int s = 0; s < 3; s++) {
+        for (int s = 0; s < 2; s++) {
             test_mesh mesh;
             render_fixture f;
             drawn_frame whole, dealt;

@@ -48,7 +48,6 @@ static void stage(render_fixture *f, const test_mesh *mesh, const drawing *d, fi
                    (const double[]){0, 0, 0});
     fixture_look(f, camera, WIDTH, HEIGHT);
     if (d->value_count) fixture_add_surface(f, surface_values, d->value_count, d->opacity);
-    f->surfaces[0].root = RENDER_ROBUST;
     if (d->has_volume) fixture_set_volume(f, 0.3);
     f->job.integration = d->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
     f->job.max_error = d->max_error;

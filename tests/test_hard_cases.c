@@ -22,7 +22,6 @@ static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera,
                    (const double[]){0, 0, 0});
     fixture_look(&f, camera, 61, 47);
     if (scene != SEGMENTS) fixture_add_surface(&f, values, 2, scene == OPAQUE ? 1 : 0.4f);
-    if (scene != SEGMENTS) f.surfaces[0].root = RENDER_ROBUST;
     if (scene != OPAQUE) fixture_set_volume(&f, 0.3);
     if (scene == SEGMENTS) f.job.integration = RENDER_SEGMENTS;
     fixture_draw(&f, out);

@@ -127,14 +127,12 @@ static void add_many_robust(render_fixture *f)
     static double values[16];
     for (int i = 0; i < 16; i++) values[i] = -1.17 + 0.171 * i;
     fixture_add_surface(f, values, 16, 0.4f);
-    f->surfaces[0].root = RENDER_ROBUST;
     f->surfaces[0].colours = black;
 }
 
 static void add_robust(render_fixture *f, float opacity)
 {
     fixture_add_surface(f, three_values, 3, opacity);
-    f->surfaces[0].root = RENDER_ROBUST;
 }
 
 /* Rays within the margin of another decision are at most the fixture's share, 0.2 % (test_render_fixture.c). No cell
@@ -332,7 +330,6 @@ static void add_differences(render_fixture *f, const double *values, int count, 
                             render_light lights[3])
 {
     fixture_add_surface(f, values, count, opacity);
-    f->surfaces[0].root = RENDER_ROBUST;
     f->surfaces[0].normal = RENDER_DIFFERENCES;
     f->surfaces[0].difference = difference;
     light_by_axes(f, lights);

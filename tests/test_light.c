@@ -171,7 +171,6 @@ static void judge_mesh(const test_mesh *mesh, fixture_camera camera, float conta
                    (const double[]){0, 0, 0});
     fixture_look(&f, camera, WIDTH, HEIGHT);
     fixture_add_surface(&f, isovalues, 2, 1);
-    f.surfaces[0].root = RENDER_ROBUST;
     f.surfaces[0].contact = contact;
     f.job.paint = RENDER_UNLIT;
     f.job.occlusion = &occlusion;

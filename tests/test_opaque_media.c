@@ -52,8 +52,8 @@ static void stage(render_fixture *f, test_mesh_kind kind, int n, method how, dou
     set_medium(f, how, depth);
 }
 
-/* Cells found for the picture, and by packets on their own. */
-static const render_traversal traversals[2] = {RENDER_BINNED, RENDER_PACKETS};
+/* Cells found for the picture, and for each tile. */
+static const render_traversal traversals[2] = {RENDER_BINNED, RENDER_TILES};
 
 static void compare_samples(render_fixture *f, const char *what)
 {

@@ -20,24 +20,23 @@ typedef struct scene {
     const char *name;
     fixture_camera camera;
     float opacity; /* of its surfaces; 0: it has none */
-    render_root root;
     bool has_volume;
     render_integration integration;
     double max_error;
 } scene;
 
 static const scene scenes[] = {
-    {"opaque", CAMERA_OUTSIDE, 1, RENDER_ROBUST, false, 0, 0},
-    {"transparent", CAMERA_ORTHOGRAPHIC, 0.4f, RENDER_NEUBAUER, false, 0, 0},
-    {"samples", CAMERA_INSIDE, 0, 0, true, RENDER_SAMPLES, 0},
-    {"samples, opaque", CAMERA_ORTHOGRAPHIC, 1, RENDER_NEUBAUER, true, RENDER_SAMPLES, 0},
-    {"samples, transparent", CAMERA_OUTSIDE, 0.4f, RENDER_ROBUST, true, RENDER_SAMPLES, 0},
-    {"segments", CAMERA_INSIDE, 0, 0, true, RENDER_SEGMENTS, 0},
-    {"segments, opaque", CAMERA_ORTHOGRAPHIC, 1, RENDER_NEUBAUER, true, RENDER_SEGMENTS, 0},
-    {"segments, transparent", CAMERA_OUTSIDE, 0.4f, RENDER_ROBUST, true, RENDER_SEGMENTS, 0},
-    {"max_error", CAMERA_INSIDE, 0, 0, true, RENDER_SEGMENTS, 1e-3},
-    {"max_error, opaque", CAMERA_OUTSIDE, 1, RENDER_ROBUST, true, RENDER_SEGMENTS, 1e-3},
-    {"max_error, transparent", CAMERA_ORTHOGRAPHIC, 0.4f, RENDER_NEUBAUER, true, RENDER_SEGMENTS, 1e-3},
+    {"opaque", CAMERA_OUTSIDE, 1, false, 0, 0},
+    {"transparent", CAMERA_ORTHOGRAPHIC, 0.4f, false, 0, 0},
+    {"samples", CAMERA_INSIDE, 0, true, RENDER_SAMPLES, 0},
+    {"samples, opaque", CAMERA_ORTHOGRAPHIC, 1, true, RENDER_SAMPLES, 0},
+    {"samples, transparent", CAMERA_OUTSIDE, 0.4f, true, RENDER_SAMPLES, 0},
+    {"segments", CAMERA_INSIDE, 0, true, RENDER_SEGMENTS, 0},
+    {"segments, opaque", CAMERA_ORTHOGRAPHIC, 1, true, RENDER_SEGMENTS, 0},
+    {"segments, transparent", CAMERA_OUTSIDE, 0.4f, true, RENDER_SEGMENTS, 0},
+    {"max_error", CAMERA_INSIDE, 0, true, RENDER_SEGMENTS, 1e-3},
+    {"max_error, opaque", CAMERA_OUTSIDE, 1, true, RENDER_SEGMENTS, 1e-3},
+    {"max_error, transparent", CAMERA_ORTHOGRAPHIC, 0.4f, true, RENDER_SEGMENTS, 1e-3},
 };
 
 enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
@@ -57,8 +56,6 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
                    (const double[]){0, 0, 0});
     fixture_look(&f, scene->camera, WIDTH, HEIGHT);
     if (scene->opacity > 0) fixture_add_surface(&f, values, 2, scene->opacity);
-    f.surfaces[0].root_steps = 2;
-    f.surfaces[0].root = scene->root;
     if (scene->has_volume) fixture_set_volume(&f, 0.3);
     f.job.integration = scene->integration;
     f.job.max_error = scene->max_error;

@@ -438,7 +438,6 @@ static void judge_cell(const test_mesh *mesh, uint64_t seed, tally *t)
                    (const double[]){0, 0, 0});
     look_at_random(&f, seed);
     fixture_add_surface(&f, values, 1, seed % 2 ? 1 : 0.4f);
-    f.surfaces[0].root = RENDER_ROBUST;
     judge_frame(&f, values[0], t);
     fixture_free(&f);
 }
@@ -537,7 +536,6 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
     fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
     fixture_add_surface(&f, &value, 1, 0.4f);
-    f.surfaces[0].root = RENDER_ROBUST;
     for (uint64_t seed = 0; seed < 16; seed++) {
         look_at_random(&f, seed);
         make_subject(&f, &s);

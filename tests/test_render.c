@@ -18,8 +18,6 @@ static const double linear_values[3] = {-0.6, 0.1, 0.5};
 static void assert_few_ambiguous(const fixture_outcome *o, double share)
 {
     if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
-    /* These are rays that took 64 steps of regula falsi. */
-    if ((double)o->slow > 0.01 * (double)o->rays) fail_msg("%d of %d slow", (int)o->slow, (int)o->rays);
 }
 
 static const char *case_name(test_mesh_kind kind, fixture_camera camera, const char *what)
@@ -182,18 +180,15 @@ static double ray_linear(const render_camera *camera, int pixel, double *at_base
     return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
 }
 
-/* The surface of a linear field is its plane: found in cells with plane faces by Neubauer's method, in warped ones by
- * robust roots. Float32 positions and values err by a few 6e-8 of the mesh's size (value 1.6 at most); the ray's slope
- * turns that into depth. */
-static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_robust)
+/* The surface of a linear field is its plane, in cells with plane faces and in warped ones. Float32 positions and
+ * values err by a few 6e-8 of the mesh's size (value 1.6 at most); the ray's slope turns that into depth. */
+static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_warped)
 {
     render_fixture f;
     drawn_frame drawn;
-    fixture_create_lattice(&f, kind, 3, is_robust || kind == TEST_TETS ? 0.2 : 0, test_linear);
+    fixture_create_lattice(&f, kind, 3, is_warped ? 0.2 : 0, test_linear);
     fixture_look(&f, camera, 41, 37);
     fixture_add_surface(&f, linear_values, 3, 0.5f);
-    f.surfaces[0].root = is_robust ? RENDER_ROBUST : RENDER_NEUBAUER;
-    f.surfaces[0].root_steps = 2;
     fixture_draw(&f, &drawn);
     for (int64_t i = 0; i < drawn.list.count; i++) {
         const fragment *hit = &drawn.list.items[i];
@@ -212,7 +207,7 @@ static void linear_surface_is_a_plane_in_every_kind(void **state)
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++)
-            for (int is_robust = 0; is_robust < 2; is_robust++) compare_plane(kind, camera, is_robust);
+            for (int is_warped = 0; is_warped < 2; is_warped++) compare_plane(kind, camera, is_warped);
 }
 
 /* With constant opacity every ray's transmittance follows from the number of samples in the cube, on lattice lines as
@@ -487,23 +482,6 @@ static void surface_coloured_by_the_field_is_the_reference(void **state)
     }
 }
 
-/* Steps N of Neubauer's method: the error after each, in cells; all have the same hits. */
-static void root_steps_lessen_the_error(void **state)
-{
-    (void)state;
-    double error[5];
-    for (int steps = 0; steps <= 4; steps++) {
-        static const fixture_bounds loose = {.depth = 1, .colour = 2, .excluded = 2e-3, .margin = 1e-6};
-        render_fixture f;
-        fixture_create_lattice(&f, TEST_HEXES, 6, 0.2, test_wave);
-        fixture_add_surface(&f, one_value, 1, 1);
-        f.surfaces[0].root_steps = steps;
-        error[steps] = fixture_compare(&f, &loose, "root steps").total_depth;
-        fixture_free(&f);
-    }
-    for (int steps = 1; steps <= 4; steps++) assert_true(error[steps] < error[steps - 1]);
-}
-
 static void one_pixel_images_are_the_reference(void **state)
 {
     (void)state;
@@ -530,15 +508,14 @@ static void build_reference_layout(render_fixture *f)
     f->ranges[0] = mmbvh_own_ranges(&f->trees[0]);
 }
 
-/* Where cells are smaller than pixels, tiles go down the trees themselves and leave out what is hidden. Packets fetch
- * all that rays meet. */
+/* Where cells are smaller than pixels, tiles go down the trees themselves and leave out what is hidden. */
 static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             render_fixture f;
-            drawn_frame drawn[3];
+            drawn_frame drawn[2];
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
             fixture_look(&f, camera, 9, 5);
             fixture_add_surface(&f, four_values, 2, 1);
@@ -546,13 +523,13 @@ static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state
             if (camera % 2) build_reference_layout(&f);
             if (camera < CAMERA_ALONG_X)
                 fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "small cells"));
-            for (render_traversal t = RENDER_BINNED; t <= RENDER_PACKETS; t++) {
+            for (render_traversal t = RENDER_BINNED; t <= RENDER_TILES; t++) {
                 f.job.traversal = t;
                 fixture_draw(&f, &drawn[t]);
                 drawn_assert_same(&drawn[0], &drawn[t]);
                 assert_int_equal(drawn[0].list.count, drawn[t].list.count);
             }
-            for (int t = 0; t < 3; t++) drawn_free(&drawn[t]);
+            for (int t = 0; t < 2; t++) drawn_free(&drawn[t]);
             fixture_free(&f);
         }
 }
@@ -575,7 +552,6 @@ int main(void)
         cmocka_unit_test(cell_centred_volume_is_the_reference),
         cmocka_unit_test(values_of_any_size_are_the_reference),
         cmocka_unit_test(surface_coloured_by_the_field_is_the_reference),
-        cmocka_unit_test(root_steps_lessen_the_error),
         cmocka_unit_test(one_pixel_images_are_the_reference),
         cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_are_the_reference),
     };

@@ -1,7 +1,7 @@
 /* Tets of plain meshes, hexes, wedges and pyramids, which tiles trace as many at once as there are lanes
- * (kernel_batch.h, kernel_curved_batch.h), against the same cells in traversals that take them one by one: the same
- * bits. Cells are of some pixels, of many and of one; the last ones lie beside each other in one vector, and may hit
- * one pixel. Usually a scene has every third camera, in turns: each kind meets each camera. */
+ * (kernel_batch.h, kernel_curved_batch.h), against the same cells taken one by one, as those of a layer with clips of
+ * its own are: the same bits. Cells are of some pixels, of many and of one; the last ones lie beside each other in one
+ * vector, and may hit one pixel. Usually a scene has every third camera, in turns: each kind meets each camera. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -31,18 +31,21 @@ static void create(render_fixture *f, const test_mesh *meshes, int count, int n,
 
 static void compare(render_fixture *f)
 {
-    drawn_frame binned, packets;
-    for (int i = 0; i < f->job.surface_count; i++)
-        f->surfaces[i].root = RENDER_ROBUST; /* what batches of hexes are for */
-    f->job.traversal = RENDER_BINNED;
-    fixture_draw(f, &binned);
-    f->job.traversal = RENDER_PACKETS;
-    fixture_draw(f, &packets);
-    assert_true(binned.list.count > 100);
-    assert_int_equal(binned.list.count, packets.list.count);
-    drawn_assert_same(&binned, &packets);
-    drawn_free(&binned);
-    drawn_free(&packets);
+    drawn_frame batches, alone;
+    /* A box that holds everything. It cuts one layer alone, as a clip of all layers would cut the rays. */
+    const render_clip everything = {.kind = RENDER_CLIP_BOX, .lower = {-1e6, -1e6, -1e6}, .upper = {1e6, 1e6, 1e6}};
+    fixture_draw(f, &batches);
+    f->job.clips = &everything;
+    f->job.clip_count = 1;
+    for (int i = 0; i < f->job.surface_count; i++) {
+        f->surfaces[i].clips = 1;
+        fixture_draw(f, &alone);
+        assert_true(batches.list.count > 100);
+        assert_int_equal(batches.list.count, alone.list.count);
+        drawn_assert_same(&batches, &alone);
+        drawn_free(&alone);
+    }
+    drawn_free(&batches);
     fixture_free(f);
 }
 

@@ -105,7 +105,6 @@ extern const fixture_bounds fixture_usual_bounds;
 
 typedef struct fixture_outcome {
     int64_t rays, hits, excluded, ambiguous;
-    int64_t slow; /* Neubauer's method has not converged there: the depth may be off by as much as in double */
     double worst_depth, worst_colour; /* of the rays that count */
     double worst_ambiguous;
     double total_depth; /* the errors of all hits together, the root finder's own included, in cells */

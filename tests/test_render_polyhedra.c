@@ -29,7 +29,7 @@ static const char *case_name(const char *what, fixture_camera camera)
 }
 
 /* Prisms on bases that are not convex, spikes, a cavity. */
-static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bool is_linear, render_root root)
+static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bool is_linear)
 {
     test_mesh mesh;
     render_fixture f;
@@ -37,8 +37,7 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
     mesh_fixture(&f, &mesh, 1, 1);
     fixture_look(&f, camera, 49, 43);
     fixture_add_surface(&f, values, 3, 0.5f);
-    f.surfaces[0].root = root;
-    if (root == RENDER_NEUBAUER) fixture_set_volume(&f, 0.05);
+    fixture_set_volume(&f, 0.05);
     const fixture_outcome o =
         fixture_compare(&f, &fixture_usual_bounds, case_name(test_polyhedron_name(shape), camera));
     assert_true(o.hits > 20);
@@ -52,10 +51,7 @@ static void shapes_are_the_reference(void **state)
     (void)state;
     for (test_polyhedron_shape shape = 0; shape < TEST_POLYHEDRON_COUNT; shape++)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++)
-            for (render_root root = RENDER_NEUBAUER; root <= RENDER_ROBUST; root++) {
-                compare_shape(shape, camera, true, root);
-                compare_shape(shape, camera, false, root);
-            }
+            for (int is_linear = 0; is_linear < 2; is_linear++) compare_shape(shape, camera, is_linear);
 }
 
 enum { AIMED_RAYS = 600 };
@@ -127,7 +123,6 @@ typedef void scene_set(render_fixture *f);
 static void set_surfaces(render_fixture *f)
 {
     fixture_add_surface(f, wave_values, 2, 0.5f);
-    f->surfaces[0].root = RENDER_ROBUST;
 }
 
 static void set_volume(render_fixture *f)
@@ -205,7 +200,6 @@ static void polyhedra_beside_other_cells_are_the_reference(void **state)
                 mesh_fixture(&f, &mesh, 1, 0.5);
                 fixture_look(&f, camera, 33, 29);
                 fixture_add_surface(&f, wave_values, 2, 0.5f);
-                f.surfaces[0].root = half ? RENDER_NEUBAUER : RENDER_ROBUST;
                 fixture_set_volume(&f, 0.3);
                 fixture_compare(&f, &fixture_usual_bounds, case_name(test_mesh_kind_name(kinds[i]), camera));
                 fixture_free(&f);

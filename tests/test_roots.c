@@ -10,7 +10,6 @@
 
 #include "kernel_cell.h"
 #include "kernel_map.h"
-#include "kernel_neubauer.h"
 #include "root_bundle.h"
 #include "test_meshes.h"
 
@@ -230,22 +229,8 @@ static void judge_robust(count *c, const cubic *g, const truth *t, bool hit, lon
     if (residual > (double)band) c->off++;
 }
 
-static void judge_neubauer(count *c, const truth *t, bool hit, long double at_t)
-{
-    c->rays++;
-    c->certain += t->certain;
-    if (!t->certain || !t->count) return;
-    int nearest = 0;
-    for (int i = 1; i < t->count; i++)
-        if (fabsl(at_t - t->roots[i]) < fabsl(at_t - t->roots[nearest])) nearest = i;
-    if (!hit)
-        c->missed++;
-    else
-        c->off += nearest > 0;
-}
-
 typedef struct rates {
-    count robust, neubauer[5];
+    count robust;
     int64_t monotone; /* packets in whose cells the field is known to be monotone along all rays */
     int64_t later;    /* further crossings that the robust search did not find, or found too many of */
 } rates;
@@ -258,23 +243,14 @@ static void judge_bundle(bundle *b, rates *r)
     const int intervals = bundle_intervals(b, list, &map, &bounds);
     r->monotone += bounds.is_monotone;
     for (int n = 0; n < intervals; n++) {
-        vf t[6], hits;
-        unsigned hit[6];
+        vf t, hits;
         const vm change = vm_xor(vf_lt(list[n].v_in, vf_set(0)), vf_lt(list[n].v_out, vf_set(0)));
-        hit[5] = vm_bits(bundle_hits(b, &map, &bounds, &list[n], &t[5], &hits));
-        for (int steps = 0; steps < 5; steps++) {
-            kernel_point place;
-            kernel_neubauer(&b->packet, &map, &list[n], list[n].mask, steps, &place);
-            t[steps] = place.t;
-            hit[steps] = vm_bits(vm_and(change, list[n].mask));
-        }
+        const unsigned hit = vm_bits(bundle_hits(b, &map, &bounds, &list[n], &t, &hits));
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[n].mask) >> lane & 1)) continue;
             const cubic g = exact_cubic(b, lane);
             const truth truth = find_truth(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
-            judge_robust(&r->robust, &g, &truth, hit[5] >> lane & 1, (long double)t[5][lane]);
-            for (int steps = 0; steps < 5; steps++)
-                judge_neubauer(&r->neubauer[steps], &truth, hit[steps] >> lane & 1, (long double)t[steps][lane]);
+            judge_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
             /* Crossings alternate, so their number is odd where the faces differ. */
             if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->later++;
         }
@@ -293,10 +269,6 @@ static void robust_misses_no_first_root(void **state)
     printf("robust: %lld cubics, %lld with a certain crossing, %lld missed, worst residual %.2g; monotone %lld cells\n",
            (long long)r.robust.rays, (long long)r.robust.certain, (long long)r.robust.missed, r.robust.worst,
            (long long)r.monotone);
-    for (int steps = 0; steps < 5; steps++)
-        printf("Neubauer, N = %d: no hit on %.3g %%, a later root on %.3g %% of those with a certain crossing\n", steps,
-               100.0 * (double)r.neubauer[steps].missed / (double)r.neubauer[steps].certain,
-               100.0 * (double)r.neubauer[steps].off / (double)r.neubauer[steps].certain);
     assert_true(r.robust.certain > cubics / 3);
     assert_true(r.monotone > cubics / 2000);
     assert_int_equal(r.robust.missed, 0);

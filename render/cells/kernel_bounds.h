@@ -285,7 +285,7 @@ SIMD_INLINE void kernel_curved_setup(const kernel_frame *f, const kernel_tile *t
     kernel_map_setup(&curved->map, c);
     if (layer->colour_map) kernel_map_colour(&curved->map, c);
     const kernel_beam beam = kernel_tile_beam(f, tile);
-    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&curved->bounds, &curved->map, c->type, &beam);
+    kernel_bounds_setup(&curved->bounds, &curved->map, c->type, &beam);
 }
 
 #endif

@@ -20,9 +20,10 @@ typedef struct kernel_tile_trace {
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
-    unsigned wanted; /* blocks that have pixels to trace */
-    unsigned begun;  /* blocks whose packets are set up */
-    int turn;        /* of volumes (kernel_clip.h) */
+    unsigned wanted;        /* blocks that have pixels to trace */
+    unsigned begun;         /* blocks whose packets are set up */
+    int turn;               /* of volumes (kernel_clip.h) */
+    int64_t first_fragment; /* of the tile, in the thread's list */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH];         /* each block's farthest t_far, */
     float pixel_far[KERNEL_TILE * KERNEL_TILE]; /* and each pixel's, where the tile goes down the trees for surfaces */
@@ -132,6 +133,7 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     t->thread = thread;
     t->wanted = wanted;
     t->begun = 0;
+    t->first_fragment = thread->out->count;
     t->t_near = (float)-f->depth_shift;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);

@@ -260,7 +260,6 @@ typedef struct kernel_frame {
     bool is_binned;     /* surfaces' cells are binned by tile, where that pays; */
     bool bins_volume;   /* those of the only volume */
     bool needs_planes;  /* tiles go down the trees */
-    bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
     bool has_segments;  /* volumes are integrated by segments, else sampled; */
     bool is_double;     /* ends of tets and of halved stretches are taken in double (kernel_double.h) */
@@ -274,8 +273,7 @@ typedef struct kernel_frame {
 typedef struct kernel_thread {
     /* memory_bytes of the kernel table, and where the kernels' rooms have theirs in it: set by the table's begin(). */
     void *memory;
-    struct kernel_cell_cache *cells;    /* that packets on their own have met, */
-    struct kernel_curved *curved_cells; /* and what surfaces know of the cells in the same places */
+    struct kernel_cell_cache *cells; /* that packets on their own have met */
     struct kernel_tile_trace *tile;
     struct kernel_tile_cells *tile_cells;
     struct kernel_tile_volume *tile_volume;

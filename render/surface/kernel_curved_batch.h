@@ -654,7 +654,7 @@ SIMD_INLINE void kernel_curved_batch_turn(kernel_tile_trace *t, kernel_curved_ba
 /* Can hexes, wedges and pyramids of the layer under way be traced in batches? */
 SIMD_INLINE bool kernel_curved_batch_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
 {
-    return arrays->has_lanes && t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
+    return arrays->has_lanes && kernel_tile_layer_batches(t);
 }
 
 /* Adds a cell of the type to the pending ones. */

@@ -1,85 +1,16 @@
-/* Isosurfaces of a packet that goes down the trees on its own (thesis, sections 4.3.1 and 4.3.2), and its hits turned
- * into fragments. */
+/* A packet's nearest opaque hits are lit and written as fragments, and so are hits that waited for other ranks' samples
+ * of their surroundings. */
 #ifndef RENDER_KERNEL_PACKET_SURFACE_H
 #define RENDER_KERNEL_PACKET_SURFACE_H
 
-#include "grid.h"
 #include "kernel_accept.h"
-#include "kernel_bounds.h"
-#include "kernel_cell.h"
-#include "kernel_cell_cache.h"
-#include "kernel_cell_values.h"
 #include "kernel_colour.h"
 #include "kernel_hits.h"
 #include "kernel_packet.h"
-#include "kernel_spmd.h"
 #include "kernel_surface.h"
-#include "kernel_traverse.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
-
-/* Makes the cell ready for the isovalue. */
-SIMD_INLINE void kernel_surface_prepare(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
-                                        int part, int value, kernel_cell *c, kernel_curved *curved)
-{
-    const bool is_fresh = !c->is_placed;
-    if (is_fresh) {
-        kernel_cell_place_in(c, f, tile, f->job->parts[part].cells);
-        if (s->layer->colour_map) kernel_cell_colours(c, s, part);
-    }
-    if (is_fresh || s->layer->value_count > 1) {
-        kernel_cell_relative(c, s->layer->values[value]);
-        curved->is_set_up = false;
-    }
-}
-
-static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
-                                vm rays)
-{
-    kernel_surface_state *state = opaque_state;
-    const render_surface_layer *layer = state->surface->layer;
-    for (int n = 0; n < count; n++) {
-        kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_polyhedron_surfaces(p, state, part, cells[n], rays);
-            continue;
-        }
-        kernel_curved *curved = kernel_curved_find(p, c);
-        if (!c->is_finite) continue;
-        kernel_cell own_cell;
-        kernel_curved own_curved;
-        if (layer->normal == RENDER_DIFFERENCES) {
-            /* Looking for samples fills the cache with other cells while this one is in use. */
-            own_cell = *c;
-            own_curved = *curved;
-            c = &own_cell;
-            curved = &own_curved;
-        }
-        for (int value = 0; value < layer->value_count; value++) {
-            if (!kernel_cell_straddles(c, layer->values[value])) continue;
-            kernel_surface_prepare(p->frame, p->tile, state->surface, part, value, c, curved);
-            kernel_cell_lines(c, p->frame, p->tile);
-            kernel_cell_surface(p, state, c, curved, value, rays);
-        }
-    }
-}
-
-/* All surface layers: opaque hits go to p->t_far and hits, transparent ones into fragments. */
-SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
-{
-    const kernel_frame *f = p->frame;
-    for (int n = 0; n < f->surface_count; n++) {
-        kernel_surface_state state = {
-            .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
-        const render_field *field = &f->surfaces[n].layer->field;
-        const kernel_descent descent = {&f->surfaces[n].interest, p->t_near, &p->t_far, kernel_surface_leaf, &state};
-        if (f->job->traversal == RENDER_SPMD)
-            kernel_trace_parts_spmd(p, field, &descent);
-        else
-            kernel_trace_parts(p, field, &descent);
-    }
-}
 
 /* Normals by differences of the nearest opaque hits of a surface. Returns those that have theirs. */
 SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)

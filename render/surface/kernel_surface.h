@@ -3,8 +3,7 @@
  * Within a cell, values are taken relative to the isovalue in double before they are rounded, so that their signs are
  * exact, and scaled by a power of two. Whether the surface crosses an interval an odd number of times is decided by the
  * signs at its two faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a
- * face exactly one has a crossing next to it. Neubauer's method takes one crossing where there is an odd number and
- * none where there is an even one; the robust finder (kernel_roots.h) finds all. The second half has
+ * face exactly one has a crossing next to it. kernel_roots.h finds all crossings of an interval. The second half has
  * polyhedra (kernel_polyhedron.h). */
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
@@ -26,7 +25,6 @@
 #include "kernel_edges.h"
 #include "kernel_hits.h"
 #include "kernel_map.h"
-#include "kernel_neubauer.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
@@ -151,11 +149,6 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     kernel_accept(p, state, c, value, hit, &at);
 }
 
-SIMD_INLINE kernel_curved *kernel_curved_find(const kernel_packet *p, const kernel_cell *c)
-{
-    return &p->thread->curved_cells[c - p->thread->cells->cells];
-}
-
 /* Takes the crossings that are visible, and returns them. */
 SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                     const kernel_curved *curved, vm found, const kernel_point *at)
@@ -245,26 +238,19 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* Where a ray crosses both halves of a quad but not its patch, both ends are one place beside the ray. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        asked[n] = vm_and(kernel_is_near(p, i), layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
+        asked[n] = vm_and(kernel_is_near(p, i), room);
         any = vm_or(any, asked[n]);
     }
     if (!vm_any(any)) return;
     kernel_curved_setup(p->frame, p->tile, curved, layer, c, value);
-    if (layer->root == RENDER_ROBUST && !state->is_contracted) {
+    if (!state->is_contracted) {
         if (!curved->has_contraction) kernel_curved_contraction(p, curved, c); /* from here: less stack */
         known = kernel_curved_known(p, state, c, curved, any);
     }
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
-        if (!vm_any(wanted)) continue;
-        if (layer->root == RENDER_ROBUST) {
-            kernel_curved_robust(p, state, c, curved, i, wanted);
-            continue;
-        }
-        kernel_point at;
-        kernel_neubauer(p, &curved->map, i, wanted, layer->root_steps, &at);
-        kernel_curved_accept(p, state, c, curved, wanted, &at);
+        if (vm_any(wanted)) kernel_curved_robust(p, state, c, curved, i, wanted);
     }
 }
 
@@ -280,8 +266,7 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *sta
 }
 
 /* Isosurfaces in polyhedra: the places on the profile where the sign changes. They are exact: a linear piece has one
- * root at most. Neubauer's method takes the first where the faces' values differ in sign; the robust finder takes all
- * of them, on rays too that are on one side of the isovalue at both faces.
+ * root at most. All of them are taken, on rays too that are on one side of the isovalue at both faces.
  *
  * Most such rays stay on that side, and need not be followed. A bound says which do, from the faces' values alone:
  *
@@ -554,12 +539,18 @@ SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, ke
 }
 
 /* Goes to the next piece. Returns the rays of left whose profile goes on behind it; a jump at the last face is a
- * piece. */
+ * piece. A value inside the cell that is the isovalue but for rounding stays on the side that the ray comes from: where
+ * a ray meets several sheets in one place, each has a value rounded on its own, and their signs would alternate. The
+ * values at the faces decide as they are. */
 SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
+    const vf zero = vf_set(0);
     const vm inside = kernel_profile_open(stay, &next, left);
     kernel_profile_next(r, stay, vf_select(inside, stay->u_out, stay->interval.v_out), &next);
+    const vm rounding =
+        vm_and(kernel_profile_open(stay, &next, inside), vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
+    next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
     kernel_piece_take(left, &next, &walk->piece);
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
 }
@@ -610,7 +601,6 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
 static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
                                     kernel_passage *r, kernel_stay *stay)
 {
-    const render_surface_layer *layer = state->surface->layer;
     kernel_walk walk;
     kernel_passage_profile(r, stay);
     kernel_walk_begin(stay, wanted, &walk);
@@ -619,7 +609,7 @@ static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *stat
         const vm kept = kernel_kept(p, state->surface, found, walk.t);
         kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
-    } while (layer->root == RENDER_ROBUST && vm_any(walk.open));
+    } while (vm_any(walk.open));
 }
 
 static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, polyhedron *c, int value, vm rays)
@@ -630,10 +620,9 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
     if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, layer->colour_map != NULL)) return;
     while (kernel_passage_next(&r, &stay)) {
         const vm near = kernel_is_near(p, &stay.interval);
-        vm wanted = kernel_changes_sign(&stay.interval);
         if (!vm_any(near)) continue;
-        if (layer->root == RENDER_ROBUST) wanted = vm_or(wanted, kernel_polyhedron_turns(p, c, &r, &stay));
-        wanted = vm_and(wanted, near);
+        const vm wanted =
+            vm_and(near, vm_or(kernel_changes_sign(&stay.interval), kernel_polyhedron_turns(p, c, &r, &stay)));
         if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &stay);
     }
 }

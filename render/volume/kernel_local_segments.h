@@ -79,7 +79,7 @@ typedef struct kernel_local_stretches {
 /* Are segments of cells of this type for lanes in this frame? */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
-    return f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
+    return kernel_segments_fit(f) && f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
 }
 
 /* The packets' windows. */

@@ -32,7 +32,7 @@ typedef struct kernel_segment_double {
 typedef struct kernel_cuts {
     int row_count;
     bool is_whole;       /* else the rest is looked for in the fragments */
-    int64_t first, last; /* the packet's fragments of surfaces */
+    int64_t first, last; /* the tile's fragments of surfaces */
     float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
 } kernel_cuts;
 
@@ -52,13 +52,25 @@ typedef struct kernel_segments {
     kernel_cuts cuts;
 } kernel_segments;
 
-SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
+/* May segments be made a ray and its cell a lane? Not where transparent surfaces cut them, nor where each is a fragment
+ * of its own. */
+SIMD_INLINE bool kernel_segments_fit(const kernel_frame *f)
 {
-    int lane = 0;
-    while (lane < SIMD_WIDTH - 1 && p->pixel[lane] != pixel) lane++;
-    return lane;
+    return !f->has_transparent && !f->job->separate_samples;
 }
 
+/* Returns the lane of the pixel; -1: it is none of the packet's. */
+SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
+{
+    const int width = p->frame->job->camera.width, left = width - p->x0;
+    const int columns = left < KERNEL_PACKET_COLUMNS ? left : KERNEL_PACKET_COLUMNS;
+    int64_t column = (int64_t)pixel - p->pixel[0];
+    for (int row = 0; row < KERNEL_PACKET_ROWS; row++, column -= width)
+        if (column >= 0 && column < columns) return row * KERNEL_PACKET_COLUMNS + (int)column;
+    return -1;
+}
+
+/* first: the tile's first fragment in the thread's list. */
 SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_cuts *cuts)
 {
     int count[SIMD_WIDTH] = {0};
@@ -70,6 +82,7 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
         const fragment *hit = &p->thread->out->items[i];
         if (hit->kind < FRAGMENT_SURFACE) continue; /* a volume's, of an earlier stretch between clips */
         const int lane = kernel_lane_of(p, hit->pixel);
+        if (lane < 0) continue;
         int at = count[lane];
         if (at == KERNEL_LANE_CUTS) {
             cuts->is_whole = false;
@@ -95,6 +108,7 @@ static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts
         const fragment *hit = &p->thread->out->items[i];
         if (hit->kind < FRAGMENT_SURFACE) continue;
         const int lane = kernel_lane_of(p, hit->pixel);
+        if (lane < 0) continue;
         if ((beyond ? hit->t_in > start[lane] : hit->t_in >= start[lane]) && hit->t_in < next[lane])
             next[lane] = hit->t_in;
     }

@@ -44,6 +44,7 @@ typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_double_cell precise;
     kernel_local_stretches stretches;
+    int volume;  /* the one under way */
     float depth; /* of windows; 0: not known yet */
 } kernel_tile_segments;
 
@@ -91,14 +92,14 @@ static const kernel_cell_visitor kernel_segments_visitor = {false, kernel_tile_c
 
 static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_visit_leaf(t, &kernel_segments_visitor, 0, part, cells, count, blocks);
+    kernel_visit_leaf(t, &kernel_segments_visitor, t->thread->tile_segments->volume, part, cells, count, blocks);
 }
 
 static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
                                        unsigned blocks)
 {
     (void)unused;
-    kernel_tile_volume_trees(t, 0, parts, count, blocks, kernel_tile_segments_leaf);
+    kernel_tile_volume_trees(t, t->thread->tile_segments->volume, parts, count, blocks, kernel_tile_segments_leaf);
 }
 
 /* ---- small tets ---- */
@@ -107,7 +108,7 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
  * are as fast. */
 SIMD_INLINE bool kernel_tet_segments_fit(const kernel_frame *f)
 {
-    return !f->is_double && !f->volume_candidates;
+    return kernel_segments_fit(f) && !f->is_double && !f->volume_candidates;
 }
 
 /* Rays that end in their tet, or begin there. */
@@ -156,20 +157,30 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
 
 /* ---- windows ---- */
 
-SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_segments *r, float far)
+SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_segments *r, float far,
+                                           int64_t first_fragment)
 {
     const kernel_frame *f = p->frame;
     kernel_lanes lanes;
     kernel_packet_lanes(p, &lanes);
     kernel_packet_samples(p, &lanes);
+    p->is_pencil = false;
     r->active = p->active;
     r->blend = kernel_blend_begin();
     r->t_last = vf_min(p->t_far, vf_set(far));
     r->list.t_begin = p->t_near;
-    r->list.per_t = f->volumes[0].exponent / p->sample_step;
     r->list.cuts.row_count = 0;
-    kernel_segments_set_double(p, &r->list, f->is_double);
-    r->state = (kernel_segment_state){&r->list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
+    if (!f->job->separate_samples) kernel_cuts_find(p, first_fragment, &r->list.cuts);
+    kernel_segments_set_double(p, &r->list, f->is_double && !f->job->separate_samples);
+}
+
+/* The packet's segments from now on are the volume's. */
+SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_segments *r, int volume)
+{
+    const kernel_frame *f = p->frame;
+    const float mixing = f->job->separate_samples ? f->mixing : 0;
+    r->list.per_t = f->volumes[volume].exponent / p->sample_step;
+    r->state = (kernel_segment_state){&r->list, &f->pieces[volume], volume, f->allowance, mixing, f->reach[volume]};
 }
 
 /* Where the first of the tile's rays that are under way is; those that are not leave. +inf: none is. */
@@ -224,25 +235,37 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Behind the tile's opaque surfaces, whose hits are in the packets. */
-static void kernel_tile_segments_trace(kernel_tile_trace *t)
+/* Begins the volume's segments; t_near of the tile is where the first ray is, +inf where none is under way. */
+SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
+                                         int volume, float near)
 {
-    kernel_tile_segments *s = t->thread->tile_segments;
-    if (!kernel_tile_cells_begin(t, kernel_tet_segments_fit(t->frame) ? kernel_tet_segments_small : NULL)) return;
-    const kernel_placement reach = kernel_tile_reach(t);
-    int packets[KERNEL_TILE_PACKETS];
-    const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
-    for (int n = 0; n < count; n++) {
-        t->packets[packets[n]].is_pencil = false;
-        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far);
+    s->volume = volume;
+    for (int n = 0; n < count; n++) kernel_ray_segments_of(&t->packets[packets[n]], &s->packets[packets[n]], volume);
+    const float front = kernel_tile_segments_front(t, s, packets, count);
+    t->t_near = front < INFINITY ? fmaxf(front, near) : front;
+}
+
+/* All segments of all volumes, each as a fragment of its own as soon as it is met: there are no windows. */
+static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_tile_trace *t, kernel_tile_segments *s,
+                                                                       const int *packets, int count,
+                                                                       const kernel_placement *reach)
+{
+    for (int volume = 0; volume < t->frame->volume_count; volume++) {
+        kernel_tile_segments_of(t, s, packets, count, volume, reach->near);
+        if (t->t_near < INFINITY) kernel_tile_segments_find(t, s, reach->blocks, INFINITY);
     }
+}
+
+/* The first volume's segments, window by window. */
+SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
+                                              int count, const kernel_placement *reach)
+{
     for (;;) {
-        t->t_near = kernel_tile_segments_front(t, s, packets, count);
+        kernel_tile_segments_of(t, s, packets, count, 0, reach->near);
         if (!(t->t_near < INFINITY)) break;
-        t->t_near = fmaxf(t->t_near, reach.near);
-        const float end = s->depth > 0 ? t->t_near + s->depth : reach.far;
-        kernel_tile_segments_find(t, s, reach.blocks, end);
-        kernel_tile_segments_learn(s, packets, count, t->t_near, fminf(end, reach.far));
+        const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
+        kernel_tile_segments_find(t, s, reach->blocks, end);
+        kernel_tile_segments_learn(s, packets, count, t->t_near, fminf(end, reach->far));
         for (int n = 0; n < count; n++) {
             kernel_tile_ray_segments *r = &s->packets[packets[n]];
             if (vm_any(t->packets[packets[n]].active))
@@ -250,6 +273,23 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
             r->list.t_begin = r->list.t_end;
         }
     }
+}
+
+/* Behind the tile's opaque surfaces, whose hits are in the packets; transparent ones, whose hits are fragments, cut
+ * segments. */
+static void kernel_tile_segments_trace(kernel_tile_trace *t)
+{
+    kernel_tile_segments *s = t->thread->tile_segments;
+    if (!kernel_tile_cells_begin(t, kernel_tet_segments_fit(t->frame) ? kernel_tet_segments_small : NULL)) return;
+    const kernel_placement reach = kernel_tile_reach(t);
+    int packets[KERNEL_TILE_PACKETS];
+    const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
+    for (int n = 0; n < count; n++)
+        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, t->first_fragment);
+    if (t->frame->job->separate_samples)
+        kernel_tile_segments_apart(t, s, packets, count, &reach);
+    else
+        kernel_tile_segments_windows(t, s, packets, count, &reach);
     for (int n = 0; n < count; n++) {
         kernel_tile_ray_segments *r = &s->packets[packets[n]];
         t->packets[packets[n]].active = r->active;

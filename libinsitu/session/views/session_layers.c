@@ -178,7 +178,6 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .colours = layer->colours,
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-                                  .root = RENDER_ROBUST,
                                   .normal = normals[layer->normals],
                                   .difference = layer->difference,
                                   .contact = CONTACT,
@@ -264,7 +263,6 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                   .colours = layer->colour,
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-                                  .root = RENDER_ROBUST,
                                   .normal = RENDER_GRADIENT,
                                   .edge_width = layer->edge_width,
                                   .is_of_faces = true,
@@ -312,7 +310,6 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
         .colour_map = &transfer->transfer,
         .opacity = layer->opacity,
         .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-        .root = RENDER_ROBUST,
         .normal = RENDER_GRADIENT,
         .clips = layer->clips};
     return INSITU_OK;

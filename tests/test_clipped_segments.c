@@ -1,0 +1,95 @@
+/* Volumes by segments under max_error, cut by spheres that rays graze: what a sphere leaves of a ray or takes from it
+ * may be as short as 1e-4 of its radius, and begin and end anywhere in a cell. The truth is the adaptive integral in
+ * double, cut where the line meets the sphere in closed form. */
+#include "reference_integral.h"
+#include "test_effort.h"
+#include "test_render_fixture.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+enum { SIDE = 13 };
+
+/* A sphere whose surface the pixel's ray passes at a share of the radius, below; and the depths at which it meets it.
+ */
+static void graze(const render_camera *camera, int pixel, uint64_t seed, render_clip *clip, double depths[2])
+{
+    double base[3], d[3], square = 0, along = 0, across = 0;
+    render_camera_ray(camera, pixel % SIDE, pixel / SIDE, base, d);
+    for (int a = 0; a < 3; a++) {
+        clip->centre[a] = test_uniform_in((uint64_t)a, seed, -0.6, 0.6);
+        square += d[a] * d[a];
+        along += d[a] * (clip->centre[a] - base[a]);
+    }
+    const double nearest = along / square;
+    for (int a = 0; a < 3; a++) across += pow(clip->centre[a] - base[a] - nearest * d[a], 2);
+    clip->kind = RENDER_CLIP_SPHERE;
+    clip->is_outside = seed % 2;
+    clip->radius = sqrt(across) * (1 + pow(10, -test_uniform_in(3, seed, 0.3, 11)));
+    const double half = sqrt((clip->radius * clip->radius - across) / square);
+    depths[0] = nearest - half;
+    depths[1] = nearest + half;
+}
+
+/* The error of a random picture of the mesh on the pixel whose ray grazes the sphere. */
+static double error_of(test_mesh_kind kind, uint64_t seed, double max_error)
+{
+    render_fixture f;
+    fixture_function function;
+    render_clip clip = {0};
+    reference_hit cuts[2];
+    double depths[2], truth[4], worst = 0;
+    drawn_frame drawn;
+    const int pixel = (int)(test_uniform(1, seed) * SIDE * SIDE);
+    fixture_create_lattice(&f, kind, 2 + (int)(seed % 3), 0.2, test_wave);
+    fixture_look(&f, (fixture_camera)(seed / 2 % 3), SIDE, SIDE);
+    fixture_set_volume(&f, 1);
+    fixture_set_function(&f, &function, seed, seed % 5 == 0, 0.9, pow(10, test_uniform_in(2, seed, -4, 0.5)));
+    f.transfer.low = -1;
+    f.job.integration = RENDER_SEGMENTS;
+    f.job.max_error = max_error;
+    f.job.extent = 3.5; /* the cube's diagonal is less */
+    graze(&f.job.camera, pixel, seed, &clip, depths);
+    f.job.clips = &clip;
+    f.job.clip_count = 1;
+    f.job.volume_clips = 1;
+    fixture_draw(&f, &drawn);
+    for (int i = 0; i < 2; i++) cuts[i] = (reference_hit){.depth = depths[i], .opacity = 0};
+    reference_integral *scene = reference_integral_create(&f.job, 1e-9);
+    reference_integral_trace(scene, pixel % SIDE, pixel / SIDE, fixture_background, cuts, 2, truth);
+    for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]));
+    reference_integral_free(scene);
+    drawn_free(&drawn);
+    fixture_free(&f);
+    return worst;
+}
+
+static void grazed_spheres_keep_max_error(void **state)
+{
+    static const double asked[3] = {1e-2, 1e-3, 1e-4};
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int i = 0; i < 3; i++) {
+            double worst = 0;
+            uint64_t at = 0;
+            for (uint64_t seed = 0; seed < (uint64_t)test_effort(getenv("ALL") ? 800 : 60, 2000); seed++) {
+                const double error = error_of(kind, 3 * seed + (uint64_t)i, asked[i]);
+                if (error > worst) at = 3 * seed + (uint64_t)i;
+                worst = test_worse(worst, error);
+            }
+            fprintf(stderr, "%s, max_error %g: %.3g of it, seed %d\n", test_mesh_kind_name(kind), asked[i],
+                    worst / asked[i], (int)at);
+            if (!getenv("ALL")) assert_true(worst <= asked[i]);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(grazed_spheres_keep_max_error)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
