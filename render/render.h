@@ -35,7 +35,7 @@ typedef struct render_camera {
     double half_height;                 /* perspective: tangent of half the vertical angle; else half the height */
     bool is_orthographic;
     int width, height;
-    double offset[2]; /* of every ray from its pixel's centre, in pixels, to the right and down; 0 by default */
+    double offset[2]; /* how far every ray is off its pixel's centre, in pixels, to the right and down; 0 by default */
 } render_camera;
 
 /* The offset of sample k of count (1, 2, 4, 8 or 16) in a pixel. Along either axis the samples are evenly spaced, and
@@ -78,7 +78,7 @@ typedef struct render_transfer {
     int colour_count;     /* >= 2 */
     const float *colours; /* colour_count × 3 */
     render_scale scale;
-    double threshold; /* of RENDER_SYMLOG, > 0 */
+    double threshold; /* for RENDER_SYMLOG, > 0 */
     bool is_banded;   /* surfaces only: the colours are those of bands of equal width, not interpolated; 1 will do */
     const float
         *outside;      /* surfaces only: 3 × 3, the colours below low, above high, and of what is not a number; NULL:
@@ -112,7 +112,7 @@ typedef struct render_field {
 } render_field;
 
 typedef enum render_normal {
-    RENDER_GRADIENT,    /* of the cell that holds the hit */
+    RENDER_GRADIENT,    /* the gradient in the cell that holds the hit */
     RENDER_DIFFERENCES, /* central ones (thesis, 4.3.4): one-sided where a sample is in no cell, the cell's gradient
                            where an axis has neither. Over this rank's cells, or with the job's waiting over those of
                            all */
@@ -124,7 +124,7 @@ enum { RENDER_DIFFERENCE_SAMPLES = 6 };
 /* A hit of RENDER_DIFFERENCES that waits for samples of other ranks (render_differences.h). 16 bytes. */
 typedef struct render_waiting_hit {
     uint32_t pixel, kind; /* as its fragment will have them */
-    float t, reach;       /* of its samples, before and behind it along each axis; scaled units */
+    float t, reach;       /* reach: how far its samples lie before and behind it along each axis; scaled units */
 } render_waiting_hit;
 
 /* The look of such a hit: the cell's gradient in camera axes, and the colour before light falls on it. */
@@ -156,7 +156,7 @@ typedef struct render_waiting {
 
 /* Gradients at a part's vertices, of any length. Every vertex of the cells that the layer's isovalues cross has one. */
 typedef struct render_vertex_gradients {
-    const int32_t *entries; /* of each vertex: which of the gradients; -1: none. NULL: the part has no such cells */
+    const int32_t *entries; /* for each vertex: which of the gradients; -1: none. NULL: the part has no such cells */
     const float (*gradients)[3]; /* world axes */
 } render_vertex_gradients;
 
@@ -172,14 +172,14 @@ typedef struct render_surface_layer {
     render_material material;
     render_normal normal;
     double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
-    const render_vertex_gradients *gradients; /* of RENDER_VERTEX: part by part */
+    const render_vertex_gradients *gradients; /* for RENDER_VERTEX: part by part */
     float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
                          of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
     bool is_of_faces; /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that
                          meets the face in an edge alone, and so is in the cell for no length, hits it too */
-    uint32_t clips;   /* of the job's, a bit each */
-    float contact; /* of rays from hits (render_light.h): what is nearer to the hit than so many sizes of the cell that
+    uint32_t clips;   /* which of the job's clips cut it, a bit each */
+    float contact; /* for rays from hits (render_light.h): what is nearer to the hit than so many sizes of the cell that
                       it is met in hides nothing; 0: all of it does */
 } render_surface_layer;
 
@@ -245,8 +245,8 @@ typedef enum render_paint {
 /* The shadows and ambient occlusion of hits painted RENDER_UNLIT: render_light.h. */
 typedef struct render_occlusion {
     uint32_t lights; /* those that cast shadows, a bit each */
-    int samples;     /* of ambient occlusion: rays of a hit, 0 .. 64; 0: none */
-    double radius;   /* of ambient occlusion: what is farther away does not count; scene units, > 0 */
+    int samples;     /* for ambient occlusion: rays of a hit, 0 .. 64; 0: none */
+    double radius;   /* for ambient occlusion: what is farther away does not count; scene units, > 0 */
 } render_occlusion;
 
 typedef struct render_job {
@@ -258,7 +258,7 @@ typedef struct render_job {
     const render_surface_layer *surfaces;
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_paint paint;
-    const render_occlusion *occlusion; /* of RENDER_UNLIT */
+    const render_occlusion *occlusion; /* for RENDER_UNLIT */
     render_waiting *waiting; /* NULL: RENDER_DIFFERENCES are found at once; else its hits are added to the list and make
                                 no fragments, but those of polyhedra. Not with RENDER_VALUES */
     render_traversal traversal;
@@ -271,7 +271,7 @@ typedef struct render_job {
     int light_count;
     double step; /* distance between samples, scene units, > 0; volumes only */
     render_integration integration;
-    double max_error; /* of segments: > 0: cells other than tets are cut into parts such that no channel of a pixel is
+    double max_error; /* for segments: > 0: cells other than tets are cut into parts such that no channel of a pixel is
                          off by more, in linear light; 0: into parts no longer than step */
     double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
                          ranks, so that all cut alike. 0: of this rank's */

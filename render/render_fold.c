@@ -70,8 +70,7 @@ static float error_at(float t)
 /* Ends each fragment of a run by its error earlier, so that compositing finds its overlaps (kernel_segments.h). */
 static void shorten(const render_folding *folding, fragment *items, int64_t count)
 {
-    for (int64_t i = 0; i < count && folding->has_segments; i++)
-        items[i].t_out -= error_at(items[i].t_out);
+    for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
 }
 
 /* Folds one run, stretch by stretch; returns the end of what it wrote. */

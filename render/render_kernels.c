@@ -50,12 +50,12 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, 
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
-    if (arrays->has_lanes && kernel_arrays_type(arrays, candidate->cell) == GRID_TET) {
+    if (arrays->has_lanes && kernel_is_linear(kernel_arrays_type(arrays, candidate->cell))) {
         kernel_arrays_fetch_tet(c, arrays, candidate->cell);
         kernel_tet_place(c, t->frame, &t->tile);
     } else {
         kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
-        if (c->type == GRID_POLYHEDRON) {
+        if (kernel_has_own_faces(c->type)) {
             kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
             return;
         }
@@ -86,8 +86,8 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
 SIMD_INLINE bool kernel_is_for_curved_batch(const kernel_tile_trace *t, const kernel_batch *b,
                                             const kernel_tile_candidate *candidate, int type)
 {
-    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_curved_batch_fit(t, &b->arrays)) return false;
-    return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
+    if (kernel_is_linear(type) || kernel_has_own_faces(type) || !kernel_curved_batch_fit(t, &b->arrays)) return false;
+    return kernel_is_box(type) || b->arrays.type != GRID_NO_TYPE ||
            kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
 }
 
@@ -114,7 +114,7 @@ SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_ba
                                      const kernel_tile_candidate *candidate)
 {
     const int type = kernel_arrays_type(&b->arrays, candidate->cell);
-    return type == GRID_TET ? b->takes_batches : kernel_is_for_curved_batch(t, b, candidate, type);
+    return kernel_is_linear(type) ? b->takes_batches : kernel_is_for_curved_batch(t, b, candidate, type);
 }
 
 /* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
@@ -139,7 +139,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
 {
     kernel_batch_turn(t, &m->batch, part);
     const int type = kernel_arrays_type(&m->batch.arrays, candidate->cell);
-    if (type == GRID_TET && m->batch.takes_batches) {
+    if (kernel_is_linear(type) && m->batch.takes_batches) {
         kernel_batch_add(t, &m->batch, candidate, value);
     } else if (kernel_is_for_curved_batch(t, &m->batch, candidate, type)) {
         kernel_curved_batch_turn(t, &m->curved_batch, &m->batch.arrays, part);

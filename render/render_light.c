@@ -76,7 +76,7 @@ struct render_occluders {
     const kernel_table *kernels;
     render_job job; /* as it was given */
     render_job surfaces;
-    kernel_frame frame; /* of the surfaces alone */
+    kernel_frame frame; /* for the surfaces alone */
     kernel_occluders trees;
     int threads;
 };

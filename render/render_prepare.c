@@ -1,4 +1,5 @@
 #include "render_prepare.h"
+#include "kernel_cell_types.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_pieces.h"
@@ -289,8 +290,7 @@ static bool has_curved_cells(const render_job *job)
 {
     for (int i = 0; i < job->part_count; i++) {
         const grid *g = job->parts[i].cells;
-        if (g->cell_types || g->cell_type == GRID_HEX || g->cell_type == GRID_WEDGE || g->cell_type == GRID_PYRAMID)
-            return true;
+        if (g->cell_types || kernel_has_quads(g->cell_type)) return true;
     }
     return false;
 }

@@ -46,7 +46,7 @@ static inline void kernel_domain_slopes(int type, kernel_slopes *out)
     kernel_corners r[3];
     memset(out, 0, sizeof *out);
     kernel_domain_corners(type, r);
-    if (type == GRID_PYRAMID) {
+    if (kernel_has_apex(type)) {
         for (int a = 0; a < 3; a++) {
             out->centre[0][a] = a == 2 ? -c[a] : c[a];
             out->corners[0][a] = a == 2 ? -r[a] : r[a];
@@ -67,7 +67,7 @@ static inline void kernel_domain_slopes(int type, kernel_slopes *out)
  * and b / k in [-1/32, 33/32] are at most 1, 33/32, 33/32 and 2.13 over k, their norm 3.29. */
 static inline double kernel_hessian_norm(int type, const double c[4])
 {
-    if (type == GRID_PYRAMID) return fabs(c[0]) * 3.29;
+    if (kernel_has_apex(type)) return fabs(c[0]) * 3.29;
     double sum = 0;
     for (int j = 0; j < 3; j++) {
         const double largest =
@@ -145,8 +145,8 @@ static inline double kernel_bounds_error(const double e[8], int type)
 {
     kernel_corners r[3];
     kernel_domain_corners(type, r);
-    if (type == GRID_PYRAMID) r[0] *= r[2], r[1] *= r[2];
-    const kernel_corners m = type == GRID_PYRAMID ? r[0] * r[1] / r[2] : r[0] * r[1];
+    if (kernel_has_apex(type)) r[0] *= r[2], r[1] *= r[2];
+    const kernel_corners m = kernel_has_apex(type) ? r[0] * r[1] / r[2] : r[0] * r[1];
     const kernel_corners at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + m * e[4] +
                               r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
     return sqrt(kernel_corners_most(at * at));

@@ -85,27 +85,27 @@ SIMD_INLINE kernel_half kernel_half_more(kernel_half v, kernel_half most)
 /* A number's slope along axis a, of coefficients 1 to 7, at r of the domain. */
 SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int a, const double r[3])
 {
-    if (type == GRID_PYRAMID) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
+    if (kernel_has_apex(type)) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
     kernel_half out = c[1 + a];
-    for (int j = type == GRID_HEX ? 0 : 1; j < 3; j++)
+    for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
         if (a != 2 - j) out += c[4 + j] * r[3 - a - (2 - j)];
-    return type == GRID_HEX ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
+    return kernel_is_box(type) ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
 }
 
-/* kernel_bounds_setup()'s bend along axis a: how far the slope of what has these coefficients 4 to 7 is at r from that
- * at the centre. */
+/* Returns how far the slope along axis a, of a polynomial with these coefficients 4 to 7, is at r from that at the
+ * centre. */
 SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
     kernel_half out = {0};
-    if (type == GRID_PYRAMID) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
-    for (int j = type == GRID_HEX ? 0 : 1; j < 3; j++)
+    if (kernel_has_apex(type)) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
+    for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
         if (a != 2 - j) out += bent[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
-    return type == GRID_HEX ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
+    return kernel_is_box(type) ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
 }
 
-/* kernel_map_setup()'s coefficients. */
+/* Finds the coefficients of the map and of the field. */
 SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const float at[4][8][SIMD_WIDTH], int half)
 {
     const int count = grid_type_vertices(type);
@@ -126,7 +126,8 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
     }
 }
 
-/* kernel_bounds_bend(). */
+/* Multiplies the map's bent coefficients by the inverse of its Jacobian at the centre, which makes those of N
+ * (kernel_roots.h). */
 SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -179,18 +180,18 @@ SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int ty
     }
 }
 
-/* kernel_bounds_error(). */
+/* Bounds, over the corners of the domain, how far the field with these coefficients is off L. */
 SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
 {
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
     kernel_half most = {0};
     for (int n = 0; n < table->corner_count; n++) {
-        const double *corner = kernel_domain_of(type)->corners[n], k = type == GRID_PYRAMID ? corner[2] : 1;
+        const double *corner = kernel_domain_of(type)->corners[n], k = kernel_has_apex(type) ? corner[2] : 1;
         const double r[3] = {corner[0] * k, corner[1] * k, corner[2]}, m = r[0] * r[1] / k;
         kernel_half at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
-        if (type != GRID_WEDGE) at += m * e[4];
-        if (type == GRID_WEDGE) at += r[2] * (r[0] * e[5] + r[1] * e[6]);
-        if (type == GRID_HEX) at += r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
+        if (!kernel_is_prism(type)) at += m * e[4];
+        if (kernel_is_prism(type)) at += r[2] * (r[0] * e[5] + r[1] * e[6]);
+        if (kernel_is_box(type)) at += r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
         most = n ? kernel_half_more(at * at, most) : at * at;
     }
     return kernel_half_sqrt(most);
@@ -214,7 +215,7 @@ SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int ty
 
 /* The largest over the corners. */
 typedef struct kernel_lanes_most {
-    kernel_half bend;                   /* kernel_matrix_norm(), to its eighth power */
+    kernel_half bend;                   /* a bound of the matrix's norm, to its eighth power */
     kernel_half df, along, steep, bent; /* squares: of F's gradient; as in kernel_bounds_rise() */
 } kernel_lanes_most;
 
@@ -292,10 +293,10 @@ SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int 
  * its coordinates there, and of a hex of all three. */
 SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_half out[4])
 {
-    const int first = type == GRID_WEDGE ? 1 : 0;
+    const int first = kernel_is_prism(type) ? 1 : 0;
     for (int j = 0; j < 4; j++) out[j] = (kernel_half){0};
     for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = bent[first + j];
-    if (type != GRID_HEX) return;
+    if (kernel_has_triangles(type)) return;
     for (int j = 0; j < 3; j++) out[j] += 0.5 * bent[3];
 }
 
@@ -352,10 +353,10 @@ SIMD_INLINE void kernel_half_contraction_of(const kernel_bounds_lanes *b, const 
     for (int n = 0; n < 4; n++) {
         const kernel_half *c = n < 3 ? b->exact[n] : r->e;
         middle[n] = c[0];
-        if (type == GRID_PYRAMID) continue;
+        if (kernel_has_apex(type)) continue;
         middle[n] += (centre[0] * c[1] + centre[1] * c[2]) + centre[2] * c[3];
-        if (type == GRID_HEX) middle[n] += 0.25 * ((c[4] + c[5]) + c[6]) + 0.125 * c[7];
-        if (type == GRID_WEDGE) middle[n] += (1.0 / 6) * (c[5] + c[6]);
+        if (kernel_is_box(type)) middle[n] += 0.25 * ((c[4] + c[5]) + c[6]) + 0.125 * c[7];
+        if (kernel_is_prism(type)) middle[n] += (1.0 / 6) * (c[5] + c[6]);
     }
     for (int i = 0; i < 3; i++) {
         const kernel_half offset =
@@ -376,7 +377,8 @@ static __attribute__((noinline)) void kernel_half_contraction(const kernel_bound
     KERNEL_OF_TYPE(type, kernel_half_contraction_of, b, r, half, out);
 }
 
-/* kernel_bounds_linear(), with kernel_bounds_jump() and kernel_bounds_rise() of rays about (0, 0, 1). */
+/* Bounds, for rays about (0, 0, 1), how far the field is off L, how it rises along the rays, and how far it may jump at
+ * a face. */
 SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
                                     kernel_curved_batch_bounds *out, int type)
 {

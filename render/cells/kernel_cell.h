@@ -161,7 +161,7 @@ SIMD_INLINE kernel_four kernel_four_abs(kernel_four v)
     return (kernel_four)((kernel_four_bits)v & 0x7fffffff);
 }
 
-/* kernel_line_between() of edges from a to b, and kernel_line_blur(). */
+/* Makes four edges' lines, from a to b, and finds their errors and extents (kernel_blur). */
 SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_spots a, kernel_spots b,
                                    kernel_line lines[4], kernel_four *errors, kernel_four *extents)
 {
@@ -197,10 +197,12 @@ typedef struct kernel_cell {
     float f[GRID_MAX_CELL_VERTICES];     /* values as the caller wants them */
     float g[GRID_MAX_CELL_VERTICES];     /* the same of the colour field */
     int rank[GRID_MAX_CELL_VERTICES];    /* place in the order of coordinates */
-    kernel_line lines[KERNEL_MAX_LINES]; /* of the edges, then of the quads' diagonals */
-    float doubt;                         /* of a tet: the largest of its lines' bounds */
-    float least[4];                      /* kernel_least_weight() of a tet's faces; [0]: no less than of any triangle */
-    float normal[3];                     /* of a tet: kernel_tet_normal(), where has_normal */
+    kernel_line lines[KERNEL_MAX_LINES]; /* the edges' lines, then those of the quads' diagonals */
+    float doubt;                         /* for a tet: the largest of its lines' bounds */
+    float
+        least[4]; /* for a tet's faces: the least sum of weights that is good enough; [0]: no less than of any triangle
+                   */
+    float normal[3]; /* for a tet: kernel_tet_normal(), where has_normal */
 } kernel_cell;
 
 /* The places where rays go through a face: v is the value of f, w that of g, r the cell's own coordinates, which are
@@ -287,7 +289,7 @@ SIMD_INLINE void kernel_cell_fetch(kernel_cell *c, const grid *g, const grid_fie
     c->index = index;
     c->is_placed = false;
     c->type = grid_cell_type(g, index);
-    if (c->type == GRID_POLYHEDRON && kernel_is_tet(g, index, c->vertices))
+    if (kernel_has_own_faces(c->type) && kernel_is_tet(g, index, c->vertices))
         c->type = GRID_TET, c->count = 4;
     else
         c->count = grid_cell_vertices(g, index, c->vertices);
@@ -304,11 +306,11 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
 SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
     static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* a hex's vertices as bits of x, y, z; and back */
-    const int begins = c->type == GRID_PYRAMID ? 4 : c->count;
+    const int begins = kernel_has_apex(c->type) ? 4 : c->count;
     int least = 0, swap;
     for (int i = 1; i < begins; i++)
         if (kernel_rank_before(c, i, least)) least = i;
-    if (c->type == GRID_HEX) {
+    if (kernel_is_box(c->type)) {
         int axes[3] = {1, 2, 4};
         for (int k = 0; k < 3; k++) {
             const int at = k == 1; /* 0 and 1, 1 and 2, 0 and 1 */
@@ -320,7 +322,7 @@ SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_V
             for (int a = 0; a < 3; a++) bits ^= corner[i] >> a & 1 ? axes[a] : 0;
             from[i] = corner[bits];
         }
-    } else if (c->type == GRID_WEDGE) {
+    } else if (kernel_is_prism(c->type)) {
         const int base = least < 3 ? 0 : 3;
         int ahead = base + (least + 1) % 3, behind = base + (least + 2) % 3;
         if (kernel_rank_before(c, behind, ahead)) swap = ahead, ahead = behind, behind = swap;
@@ -377,7 +379,7 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
 SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
-    if (c->type == GRID_TET) {
+    if (kernel_is_linear(c->type)) {
         kernel_rank_positions(c->world, 4, rank);
         for (int i = 0; i < 4; i++) from[rank[i]] = i;
         kernel_cell_permute(c, from, 4);
@@ -405,7 +407,7 @@ SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile,
     *out_z = (float)(z - tile->depth_shift);
 }
 
-/* kernel_place_in() of a tet's vertices at once: the same operations, and so the same bits. */
+/* Moves a tet's vertices into tile space, all at once: the operations of kernel_place_in(), and so the same bits. */
 SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
     kernel_doubles d[3], place[3];
@@ -426,7 +428,7 @@ SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const k
 SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
-    if (c->type == GRID_TET)
+    if (kernel_is_linear(c->type))
         kernel_tet_place(c, f, tile);
     else
         for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
@@ -520,16 +522,17 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
         const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
         const kernel_spot from = kernel_cell_spot(c, a), to = kernel_cell_spot(c, b);
         c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
-        if (c->type != GRID_HEX) most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
+        if (kernel_has_triangles(c->type))
+            most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
     }
-    c->least[0] = c->type == GRID_HEX ? (float)INFINITY : kernel_blur_least(most); /* hexes hardly have triangles */
+    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_blur_least(most); /* hexes hardly have triangles */
 }
 
 static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
     if (c->has_lines) return;
     c->has_lines = true;
-    if (c->type == GRID_TET)
+    if (kernel_is_linear(c->type))
         kernel_tet_lines(c, f, tile);
     else
         kernel_curved_lines(c, f, tile);

@@ -115,7 +115,8 @@ SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, 
     return kernel_line_blur(&l, p->tile->radius, a, b);
 }
 
-/* kernel_least_weight() of the triangle i, j, k in the order. */
+/* Returns the least sum of weights that is good enough, of the triangle i, j, k in the order (kernel_least_weight()).
+ */
 static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_spot i, kernel_spot j,
                                                                    kernel_spot k)
 {

@@ -20,30 +20,6 @@ typedef struct kernel_curved_ends {
     float t[2][KERNEL_LIST_ROOM], v[2][KERNEL_LIST_ROOM], r[2][3][KERNEL_LIST_ROOM];
 } kernel_curved_ends;
 
-typedef struct kernel_curved_packet {
-    vm active;
-    vi lane, at;
-    vf far, u, v;
-    kernel_rays rays;
-} kernel_curved_packet;
-
-SIMD_INLINE void kernel_curved_packet_begin(kernel_curved_packet *p, const kernel_tile_trace *t,
-                                            const kernel_pixel_list *rays, int first)
-{
-    const kernel_tile *tile = &t->tile;
-    const bool flat = t->frame->job->camera.is_orthographic;
-    const int left = rays->count - first;
-    const vi pixel = kernel_bytes(rays->pixel + first), column = pixel & (KERNEL_TILE - 1), row = pixel >> 4;
-    p->active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    p->lane = kernel_bytes(rays->lane + first) & (SIMD_WIDTH - 1);
-    p->at = kernel_batch_at(column & (KERNEL_TILE - 1), row & (KERNEL_TILE - 1));
-    p->far = kernel_batch_far(t, p->at);
-    p->rays = (kernel_rays){kernel_batch_of_tile(tile->origin_x, column), kernel_batch_of_tile(tile->origin_y, row),
-                            kernel_batch_of_tile(tile->slope_x, column), kernel_batch_of_tile(tile->slope_y, row)};
-    p->u = flat ? p->rays.origin_x : p->rays.slope_x;
-    p->v = flat ? p->rays.origin_y : p->rays.slope_y;
-}
-
 SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel_list *from, int i)
 {
     to->pixel[to->count] = from->pixel[i];
@@ -51,7 +27,7 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
     to->count++;
 }
 
-SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_curved_packet *p, int n,
+SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_lane_rays *p, int n,
                                     kernel_curved_sides *s)
 {
     const vf e =
@@ -61,7 +37,7 @@ SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_
     s->side[n] = vi_from_bits(e);
 }
 
-SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
                                         kernel_curved_sides *s)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -71,7 +47,8 @@ SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const ker
         if (shape->faces[face].count == 4) kernel_curved_side(h, p, shape->edge_count + face, s);
 }
 
-/* kernel_halves_once() of a quad whose diagonal is from the loop's vertex 1 where turn is set, else from vertex 0. */
+/* Returns the rays that cross just one half of a quad, whose diagonal is from the loop's vertex 1 where turn is set,
+ * else from vertex 0. */
 SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
 {
     vm from[4];
@@ -80,7 +57,7 @@ SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
 }
 
 /* Projects the vertices along the rays. */
-SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kernel_curved_packet *p, int count, vf x[8],
+SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kernel_lane_rays *p, int count, vf x[8],
                                        vf y[8])
 {
     for (int i = 0; i < count; i++) {
@@ -90,7 +67,7 @@ SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kern
     }
 }
 
-SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
                                      kernel_curved_crossed *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -135,8 +112,8 @@ SIMD_INLINE vi kernel_face_word(const kernel_placed_curved *h, vi lane, vi face)
     return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
 }
 
-SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
-                                         vi face, kernel_quad *q, kernel_curved_quad *out)
+SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi face,
+                                         kernel_quad *q, kernel_curved_quad *out)
 {
     const int count = grid_type_vertices(type);
     const vi word = kernel_face_word(h, p->lane, face);
@@ -169,9 +146,9 @@ typedef struct kernel_curved_triangle {
     vf e[3];
 } kernel_curved_triangle;
 
-/* kernel_triangle_mend(). */
+/* Computes the weak rays' edge functions again, from projected vertices. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
-                                                                        const kernel_curved_packet *p, vm weak,
+                                                                        const kernel_lane_rays *p, vm weak,
                                                                         kernel_curved_triangle *own)
 {
     vf x[3], y[3];
@@ -187,7 +164,7 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const ke
 }
 
 /* The triangle that is the face, on the given rays; on others another. */
-SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, const kernel_curved_packet *p, int type,
+SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
                                              vm rays, vi face, kernel_curved_triangle *own)
 {
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
@@ -204,7 +181,7 @@ SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, cons
     if (__builtin_expect(vm_any(weak), 0)) kernel_curved_triangle_mend(h, p, weak, own);
 }
 
-/* kernel_weigh(). */
+/* Returns the mean of the corners' values by the weights. */
 SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v[3], vf inverse)
 {
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
@@ -234,15 +211,15 @@ SIMD_INLINE void kernel_curved_place_select(vm m, const kernel_curved_place *a, 
     for (int i = 0; i < 3; i++) out->r[i] = vf_select(m, a->r[i], b->r[i]);
 }
 
-SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel_curved_packet *p, int type, vi faces,
+SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi faces,
                                      kernel_curved_place out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};
     const vm on_quad[2] = {kernel_curved_on_quad(type, 0, face[0]), kernel_curved_on_quad(type, 1, face[1])};
     const vm once[2] = {vm_and(p->active, on_quad[0]), vm_and(p->active, on_quad[1])};
-    const int quads = type == GRID_PYRAMID ? 1 : 2;
+    const int quads = kernel_has_apex(type) ? 1 : 2;
     memset(out, 0, 2 * sizeof *out);
-    if (type == GRID_HEX || vm_any(vm_or(once[0], once[1]))) {
+    if (kernel_is_box(type) || vm_any(vm_or(once[0], once[1]))) {
         kernel_quad own[2];
         kernel_curved_quad corners[2];
         kernel_quad_place places[2];
@@ -250,7 +227,7 @@ SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel
         kernel_quads_cross(own, quads, once, true, places); /* not in doubt, so beside all edges */
         for (int n = 0; n < quads; n++) kernel_curved_quad_place(type, &corners[n], &places[n], &out[n]);
     }
-    for (int n = 0; n < 2 && type != GRID_HEX; n++) {
+    for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(p->active, on_quad[n]);
         kernel_curved_triangle own;
         kernel_curved_place place;

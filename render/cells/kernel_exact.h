@@ -162,7 +162,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
         d[2][i] = spot.t;
         d[3][i] = kernel_double_domain(transfer, c->values[i]);
     }
-    m->is_pyramid = c->type == GRID_PYRAMID;
+    m->is_pyramid = kernel_has_apex(c->type);
     for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);
     kernel_polynomial_fit(m->field, c->type, d[3]);
 }
@@ -196,7 +196,7 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
     out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
 }
 
-/* kernel_map_newton(), to the end: where a step is below 1e-8, the next would be below rounding. */
+/* Takes steps of Newton's method in double to the end: where a step is below 1e-8, the next would be below rounding. */
 static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {

@@ -25,6 +25,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_cell_types.h"
 #include "simd.h"
 
 enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
@@ -51,7 +52,7 @@ typedef struct kernel_local_crossing {
 
 SIMD_INLINE int kernel_bent_terms(int type)
 {
-    return type == GRID_HEX ? 4 : type == GRID_WEDGE ? 2 : type == GRID_PYRAMID ? 1 : 0;
+    return kernel_is_box(type) ? 4 : kernel_is_prism(type) ? 2 : kernel_has_apex(type) ? 1 : 0;
 }
 
 /* A number at the vertices as the terms' factors: in the middle, along r, bent. */
@@ -100,11 +101,11 @@ SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
 
 SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 {
-    if (type == GRID_HEX)
+    if (kernel_is_box(type))
         kernel_hex_terms(v, out);
-    else if (type == GRID_WEDGE)
+    else if (kernel_is_prism(type))
         kernel_wedge_terms(v, out);
-    else if (type == GRID_PYRAMID)
+    else if (kernel_has_apex(type))
         kernel_pyramid_terms(v, out);
     else
         kernel_tet_terms(v, out);
@@ -118,7 +119,7 @@ typedef struct kernel_bend {
 SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
 {
     const vf zero = vf_set(0);
-    if (type == GRID_HEX) {
+    if (kernel_is_box(type)) {
         b->term[0] = r[0] * r[1];
         b->term[1] = r[0] * r[2];
         b->term[2] = r[1] * r[2];
@@ -126,12 +127,12 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
         const vf along[4][3] = {
             {r[1], r[0], zero}, {r[2], zero, r[0]}, {zero, r[2], r[1]}, {b->term[2], b->term[1], b->term[0]}};
         memcpy(b->along, along, sizeof along);
-    } else if (type == GRID_WEDGE) {
+    } else if (kernel_is_prism(type)) {
         b->term[0] = r[0] * r[2];
         b->term[1] = r[1] * r[2];
         const vf along[2][3] = {{r[2], zero, r[0]}, {zero, r[2], r[1]}};
         memcpy(b->along, along, sizeof along);
-    } else if (type == GRID_PYRAMID) {
+    } else if (kernel_has_apex(type)) {
         /* Within the cell α / k and β / k are half at most; a step beyond the apex must not blow up. */
         const vf half = vf_set(0.75f), inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         const vf a = vf_clamp(r[0] * inverse, -half, half), c = vf_clamp(r[1] * inverse, -half, half);
@@ -239,9 +240,9 @@ SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
  * places. */
 SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
 {
-    if (type == GRID_HEX)
+    if (kernel_is_box(type))
         kernel_hex_turn(at, lists);
-    else if (type == GRID_WEDGE)
+    else if (kernel_is_prism(type))
         kernel_wedge_turn(at, lists);
     else
         kernel_pyramid_turn(at, lists);
@@ -250,12 +251,12 @@ SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
 /* Returns how far r lies inside of the cell's border; it is less than 0 outside. */
 SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 {
-    if (type == GRID_HEX) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
-    if (type == GRID_WEDGE) {
+    if (kernel_is_box(type)) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
+    if (kernel_is_prism(type)) {
         const vf within = vf_min(vf_min(r[0], r[1]) + 1.0f / 3, 1.0f / 3 - (r[0] + r[1]));
         return vf_min(within, 0.5f - vf_abs(r[2]));
     }
-    if (type == GRID_PYRAMID) return vf_min(0.5f * r[2] - vf_max(vf_abs(r[0]), vf_abs(r[1])), 1.0f - r[2]);
+    if (kernel_has_apex(type)) return vf_min(0.5f * r[2] - vf_max(vf_abs(r[0]), vf_abs(r[1])), 1.0f - r[2]);
     return vf_min(vf_min(vf_min(r[0], r[1]), r[2]) + 0.25f, 0.25f - ((r[0] + r[1]) + r[2]));
 }
 
@@ -281,9 +282,9 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
     const vf *b0 = bent[0];
     vf most = vf_set(0);
     /* Along k, α and β: 1/4, 1/2 and 1/2 at most. */
-    if (type == GRID_PYRAMID) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
-    for (int n = 0; n < (type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 0); n++) {
-        const float *corner = corners[type == GRID_HEX ? 0 : 1][n];
+    if (kernel_has_apex(type)) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
+    for (int n = 0; n < (kernel_is_box(type) ? 8 : kernel_is_prism(type) ? 6 : 0); n++) {
+        const float *corner = corners[kernel_is_box(type) ? 0 : 1][n];
         const vf r[3] = {vf_set(corner[0]), vf_set(corner[1]), vf_set(corner[2])};
         kernel_bend b;
         vf sum = vf_set(0);
@@ -394,7 +395,7 @@ SIMD_INLINE vf kernel_local_take(const float *of, vi lane)
 typedef struct kernel_local_points {
     vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
     kernel_bend bend;     /* at r */
-    vf column[3][3], det; /* of the derivatives' inverse, times their determinant's inverse in det */
+    vf column[3][3], det; /* columns of the derivatives' inverse, times their determinant's inverse in det */
 } kernel_local_points;
 
 /* y - (r + n(r)) */
@@ -455,7 +456,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
         for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_local_take(cells->inverse[i][a], lane), d[a], p->y[i]);
         p->r[i] = p->y[i];
     }
-    if (type == GRID_TET) return vm_all_lanes();
+    if (kernel_is_linear(type)) return vm_all_lanes();
     for (int k = 0; k < kernel_bent_terms(type); k++)
         for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
     vf left[3];

@@ -74,10 +74,10 @@ typedef struct kernel_map {
 
 #define KERNEL_FIT(type, c, v)                                                                                         \
     do {                                                                                                               \
-        if ((type) != GRID_HEX) memset(c, 0, 8 * sizeof *(c));                                                         \
-        if ((type) == GRID_HEX)                                                                                        \
+        if (kernel_has_triangles(type)) memset(c, 0, 8 * sizeof *(c));                                                 \
+        if (kernel_is_box(type))                                                                                       \
             KERNEL_HEX_FIT(c, v);                                                                                      \
-        else if ((type) == GRID_WEDGE)                                                                                 \
+        else if (kernel_is_prism(type))                                                                                \
             KERNEL_WEDGE_FIT(c, v);                                                                                    \
         else                                                                                                           \
             KERNEL_PYRAMID_FIT(c, v);                                                                                  \
@@ -105,7 +105,7 @@ SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, con
 
 SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
 {
-    m->is_pyramid = c->type == GRID_PYRAMID;
+    m->is_pyramid = kernel_has_apex(c->type);
     m->origin[0] = c->x[0];
     m->origin[1] = c->y[0];
     m->origin[2] = c->z[0];
@@ -428,8 +428,8 @@ typedef struct kernel_bounds {
     float curve, twist;        /* H, K; of a pyramid: times k */
     float coarsest;            /* longer pieces are halved in any case */
     bool is_monotone;          /* the field along any ray of the beam */
-    float level, gradient[3];  /* of L: at vertex 0, and along tile space */
-    float thickness;           /* of |E|, and what rounding adds to it */
+    float level, gradient[3];  /* for L: at vertex 0, and along tile space */
+    float thickness;           /* for |E|, and what rounding adds to it */
     float jump;                /* a face's value and the field on the ray beside it are never farther apart */
 } kernel_bounds;
 
@@ -471,7 +471,7 @@ static const kernel_domain kernel_wedge_domain = {{1.0 / 3, 1.0 / 3, 0.5},
 
 SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
 {
-    return type == GRID_WEDGE ? &kernel_wedge_domain : &kernel_box_domain;
+    return kernel_is_prism(type) ? &kernel_wedge_domain : &kernel_box_domain;
 }
 /* Rays' directions: (x, y, 1), and up to spread off that in both. */
 typedef struct kernel_beam {

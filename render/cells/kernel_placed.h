@@ -11,6 +11,7 @@
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
+#include "kernel_lanes_cell.h"
 #include "kernel_shapes.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -57,60 +58,35 @@ SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p
     }
 }
 
-/* kernel_tet_place(). */
 SIMD_INLINE void kernel_placed_spots(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
 {
-    const double *eye = f->job->camera.eye;
-    for (int half = 0; half < 2; half++)
-        for (int i = 0; i < 4; i++) {
-            kernel_half d[3], at[3];
-            for (int a = 0; a < 3; a++) d[a] = out->world[a][i].half[half] - eye[a];
-            for (int a = 0; a < 3; a++)
-                at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-            const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-            kernel_half_put(&out->at[0][i], half, at[0] - tile->centre_x * depth);
-            kernel_half_put(&out->at[1][i], half, at[1] - tile->centre_y * depth);
-            kernel_half_put(&out->at[2][i], half, at[2] - tile->depth_shift);
-        }
-}
-
-/* kernel_line_between() of one of the edges, without its bound. */
-SIMD_INLINE void kernel_placed_line(kernel_placed *out, const kernel_frame *f, int edge)
-{
-    const bool flat = f->job->camera.is_orthographic;
-    const int i = kernel_tet_edge[edge][0], j = kernel_tet_edge[edge][1];
-    for (int half = 0; half < 2; half++) {
-        const kernel_half ax = kernel_half_of(&out->at[0][i], half), ay = kernel_half_of(&out->at[1][i], half);
-        const kernel_half bx = kernel_half_of(&out->at[0][j], half), by = kernel_half_of(&out->at[1][j], half);
-        kernel_half da = kernel_half_of(&out->at[2][i], half) + f->depth_shift;
-        kernel_half db = kernel_half_of(&out->at[2][j], half) + f->depth_shift;
-        if (flat) da = db = (kernel_half){0} + 1;
-        kernel_half_put(&out->c[edge], half, ax * by - bx * ay);
-        kernel_half_put(&out->cu[edge], half, db * ay - da * by);
-        kernel_half_put(&out->cv[edge], half, da * bx - db * ax);
+    for (int i = 0; i < 4; i++) {
+        const kernel_whole *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
+        vf at[3];
+        kernel_lanes_place(f, tile, world, at);
+        for (int a = 0; a < 3; a++) out->at[a][i] = at[a];
     }
 }
 
-/* kernel_tet_lines(). */
+/* Finds the edges' lines, and how large the faces' weights must be (kernel_least_weight()). */
 SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
 {
-    const bool flat = f->job->camera.is_orthographic;
-    vf size[4], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
+    vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
-        vf depth = vf_set(1);
-        if (!flat) depth = vf_abs(out->at[2][i]) + fabsf((float)f->depth_shift);
-        size[i] = 2 * vf_max(vf_abs(out->at[0][i]), vf_abs(out->at[1][i])) + 5 * tile->radius * depth;
+        for (int a = 0; a < 3; a++) at[i][a] = out->at[a][i];
+        size[i] = kernel_lanes_size(f, tile, at[i]);
     }
     out->doubt = vf_set(0);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        vf apart[3];
-        kernel_placed_line(out, f, n);
-        out->bound[n] = 6 * 6e-8f * (size[i] * size[j]);
+        vf line[3];
+        kernel_lanes_line(f, at[i], at[j], line);
+        kernel_lanes_line_blur(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
+        out->c[n] = line[0];
+        out->cu[n] = line[1];
+        out->cv[n] = line[2];
+        out->bound[n] = kernel_lanes_doubt(size[i], size[j]);
         out->doubt = vf_max(out->doubt, out->bound[n]);
-        for (int a = 0; a < 3; a++) apart[a] = vf_abs(out->at[a][i] - out->at[a][j]);
-        error[n] = 6e-8f * (3 * vf_abs(out->c[n]) + tile->radius * (4 * vf_abs(out->cu[n]) + 3 * vf_abs(out->cv[n])));
-        extent[n] = apart[2] + 0.25f * (apart[0] + apart[1]);
     }
     for (int n = 0; n < 4; n++) {
         const signed char *edge = kernel_tet_face[n] + 3;

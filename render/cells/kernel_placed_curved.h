@@ -12,6 +12,7 @@
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
+#include "kernel_lanes_cell.h"
 #include "kernel_shapes.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -48,7 +49,7 @@ typedef struct kernel_placed_curved {
 /* The number of a type's first face that is a triangle; its others follow. */
 SIMD_INLINE int kernel_first_triangle(int type)
 {
-    return type == GRID_PYRAMID ? 1 : 0;
+    return kernel_has_apex(type) ? 1 : 0;
 }
 
 /* ---- a cell's numbers, for rays ---- */
@@ -100,7 +101,8 @@ SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm 
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
 }
 
-/* kernel_rank_positions(), of vertices as they came. */
+/* Counts for each vertex how many are before it in the order of coordinates; equal ones are in the order in which they
+ * came. */
 SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -113,7 +115,7 @@ SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int
         }
 }
 
-/* kernel_cell_turn() of a hex: the least vertex first, then the axes in the order of its neighbours. */
+/* Turns hexes: the least vertex first, then the axes in the order of its neighbours. */
 SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
 {
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
@@ -165,9 +167,9 @@ SIMD_INLINE void kernel_turned_pyramid(kernel_turned_curved *h, bool is_narrow)
 
 SIMD_INLINE void kernel_turned_turn(kernel_turned_curved *h, bool is_narrow, int type)
 {
-    if (type == GRID_HEX)
+    if (kernel_is_box(type))
         kernel_turned_hex(h, is_narrow);
-    else if (type == GRID_WEDGE)
+    else if (kernel_is_prism(type))
         kernel_turned_wedge(h, is_narrow);
     else
         kernel_turned_pyramid(h, is_narrow);
@@ -210,44 +212,6 @@ SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_array
     return kernel_turned_collapsed(&h, is_narrow, type);
 }
 
-/* ---- places and values ---- */
-
-/* kernel_place_in() of a vertex: half of the lanes. */
-SIMD_INLINE void kernel_half_place(const kernel_frame *f, const kernel_tile *tile, const kernel_half world[3], int half,
-                                   vf out[3])
-{
-    const double *eye = f->job->camera.eye;
-    kernel_half d[3], at[3];
-    for (int a = 0; a < 3; a++) d[a] = world[a] - eye[a];
-    for (int a = 0; a < 3; a++)
-        at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-    const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-    kernel_half_put(&out[0], half, at[0] - tile->centre_x * depth);
-    kernel_half_put(&out[1], half, at[1] - tile->centre_y * depth);
-    kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
-}
-
-/* kernel_cell_relative() of count values. */
-SIMD_INLINE void kernel_lanes_relative(const kernel_whole values[8], int count, const double isovalues[SIMD_WIDTH],
-                                       vf out[8])
-{
-    for (int half = 0; half < 2; half++) {
-        kernel_half isovalue, v[8], largest = {0};
-        memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
-        for (int i = 0; i < count; i++) {
-            v[i] = values[i].half[half] - isovalue;
-            largest = kernel_half_max(kernel_half_abs(v[i]), largest);
-        }
-        /* kernel_mirrored_power() */
-        kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
-        const kernel_half_mask low = exponent < 23;
-        const kernel_half_mask high = exponent > 2023;
-        exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
-        const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
-        for (int i = 0; i < count; i++) kernel_half_put(&out[i], half, v[i] * scale);
-    }
-}
-
 /* ---- lines ---- */
 
 /* A vertex as lines take it. */
@@ -255,49 +219,28 @@ typedef struct kernel_lanes_spot {
     vf at[3], size;
 } kernel_lanes_spot;
 
-/* kernel_spot_size(). */
-SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
-{
-    vf depth = vf_set(1);
-    if (!f->job->camera.is_orthographic) depth = vf_abs(at[2]) + fabsf((float)f->depth_shift);
-    return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
-}
-
 /* The largest bound of kernel_curved_lines() over all lines, and that of kernel_line_blur(). */
 typedef struct kernel_lanes_blur {
     vf doubt, error, extent;
 } kernel_lanes_blur;
 
-/* kernel_line_between(), and of cells with triangles kernel_line_blur(); which of the two is the first decides signs
- * alone. */
+/* Which of the two ends is the first decides signs alone. Blurs are for cells with triangles. */
 SIMD_INLINE void kernel_placed_line_of(kernel_placed_curved *out, const kernel_frame *f, float radius, int type, int n,
                                        const kernel_lanes_spot ends[2], kernel_lanes_blur *own)
 {
-    const bool flat = f->job->camera.is_orthographic;
     const kernel_lanes_spot *a = &ends[0], *b = &ends[1];
-    vf line[3], apart[3];
-    for (int half = 0; half < 2; half++) {
-        const kernel_half ax = kernel_half_of(&a->at[0], half), ay = kernel_half_of(&a->at[1], half);
-        const kernel_half bx = kernel_half_of(&b->at[0], half), by = kernel_half_of(&b->at[1], half);
-        kernel_half da = kernel_half_of(&a->at[2], half) + f->depth_shift;
-        kernel_half db = kernel_half_of(&b->at[2], half) + f->depth_shift;
-        if (flat) da = db = (kernel_half){0} + 1;
-        kernel_half_put(&line[0], half, ax * by - bx * ay);
-        kernel_half_put(&line[1], half, db * ay - da * by);
-        kernel_half_put(&line[2], half, da * bx - db * ax);
-    }
-    own->doubt = 6 * 6e-8f * (a->size * b->size);
+    vf line[3];
+    kernel_lanes_line(f, a->at, b->at, line);
+    own->doubt = kernel_lanes_doubt(a->size, b->size);
     vf_store(out->c[n], line[0]);
     vf_store(out->cu[n], line[1]);
     vf_store(out->cv[n], line[2]);
     vf_store(out->bound[n], own->doubt);
-    if (type == GRID_HEX) return;
-    for (int i = 0; i < 3; i++) apart[i] = vf_abs(a->at[i] - b->at[i]);
-    own->error = 6e-8f * (3 * vf_abs(line[0]) + radius * (4 * vf_abs(line[1]) + 3 * vf_abs(line[2])));
-    own->extent = apart[2] + 0.25f * (apart[0] + apart[1]);
+    if (kernel_has_triangles(type)) kernel_lanes_line_blur(line, radius, a->at, b->at, &own->error, &own->extent);
 }
 
-/* kernel_quad_corners() of the loop, four bits a corner; odd_lanes: where that begins at the loop's vertex 1 or 3. */
+/* Returns the loop's corners from the least on, towards the lesser neighbour, four bits a corner; odd_lanes: where that
+ * begins at the loop's vertex 1 or 3. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
@@ -341,7 +284,8 @@ typedef struct kernel_lanes_order {
     vm first[3], last[3];
 } kernel_lanes_order;
 
-/* kernel_triangle_order() of the loop, four bits a corner, and along which of its sides 01, 12, 20 the rank falls. */
+/* Returns the loop's corners in the order, four bits a corner, and along which of its sides 01, 12, 20 the rank falls.
+ */
 SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], kernel_lanes_order *o, vm falls[3])
 {
     const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
@@ -366,7 +310,8 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
 }
 
-/* kernel_triangle_order() and kernel_triangle_least(), and the lines of its edges, whose blurs are given. */
+/* Stores a triangle's corners in the order, its edges' lines, whose blurs are given, and the least sum of weights that
+ * is good enough. */
 SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int face, const vf rank[8],
                                         const kernel_lanes_blur *blurs)
 {
@@ -401,12 +346,12 @@ SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int
 SIMD_INLINE void kernel_blur_add(kernel_lanes_blur *most, int type, const kernel_lanes_blur *own)
 {
     most->doubt = vf_max(own->doubt, most->doubt);
-    if (type == GRID_HEX) return;
+    if (kernel_is_box(type)) return;
     most->error = vf_max(own->error, most->error);
     most->extent = vf_max(own->extent, most->extent);
 }
 
-/* kernel_curved_lines(). */
+/* Finds the lines of all edges, and of the quads' diagonals from their least corners. */
 SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
                                         int type, const vf rank[8])
 {
@@ -435,8 +380,9 @@ SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_
         kernel_blur_add(&most, type, &own);
     }
     vf_store(out->doubt, most.doubt);
-    /* kernel_blur_least() */
-    if (type != GRID_HEX)
+    /* No less than of any triangle: with the largest error and extent of any line for all three (kernel_blur_least()).
+     */
+    if (kernel_has_triangles(type))
         vf_store(out->least_of_all, 1.0001f * ((3 * most.error) * (3 * most.extent) * (0.5f / KERNEL_WEIGHT_ERROR)));
 }
 
@@ -452,15 +398,13 @@ SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_ar
     const vm collapsed = p->has_narrow_places ? kernel_turned_fetch(out, p, true, type, vertices, rank)
                                               : kernel_turned_fetch(out, p, false, type, vertices, rank);
     for (int i = 0; i < count; i++) {
+        const kernel_whole *world[3];
         vi vertex;
         vf at[3];
         memcpy(&vertex, out->vertex[i], sizeof vertex);
         values[i] = kernel_numbers_take(&p->values, vertex);
-        for (int half = 0; half < 2; half++) {
-            const kernel_half world[3] = {out->world[0][i].half[half], out->world[1][i].half[half],
-                                          out->world[2][i].half[half]};
-            kernel_half_place(f, tile, world, half, at);
-        }
+        for (int a = 0; a < 3; a++) world[a] = &out->world[a][i];
+        kernel_lanes_place(f, tile, world, at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     kernel_lanes_relative(values, count, isovalues, relative);
@@ -512,7 +456,7 @@ static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_pla
         c->lines[i] = (kernel_line){h->c[i][n], h->cu[i][n], h->cv[i][n], h->bound[i][n]};
         if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_flip(&c->lines[i]);
     }
-    c->least[0] = type == GRID_HEX ? (float)INFINITY : h->least_of_all[n];
+    c->least[0] = kernel_is_box(type) ? (float)INFINITY : h->least_of_all[n];
 }
 
 /* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */

@@ -216,7 +216,7 @@ SIMD_INLINE kernel_half_mask kernel_half_vanishes(const kernel_half_quadratic *c
     return (kernel_half_mask)(c->c0 == 0) & (kernel_half_mask)(c->c1 == 0) & (kernel_half_mask)(c->c2 == 0);
 }
 
-/* kernel_flat_root() */
+/* Returns the quadratic's root on the side of the turn, without cancellation. */
 SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_half turn)
 {
     const kernel_half zero = {0}, one = zero + 1;
@@ -229,7 +229,7 @@ SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_
     return kernel_half_select((kernel_half_mask)(x >= 0), least, zero);
 }
 
-/* kernel_flat_once() of rays of which nothing vanishes; returns the others. */
+/* Finds the patch's place on wanted rays for which no coefficient vanishes; returns the others. */
 SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_place *out)
 {
     const kernel_half zero = {0}, one = zero + 1;
@@ -377,7 +377,7 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* kernel_quad_once() of rays that are beside all edges. */
+/* Finds the place on wanted rays that lie beside all edges, from edge functions of the projected corners. */
 static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_place *out)
 {
     kernel_quad own = *q;
@@ -520,7 +520,7 @@ typedef struct kernel_ray_box {
 typedef struct kernel_seen_edges {
     vf at[12][2], square[12];
     vf spread; /* half width + half height */
-    vf margin; /* of rounding */
+    vf margin; /* what rounding may make */
 } kernel_seen_edges;
 
 SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_seen_edges *out)

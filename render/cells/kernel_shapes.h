@@ -1,8 +1,10 @@
-/* The shapes of cells, as tables: edges, faces and corners. A new cell type goes here. */
+/* The shapes of cells with quads, and of tets, as tables: edges, faces and corners. A new cell type goes here, and into
+ * kernel_cell_types.h. */
 #ifndef RENDER_KERNEL_SHAPES_H
 #define RENDER_KERNEL_SHAPES_H
 
 #include "grid.h"
+#include "kernel_cell_types.h"
 #include "simd.h"
 
 /* Edges 01, 02, 03, 12, 13, 23, and the faces without vertex 3, 2, 1, 0: their edges ij, jk and ik. */
@@ -58,12 +60,6 @@ static const kernel_shape kernel_shapes[3] = {
       {3, {3, 0, 4, 0}, {{3, 0}, {4, 0}, {7, 1}}}},
      {{0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}, {0, 0, 0}}},
 };
-
-/* The row of a hex, wedge or pyramid in tables of their shapes. */
-SIMD_INLINE int kernel_shape_number(int type)
-{
-    return type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2;
-}
 
 SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 {
@@ -123,17 +119,15 @@ SIMD_INLINE vf kernel_curved_own(const kernel_shape *shape, int count, int axis,
  * wedge, whose triangles come first, the last is a quad but where both are triangles; of a pyramid none is. */
 SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
 {
-    if (type == GRID_HEX) return vm_all_lanes();
     const vf number = vf_from_vi(face);
-    if (type == GRID_WEDGE) return vf_lt(vf_set(1.5f), number);
-    return n ? vm_none() : vf_lt(number, vf_set(0.5f));
+    return KERNEL_BY_SHAPE(type, vm_all_lanes(), vf_lt(vf_set(1.5f), number),
+                           n ? vm_none() : vf_lt(number, vf_set(0.5f)));
 }
 
 /* Calls a function, whose last argument is the type, with a constant for a hex, wedge or pyramid: inlined, it has loops
  * of known lengths. */
 #define KERNEL_OF_TYPE(type, function, ...)                                                                            \
-    ((type) == GRID_HEX     ? function(__VA_ARGS__, GRID_HEX)                                                          \
-     : (type) == GRID_WEDGE ? function(__VA_ARGS__, GRID_WEDGE)                                                        \
-                            : function(__VA_ARGS__, GRID_PYRAMID))
+    KERNEL_BY_SHAPE(type, function(__VA_ARGS__, GRID_HEX), function(__VA_ARGS__, GRID_WEDGE),                          \
+                    function(__VA_ARGS__, GRID_PYRAMID))
 
 #endif

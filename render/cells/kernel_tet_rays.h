@@ -14,44 +14,21 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Pixels of the tile, with their cells' lanes. */
-typedef struct kernel_tet_rays {
-    vm active;
-    vi lane, column, row;
-    vf u, v;
-} kernel_tet_rays;
-
-SIMD_INLINE void kernel_tet_rays_of(kernel_tet_rays *r, const kernel_frame *f, const kernel_tile *tile, vi pixel,
-                                    vi lane)
+SIMD_INLINE void kernel_tet_rays_project(const kernel_placed *tets, const kernel_lane_rays *r, vf x[4], vf y[4])
 {
-    const bool flat = f->job->camera.is_orthographic;
-    r->lane = lane & (SIMD_WIDTH - 1);
-    r->column = pixel & (KERNEL_TILE - 1);
-    r->row = pixel >> 4;
-    r->u = kernel_batch_of_tile(flat ? tile->origin_x : tile->slope_x, r->column);
-    r->v = kernel_batch_of_tile(flat ? tile->origin_y : tile->slope_y, r->row);
-}
-
-SIMD_INLINE void kernel_tet_rays_project(const kernel_placed *tets, const kernel_tile *tile, const kernel_tet_rays *r,
-                                         vf x[4], vf y[4])
-{
-    const vf origin_x = kernel_batch_of_tile(tile->origin_x, r->column);
-    const vf origin_y = kernel_batch_of_tile(tile->origin_y, r->row);
-    const vf slope_x = kernel_batch_of_tile(tile->slope_x, r->column);
-    const vf slope_y = kernel_batch_of_tile(tile->slope_y, r->row);
     for (int i = 0; i < 4; i++) {
         const vf z = vf_permute(tets->at[2][i], r->lane);
-        x[i] = (vf_permute(tets->at[0][i], r->lane) - origin_x) - slope_x * z;
-        y[i] = (vf_permute(tets->at[1][i], r->lane) - origin_y) - slope_y * z;
+        x[i] = (vf_permute(tets->at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
+        y[i] = (vf_permute(tets->at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
     }
 }
 
-/* kernel_tet_edges_exactly(). */
-static __attribute__((noinline)) void kernel_tet_rays_exactly(const kernel_placed *tets, const kernel_tile *tile,
-                                                              const kernel_tet_rays *r, vf e[KERNEL_TET_EDGES])
+/* Computes edge functions whose sign is in doubt again, from projected vertices, to their exact sign. */
+static __attribute__((noinline)) void kernel_tet_rays_exactly(const kernel_placed *tets, const kernel_lane_rays *r,
+                                                              vf e[KERNEL_TET_EDGES])
 {
     vf x[4], y[4];
-    kernel_tet_rays_project(tets, tile, r, x, y);
+    kernel_tet_rays_project(tets, r, x, y);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm doubt = vm_and(r->active, vm_not(vf_lt(vf_permute(tets->bound[n], r->lane), vf_abs(e[n]))));
@@ -74,14 +51,13 @@ SIMD_INLINE kernel_sums kernel_tet_rays_sums(const kernel_tet_vertices *v, const
                          .weight = kernel_weight(ij, jk, ik)};
 }
 
-/* kernel_tet_mend(). */
-static __attribute__((noinline)) void kernel_tet_rays_mend(const kernel_placed *tets, const kernel_tile *tile,
-                                                           const kernel_tet_rays *r, const kernel_tet_vertices *v,
-                                                           const vf e[KERNEL_TET_EDGES], const vm weak[4],
-                                                           kernel_sums sums[4])
+/* Makes the sums of weakly weighted triangles again, from projected vertices. */
+static __attribute__((noinline)) void kernel_tet_rays_mend(const kernel_placed *tets, const kernel_lane_rays *r,
+                                                           const kernel_tet_vertices *v, const vf e[KERNEL_TET_EDGES],
+                                                           const vm weak[4], kernel_sums sums[4])
 {
     vf x[4], y[4];
-    kernel_tet_rays_project(tets, tile, r, x, y);
+    kernel_tet_rays_project(tets, r, x, y);
     for (int n = 0; n < 4; n++) {
         if (!vm_any(weak[n])) continue;
         const signed char *face = kernel_tet_face[n];
@@ -94,8 +70,7 @@ static __attribute__((noinline)) void kernel_tet_rays_mend(const kernel_placed *
 }
 
 /* The edge functions on the rays. */
-SIMD_INLINE void kernel_tet_rays_edges(const kernel_placed *tets, const kernel_tile *tile, const kernel_tet_rays *r,
-                                       vf e[KERNEL_TET_EDGES])
+SIMD_INLINE void kernel_tet_rays_edges(const kernel_placed *tets, const kernel_lane_rays *r, vf e[KERNEL_TET_EDGES])
 {
     vf least = vf_set(INFINITY);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
@@ -104,18 +79,17 @@ SIMD_INLINE void kernel_tet_rays_edges(const kernel_placed *tets, const kernel_t
         least = vf_min(vf_abs(e[n]), least);
     }
     const vm sure = vf_lt(vf_permute(tets->doubt, r->lane), least);
-    if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_tet_rays_exactly(tets, tile, r, e);
+    if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_tet_rays_exactly(tets, r, e);
 }
 
-/* kernel_tet_interval(). */
-SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *tets, const kernel_tile *tile, const kernel_tet_rays *r,
-                                          kernel_interval *out)
+/* Finds where the rays come into their tets and go out, and the values there. */
+SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *tets, const kernel_lane_rays *r, kernel_interval *out)
 {
     vf e[KERNEL_TET_EDGES];
     vm hit[4], weak[4], any_weak = vm_none();
     kernel_tet_vertices v;
     kernel_sums sums[4];
-    kernel_tet_rays_edges(tets, tile, r, e);
+    kernel_tet_rays_edges(tets, r, e);
     out->mask = vm_none();
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
@@ -133,7 +107,7 @@ SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *tets, const kerne
         weak[n] = vm_and(hit[n], vf_lt(vf_abs(sums[n].weight), vf_permute(tets->least[n], r->lane)));
         any_weak = vm_or(any_weak, weak[n]);
     }
-    if (__builtin_expect(vm_any(any_weak), 0)) kernel_tet_rays_mend(tets, tile, r, &v, e, weak, sums);
+    if (__builtin_expect(vm_any(any_weak), 0)) kernel_tet_rays_mend(tets, r, &v, e, weak, sums);
     const kernel_ends ends = kernel_tet_choose(hit, sums);
     kernel_ends_order(&ends, false, out);
 }

@@ -31,7 +31,7 @@ typedef struct store_block {
 struct polyhedron_store {
     polyhedron *table[1 << TABLE_BITS];
     store_block *blocks;  /* the one in use first */
-    store_block *unused;  /* of the usual size */
+    store_block *unused;  /* each has the usual size */
     size_t bytes;         /* in blocks */
     char *work, *scratch; /* for taking apart; for the kernels */
     size_t work_bytes, scratch_bytes;
@@ -142,7 +142,7 @@ typedef struct work {
     const grid *g;
     const grid_field *field;
     closed_faces faces;
-    int *rank; /* of a vertex as met */
+    int *rank; /* each vertex's, in the order in which they were met */
     double (*positions)[3];
     work_vertex *vertices;
 } work;

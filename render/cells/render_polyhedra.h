@@ -13,7 +13,7 @@ typedef struct polyhedron_facet {
     int edge[3];
     int quad;   /* the quad it is half of, or -1, */
     int twin;   /* and the other half's number */
-    float sign; /* of the tet it spans with the centre: 1, -1 where that lies outside, 0 where it has no volume */
+    float sign; /* for the tet it spans with the centre: 1, -1 where that lies outside, 0 where it has no volume */
 } polyhedron_facet;
 
 /* Vertices are numbered in the order of coordinates, so that a < b says which of two comes first; the centre is number
@@ -30,10 +30,10 @@ typedef struct polyhedron {
     double *values;
     float *x, *y, *z;  /* tile space */
     float *f, *g;      /* values as the kernels want them; of the colour field */
-    double scale;      /* of the values in f */
+    double scale;      /* for the values in f */
     double fall, rise; /* by how much values change at most along the tile's rays, down and up, a unit of depth */
     float (*lines)[4]; /* kernel_cell.h: of the edges, then from each vertex to the centre */
-    float least;       /* of all its triangles: kernel_blur_least() */
+    float least;       /* for all its triangles: kernel_blur_least() */
     int64_t *vertices; /* vertex_count */
     int (*edges)[2];
     polyhedron_facet *facets;

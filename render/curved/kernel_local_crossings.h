@@ -26,13 +26,15 @@ enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
-    float dents[SIMD_WIDTH]; /* kernel_curved_dents() over the pixels of the cell */
+    float dents[SIMD_WIDTH]; /* how far patches are off their triangles at most, over the cell's pixels
+                                (kernel_curved_dents()) */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
 } kernel_local_faces;
 
 /* ---- cells ---- */
 
-/* kernel_rank_positions() of the vertices as they came, as numbers. */
+/* Counts for each vertex how many are before it in the order of coordinates; equal ones are in the order in which they
+ * came. */
 SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int count, vf rank[8])
 {
     kernel_half sum[2][8] = {0};
@@ -234,7 +236,7 @@ typedef struct kernel_local_corners {
 /* Vectors of 16 rays mostly have them in one or two cells, which were listed one after the other. Then a number of each
  * ray's own vertex is taken out of the two cells' rows at once. */
 typedef struct kernel_local_pair {
-    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* of the two cells */
+    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* for the two cells */
     vi second;                                /* SIMD_WIDTH where the ray's cell is the second */
 } kernel_local_pair;
 
@@ -333,7 +335,7 @@ SIMD_INLINE vf kernel_local_weigh(const vf e[3], vf inverse, vf i, vf j, vf k)
     return vf_muladd(e[0], k, vf_muladd(-e[2], j, e[1] * i)) * inverse;
 }
 
-/* kernel_triangle_crossing() of triangles whose corners are in the order. */
+/* Finds the rays' crossings of triangles, whose corners are in the order of coordinates. */
 SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int type, kernel_local_crossing *out)
 {
     const vf *i = c->at[0], *j = c->at[1], *k = c->at[2];
@@ -360,7 +362,7 @@ SIMD_INLINE void kernel_local_crossing_select(vm m, const kernel_local_crossing 
 SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2], int type, const vm on_quad[2],
                                           kernel_local_crossing ends[2])
 {
-    const int count = type == GRID_PYRAMID ? 1 : 2;
+    const int count = kernel_has_apex(type) ? 1 : 2;
     kernel_quad quads[2];
     kernel_quad_place places[2];
     for (int n = 0; n < count; n++) kernel_local_quad_of(&corners[n], &quads[n]);
@@ -378,10 +380,10 @@ SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_lo
     kernel_local_crossing ends[2];
     kernel_local_corners_of(f, rays, crossed->two, type, face, corners);
     for (int n = 0; n < 2; n++) on_quad[n] = vm_and(crossed->two, kernel_curved_on_quad(type, n, face[n]));
-    if (type != GRID_HEX) memset(ends, 0, sizeof ends);
-    if (type == GRID_HEX || vm_any(vm_or(on_quad[0], on_quad[1])))
+    if (kernel_has_triangles(type)) memset(ends, 0, sizeof ends);
+    if (kernel_is_box(type) || vm_any(vm_or(on_quad[0], on_quad[1])))
         kernel_local_cross_quads(corners, type, on_quad, ends);
-    for (int n = 0; n < 2 && type != GRID_HEX; n++) {
+    for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(crossed->two, on_quad[n]);
         kernel_local_crossing end;
         if (!vm_any(on_triangle)) continue;

@@ -60,13 +60,13 @@ typedef struct kernel_local_deviations {
 /* The gradient of a bent term is no more than that. */
 SIMD_INLINE float kernel_local_bent_slope(int type, int term)
 {
-    return type == GRID_WEDGE ? 0.88f : type == GRID_PYRAMID ? 0.79f : term < 3 ? 0.74f : 0.47f;
+    return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
 /* What no look may see of the field, by the bend's square and the bent terms (kernel_local_budget.h). */
 SIMD_INLINE float kernel_local_bent_unseen(int type)
 {
-    return type == GRID_HEX ? 0.0011f : type == GRID_WEDGE ? 0.0004f : 0;
+    return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
 
 /* All but the tolerance. */
@@ -90,8 +90,8 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
 
 /* The lanes' rays and cells. The ray's share u goes from -1/2 to 1/2. */
 typedef struct kernel_local_chord {
-    vf middle[3], span[3];                               /* of the line between r at the faces */
-    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* of the terms' chords */
+    vf middle[3], span[3];                               /* the line between r at the faces */
+    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* the terms' chords */
     vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
     vf tolerance, residual_limit;
 } kernel_local_chord;
@@ -110,9 +110,9 @@ SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BEN
 /* Tells where r is in the cell or not far outside. */
 SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 {
-    if (type == GRID_WEDGE) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
+    if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
     const vf most = vf_max(vf_abs(r[0]), vf_abs(r[1])), half = vf_set(0.5f + KERNEL_DEVIATION_MARGIN);
-    if (type == GRID_HEX) return vf_le(vf_max(most, vf_abs(r[2])), half);
+    if (kernel_is_box(type)) return vf_le(vf_max(most, vf_abs(r[2])), half);
     return vm_and(vf_le(most, half * r[2]), vf_le(r[2], vf_set(1 + KERNEL_DEVIATION_MARGIN)));
 }
 
@@ -203,7 +203,7 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
 /* Where one of equal parts of the ray's way ends. */
 typedef struct kernel_local_part {
     float u;
-    vf r[3], deviation; /* of the field, from the chord of the whole way */
+    vf r[3], deviation; /* the field's, from the chord of the whole way */
     vf residual;        /* the most so far */
 } kernel_local_part;
 

@@ -11,6 +11,7 @@
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_interest.h"
+#include "kernel_lanes_cell.h"
 #include "kernel_local.h"
 #include "kernel_placed_curved.h"
 #include "kernel_tile.h"
@@ -20,7 +21,6 @@
 #include "simd.h"
 
 enum {
-    KERNEL_LOCAL_TYPES = 3, /* hexes, wedges, pyramids */
     KERNEL_LOCAL_AHEAD = 8, /* so many cells wait for their indices from memory, and as many for their numbers */
     KERNEL_LOCAL_ROOM = SIMD_WIDTH + 2 * KERNEL_LOCAL_AHEAD
 };
@@ -37,10 +37,10 @@ typedef struct kernel_local_lanes {
     kernel_tile_take *take; /* what is done with cells that are not for lanes */
     int volume, part;
     kernel_arrays arrays; /* the part's */
-    kernel_local_queue queues[KERNEL_LOCAL_TYPES];
+    kernel_local_queue queues[KERNEL_CURVED_TYPES];
     double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH]; /* as the caller has them */
     kernel_local_cells cells;
-    int32_t ends[4][SIMD_WIDTH]; /* kernel_local_pixels() */
+    int32_t ends[4][SIMD_WIDTH]; /* first and last columns and rows that cells may show in (kernel_local_pixels()) */
     int alone;                   /* the lane whose cell is the tile's cell, ready to be crossed; -1: none */
 } kernel_local_lanes;
 
@@ -49,7 +49,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, ker
     l->take = take;
     l->volume = volume;
     l->part = -1;
-    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
 }
 
 /* Cells that wait from now on are of this part: none of another waits. */
@@ -62,7 +62,7 @@ SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_loca
 
 SIMD_INLINE int kernel_local_queue_of(int type)
 {
-    return type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : type == GRID_PYRAMID ? 2 : -1;
+    return kernel_has_quads(type) ? kernel_shape_number(type) : -1;
 }
 
 /* ---- cells ---- */
@@ -159,12 +159,11 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
     const int count = grid_type_vertices(type);
     const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);
     for (int i = 0; i < count; i++) {
+        kernel_whole places[3];
         vf at[3];
-        for (int half = 0; half < 2; half++) {
-            kernel_half world[3];
-            for (int a = 0; a < 3; a++) memcpy(&world[a], l->world[a][i] + half * KERNEL_HALF, sizeof world[a]);
-            kernel_half_place(t->frame, &t->tile, world, half, at);
-        }
+        for (int a = 0; a < 3; a++) memcpy(&places[a], l->world[a][i], sizeof places[a]);
+        const kernel_whole *const world[3] = {&places[0], &places[1], &places[2]};
+        kernel_lanes_place(t->frame, &t->tile, world, at);
         for (int a = 0; a < 3; a++) lists[a][i] = at[a];
     }
     kernel_local_turn(type, lists, list_count);

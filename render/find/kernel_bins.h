@@ -42,7 +42,7 @@ enum { KERNEL_DEPTHS = 32 };
 typedef struct kernel_by_depth {
     kernel_tile_candidate *items;
     float low, scale;
-    int first[KERNEL_DEPTHS]; /* of each bin's items, the nearest bin first; each knows the next, -1 is none */
+    int first[KERNEL_DEPTHS]; /* for each bin's items, the nearest bin first; each knows the next, -1 is none */
 } kernel_by_depth;
 
 /* The bin of a depth: no smaller than that of anything nearer. */

@@ -1,8 +1,8 @@
 /* Isosurfaces of tets, hexes, wedges and pyramids, found as many at once as there are lanes (kernel_candidates.h):
  *
  *     lanes are cells of one type:  do their values straddle an isovalue?
- *     lanes are cells that do:      kernel_linearize(), kernel_slab_outline() and the box of pixels; of tets
- *                                   where the isovalue crosses their edges
+ *     lanes are cells that do:      the slab of kernel_outline.h and the box of pixels; of tets where the isovalue
+ *                                   crosses their edges
  *
  * Places are differences from the eye as float32, along the camera's axes. A hit is the mean of the vertices with
  * weights that are not negative, and its value is that of theirs (kernel_outline.h), so that |L| <= E there for
@@ -28,7 +28,7 @@
 #include "simd.h"
 
 typedef struct kernel_curved_lanes {
-    int count;         /* of a cell's vertices */
+    int count;         /* a cell's vertices */
     vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */
     vm usual;          /* numbers are of usual sizes: others are for the cell alone */
 } kernel_curved_lanes;
@@ -38,7 +38,8 @@ typedef struct kernel_curved_slab {
     vf at[8], thickness;
 } kernel_curved_slab;
 
-/* Does what kernel_is_unfolded() does, in lanes. */
+/* Returns the lanes whose cells are not folded. inverse: that of the Jacobian at the middle. What is left to 1 is far
+ * more than all rounding. */
 SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const kernel_differential *d, int count,
                                             vf inverse[3][3])
 {
@@ -67,7 +68,8 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const 
     return unfolded;
 }
 
-/* Does what kernel_linearize() does, in lanes. Lanes whose volume is near float32's least are not usual. */
+/* Finds L at the vertices and how thick the slab is. f is at most about 1. Places are known to a rounding of where they
+ * are: X, Y and Z to r, their middle to 8 r. Lanes whose volume is near float32's least are not usual. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);
@@ -116,14 +118,14 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
 static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
                                                                kernel_curved_slab *out)
 {
-    if (type == GRID_HEX)
-        kernel_curved_lanes_slab_of(l, GRID_HEX, out); /* loops of known length */
+    if (kernel_is_box(type))
+        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out); /* loops of known length */
     else
         kernel_curved_lanes_slab_of(l, type, out);
 }
 
-/* Finds the points of kernel_slab_outline(): vertices in the slab, and crossings of lines between two with its
- * sides. */
+/* Finds the box of the slab's corners, and of points within it: vertices in the slab, and where lines between two
+ * vertices meet its sides. */
 static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l,
                                                                const kernel_curved_slab *slab, kernel_ends_lanes *e)
 {
@@ -197,7 +199,7 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
     for (unsigned odd = crossed & ~vm_bits(usual); odd; odd &= odd - 1) {
         kernel_cell own;
         kernel_cell_fetch(&own, s->arrays.cells, &s->field->fields[s->part], c->cell[__builtin_ctz(odd)]);
-        kernel_find_alone(s, &own, value);
+        kernel_find_surface(s, &own, value);
     }
 }
 
@@ -265,7 +267,7 @@ static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kern
 
 static void kernel_find_all_crossed(kernel_finder *s)
 {
-    for (int i = 0; i < KERNEL_FOUND_TETS; i++) kernel_find_crossed(s, &s->crossed[i]);
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
 /* Adds these lanes' cells, which the isovalue crosses, to the crossed ones. One isovalue crosses all of those. */

@@ -35,7 +35,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
     kernel_cells_fill(c);
     if (!s->surface)
         kernel_find_volumes(s, c);
-    else if (c->type == GRID_TET)
+    else if (kernel_is_linear(c->type))
         kernel_find_tets(s, c);
     else
         kernel_find_curved(s, c);
@@ -48,12 +48,12 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t cell)
 {
     kernel_found_fetch(s, cell);
-    if (s->cell.type == GRID_POLYHEDRON)
+    if (kernel_has_own_faces(s->cell.type))
         kernel_find_polyhedron(s, cell);
     else if (!s->surface)
         kernel_find_volume(s);
     else
-        for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_alone(s, &s->cell, value);
+        for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_surface(s, &s->cell, value);
 }
 
 /* Makes the queued cells, whose connectivity has come, pending, and prefetches their vertices. Those that have waited
@@ -64,7 +64,7 @@ static void kernel_find_queued(kernel_finder *s)
     for (int n = 0, end; n < s->queued_count; n = end) {
         const int type = kernel_arrays_type(p, s->queued[n]);
         end = n + 1;
-        if (type == GRID_POLYHEDRON || !p->has_lanes) {
+        if (kernel_has_own_faces(type) || !p->has_lanes) {
             kernel_find_one(s, s->queued[n]);
             continue;
         }
@@ -98,7 +98,7 @@ static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
 static void kernel_find_rest(kernel_finder *s)
 {
     kernel_find_queued(s);
-    for (int i = 0; i < KERNEL_FOUND_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
     kernel_find_all_crossed(s);
 }
 

@@ -1,6 +1,6 @@
 /* The search of a subtree for the cells that show (kernel_candidates.h), and the pixels that a cell alone may show in.
- * Cells are looked for in many cells at once (kernel_candidate_surfaces.h, kernel_candidate_volumes.h), but for
- * those whose numbers are too large, too small or NaN for lanes. */
+ * Cells are looked for in many cells at once (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Those whose
+ * numbers are too large, too small or NaN for lanes are found by the box of their vertices. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -21,7 +21,7 @@
 
 /* Cells of one type, one a lane. */
 typedef struct kernel_cells {
-    int type, vertices; /* of each */
+    int type, vertices; /* each cell's */
     int count;
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
@@ -44,12 +44,10 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     return vertex;
 }
 
-/* Types of cells that are looked for in lanes. */
-enum { KERNEL_FOUND_TYPES = 4, KERNEL_FOUND_TETS = KERNEL_FOUND_TYPES - 1 };
-
+/* The place of a type in kernel_lane_types. */
 SIMD_INLINE int kernel_found_number(int type)
 {
-    return type == GRID_TET ? KERNEL_FOUND_TETS : kernel_shape_number(type);
+    return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
 }
 
 /* Cells of one type with quads that an isovalue crosses, one a lane, until there is one in each
@@ -69,7 +67,7 @@ typedef struct kernel_finder {
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
-    uint32_t source;     /* of the layer's first isovalue */
+    uint32_t source;     /* for the layer's first isovalue */
     kernel_tile picture; /* all of it as one tile, about the axis of view */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
@@ -78,8 +76,8 @@ typedef struct kernel_finder {
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
     int queued_count;
-    kernel_cells pending[KERNEL_FOUND_TYPES]; /* those whose vertices are, by kernel_found_number() */
-    kernel_crossed crossed[KERNEL_FOUND_TETS];
+    kernel_cells pending[KERNEL_LANE_TYPES]; /* those whose vertices are, by kernel_found_number() */
+    kernel_crossed crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
 } kernel_finder;
 
@@ -103,11 +101,10 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
     s->queued_count = 0;
-    static const int types[KERNEL_FOUND_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};
-    for (int i = 0; i < KERNEL_FOUND_TYPES; i++) {
-        kernel_cells *c = &s->pending[kernel_found_number(types[i])];
-        *c = (kernel_cells){.type = types[i], .vertices = grid_type_vertices(types[i])};
-        if (types[i] != GRID_TET) s->crossed[kernel_found_number(types[i])] = (kernel_crossed){.cells = *c};
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
+        const int type = kernel_lane_types[i];
+        s->pending[i] = (kernel_cells){.type = type, .vertices = grid_type_vertices(type)};
+        if (!kernel_is_linear(type)) s->crossed[i] = (kernel_crossed){.cells = s->pending[i]};
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     memset(&s->picture, 0, sizeof s->picture);
@@ -249,41 +246,27 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* Places the fetched cell, with its values less the isovalue; false where that does not cross it. */
-SIMD_INLINE bool kernel_find_place(const kernel_finder *s, kernel_cell *c, int value)
+/* Adds the fetched cell by the box of its vertices. */
+static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel_cell *c, uint32_t source)
 {
-    const double isovalue = s->surface->layer->values[value];
-    if (!c->is_finite || !kernel_cell_straddles(c, isovalue)) return false;
+    kernel_outline o;
+    kernel_candidate candidate = {.cell = c->index, .source = source};
     if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
-    kernel_cell_relative(c, isovalue);
-    return true;
-}
-
-/* Looks for one isovalue in the fetched cell alone. */
-static void kernel_find_alone(kernel_finder *s, kernel_cell *c, int value)
-{
-    kernel_outline o;
-    kernel_candidate candidate = {.cell = c->index, .source = s->source + (uint32_t)value};
-    if (!kernel_find_place(s, c, value)) return;
-    if (c->type == GRID_TET) {
-        if (!kernel_tet_outline(c, &o)) return;
-    } else {
-        kernel_vertex_outline(c, &o);
-        if (!kernel_slab_outline(c, &o)) return;
-    }
-    if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
-}
-
-/* Adds the whole fetched cell if it shows in the volume. */
-static void kernel_find_volume(kernel_finder *s)
-{
-    kernel_cell *c = &s->cell;
-    kernel_outline o;
-    kernel_candidate candidate = {.cell = c->index, .source = s->source};
-    if (!c->is_finite || !kernel_cell_shows(c, s->transfer)) return;
-    kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_vertex_outline(c, &o);
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
+}
+
+/* Adds the fetched cell if the isovalue crosses it. */
+SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
+{
+    if (c->is_finite && kernel_cell_straddles(c, s->surface->layer->values[value]))
+        kernel_find_whole(s, c, s->source + (uint32_t)value);
+}
+
+/* Adds the fetched cell if it shows in the volume. */
+SIMD_INLINE void kernel_find_volume(kernel_finder *s)
+{
+    if (s->cell.is_finite && kernel_cell_shows(&s->cell, s->transfer)) kernel_find_whole(s, &s->cell, s->source);
 }
 
 /* ---- cells in lanes ---- */
@@ -342,7 +325,8 @@ SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
     return (kernel_ends_lanes){most, -most, most, -most, most, -most};
 }
 
-/* kernel_extent_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
+/* Finds the first and the last pixel between each lane's ends, with the pad of kernel_extent_range(). Returns the lanes
+ * that have any. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const int ends[2], vf *first, vf *last)
 {
     const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));

@@ -229,7 +229,7 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans
 typedef struct coverage {
     double cells;
     double pixels; /* summed over the parts' boxes */
-    span all[2];   /* of all boxes */
+    span all[2];   /* for all boxes */
 } coverage;
 
 /* Measures the parts that have ranges, of a field or, NULL, all. False where one is not all before the eye. */

@@ -62,7 +62,7 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;
     int32_t at[SIMD_WIDTH];
-    vf first[4], last[4]; /* of the six numbers of two entries */
+    vf first[4], last[4]; /* the six numbers of two entries */
     vi_store(at, index);
     vf_gather_rows(t->colours, at, first);
     vf_gather_rows(t->colours + 2, at, last);

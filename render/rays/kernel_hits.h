@@ -20,7 +20,7 @@ typedef struct kernel_hits {
                                in the cell, its own coordinates */
     kernel_hit_cells cells; /* only of RENDER_VERTEX */
     vf colour[3];           /* unlit */
-    vf reach;               /* of differences; only where asked for */
+    vf reach;               /* how far samples for differences lie; only if they are wanted */
     vf kind;
     int cut_count;           /* rows: the n-th that was found of each ray, +inf where it has fewer */
     vf cut[KERNEL_MAX_CUTS]; /* in the order in which they were found */

@@ -270,7 +270,7 @@ enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two on each line bet
 typedef struct kernel_outline {
     int count;
     float point[3][KERNEL_OUTLINE_POINTS];
-    float size[3]; /* of the cell: largest |X|, |Y|, |Z| of its vertices */
+    float size[3]; /* the cell's: largest |X|, |Y|, |Z| of its vertices */
 } kernel_outline;
 
 /* Pads of a hundred-thousandth of the cell and its place: rays that hit by a rounding have theirs wholly within. */

@@ -22,17 +22,17 @@ typedef struct kernel_tile_trace {
     kernel_planes tree_planes, tile_planes;
     unsigned wanted;        /* blocks that have pixels to trace */
     unsigned begun;         /* blocks whose packets are set up */
-    int turn;               /* of volumes (kernel_clip.h) */
-    int64_t first_fragment; /* of the tile, in the thread's list */
+    int turn;               /* which stretch of each ray volumes are traced on (kernel_clip.h) */
+    int64_t first_fragment; /* the tile's first, in the thread's list */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH];         /* each block's farthest t_far, */
     float pixel_far[KERNEL_TILE * KERNEL_TILE]; /* and each pixel's, where the tile goes down the trees for surfaces */
-    /* of the surface under way */
+    /* for the surface under way */
     const kernel_surface *surface;
     int layer;
     struct kernel_cell *cell;
     struct kernel_curved *curved;
-    struct kernel_tile_finder *search;          /* of cells down the trees */
+    struct kernel_tile_finder *search;          /* for cells down the trees */
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
@@ -301,6 +301,32 @@ SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
     return vf_gather((const float *)(const void *)&t->packets[0].t_far,
                      at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
+}
+
+/* Rays of a list, each of a cell of its own. */
+typedef struct kernel_lane_rays {
+    vm active;
+    vi lane, at; /* the lane of the ray's cell; where its pixel is, by packet and lane */
+    kernel_rays rays;
+    vf u, v; /* as in kernel_packet */
+    vf far;  /* the nearest hit so far; only surfaces set it */
+} kernel_lane_rays;
+
+/* Takes the list's rays from first on. */
+SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile_trace *t,
+                                        const kernel_pixel_list *rays, int first)
+{
+    const kernel_tile *tile = &t->tile;
+    const bool flat = t->frame->job->camera.is_orthographic;
+    const int left = rays->count - first;
+    const vi pixel = kernel_bytes(rays->pixel + first), column = pixel & (KERNEL_TILE - 1), row = pixel >> 4;
+    out->active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
+    out->lane = kernel_bytes(rays->lane + first) & (SIMD_WIDTH - 1);
+    out->at = kernel_batch_at(column & (KERNEL_TILE - 1), row & (KERNEL_TILE - 1));
+    out->rays = (kernel_rays){kernel_batch_of_tile(tile->origin_x, column), kernel_batch_of_tile(tile->origin_y, row),
+                              kernel_batch_of_tile(tile->slope_x, column), kernel_batch_of_tile(tile->slope_y, row)};
+    out->u = flat ? out->rays.origin_x : out->rays.slope_x;
+    out->v = flat ? out->rays.origin_y : out->rays.slope_y;
 }
 
 static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)

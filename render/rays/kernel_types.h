@@ -45,7 +45,7 @@ enum {
     KERNEL_PIECE_CLEAR,        /* 1 - opacity */
     KERNEL_PIECE_CLEAR_HIGH,
     KERNEL_PIECE_INVERSE, /* 1 / (high - low) */
-    KERNEL_PIECE_SLOPE,   /* of the opacity */
+    KERNEL_PIECE_SLOPE,   /* the opacity's */
     KERNEL_PIECE_COLOUR,
     KERNEL_PIECE_COLOUR_SLOPE = KERNEL_PIECE_COLOUR + 3,
     KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3
@@ -61,7 +61,7 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Of a stretch of values, between steps: what a field that is off by d does to the light is at most cost d a unit
+/* Over a stretch of values, between steps: what a field that is off by d does to the light is at most cost d a unit
  * distance, and varies by swing d as long as neither the light that gets there changes nor that behind. */
 typedef struct kernel_swing {
     float swing, cost;
@@ -83,7 +83,7 @@ typedef struct kernel_steep {
 /* A bin of the sums (kernel_preintegral.h), in units: the extinction's, then the emission's in three channels. It is
  * read as rows of four floats. */
 typedef struct kernel_pre_entry {
-    int32_t before[4]; /* of all bins before it */
+    int32_t before[4]; /* all in the bins before it */
     float own[4];
     int32_t colour; /* at its middle, 10 bits a channel */
     float rough;    /* by how much extinction and emission vary in it, as light */
@@ -91,7 +91,7 @@ typedef struct kernel_pre_entry {
 } kernel_pre_entry;
 
 typedef struct kernel_preintegral {
-    int bin_count;             /* of equal width; an entry before them and one behind are endless */
+    int bin_count;             /* equal in width; an entry before them and one behind are endless */
     kernel_pre_entry *entries; /* bin_count + 2 */
     float low, inverse;        /* the bins' begin, and 1 / their width */
     float depth_unit, light_unit;
@@ -187,7 +187,7 @@ typedef struct kernel_tile_candidate {
     float near;
     union {
         float far;
-        int32_t next; /* of a surface's, in the tile: render_kernels.c */
+        int32_t next; /* the next surface's candidate of the bin in the tile: render_kernels.c */
     };
     uint32_t cell, source;
     uint16_t blocks, box;
@@ -214,7 +214,7 @@ static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
 /* A list is a chain of chunks, none of which moves. */
 typedef struct kernel_candidate_chunk {
     struct kernel_candidate_chunk *before;
-    int64_t count; /* of one that is full */
+    int64_t count; /* if it is full */
     kernel_candidate items[];
 } kernel_candidate_chunk;
 
@@ -222,7 +222,7 @@ typedef struct kernel_candidate_list {
     kernel_candidate_chunk *chunk; /* the one that is filled; NULL at first */
     kernel_candidate *items;       /* its own, */
     int64_t count, capacity;       /* count of which are filled */
-    uint32_t *counts;              /* of a picture's tiles, row by row: how many of all there are of each */
+    uint32_t *counts;              /* for a picture's tiles, row by row: how many of all there are of each */
     int tile_columns;
     bool is_full;   /* no more are wanted: memory ran out, or the bound is reached */
     int64_t *bound; /* how many more all lists together may have room for */
@@ -250,7 +250,7 @@ typedef struct kernel_frame {
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
     double depth_shift;        /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
-    double slope_x0, slope_dx; /* of the pixel column x: slope_x0 + x * slope_dx; offsets where orthographic */
+    double slope_x0, slope_dx; /* the pixel column x has slope_x0 + x * slope_dx; offsets where orthographic */
     double slope_y0, slope_dy;
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
@@ -279,8 +279,8 @@ typedef struct kernel_thread {
     struct kernel_tile_volume *tile_volume;
     struct kernel_tile_segments *tile_segments;
     struct kernel_finder *finder;
-    kernel_bin bin, volume_bin; /* of the tile, where the frame has candidates of surfaces, of the volume */
-    uint32_t serial;            /* of the tile, from 1: cells of other tiles in the cache are stale */
+    kernel_bin bin, volume_bin; /* for the tile, where the frame has candidates of surfaces, of the volume */
+    uint32_t serial;            /* the tile's number, from 1: cells of other tiles in the cache are stale */
     fragment_list *out;
     /* Make room for more items in out; false where memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);

@@ -58,7 +58,7 @@ hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const flo
 /* ---- the hemisphere ------------------------------------------------------------------------------------------ */
 
 typedef struct hemisphere {
-    double cosine, sine; /* of the pixel's turn */
+    double cosine, sine; /* for the pixel's turn */
     double begin;        /* 0 .. 1, of the spiral's first step */
 } hemisphere;
 

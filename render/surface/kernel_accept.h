@@ -29,7 +29,7 @@ typedef struct kernel_smooth_cell {
     int32_t index;
     kernel_cell cell;
     double gradient[3][GRID_MAX_CELL_VERTICES];
-    double polynomial[3][8]; /* of all but tets */
+    double polynomial[3][8]; /* not set for tets */
 } kernel_smooth_cell;
 
 /* Fetches the gradient at a vertex, in camera axes; 0 where it has none. */
@@ -58,7 +58,7 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
         kernel_vertex_gradient(p->frame, &layer->gradients[part], c->vertices[i], gradient);
         for (int k = 0; k < 3; k++) out->gradient[k][i] = gradient[k];
     }
-    for (int k = 0; k < 3 && c->type != GRID_TET; k++)
+    for (int k = 0; k < 3 && !kernel_is_linear(c->type); k++)
         kernel_polynomial_fit(out->polynomial[k], c->type, out->gradient[k]);
 }
 
@@ -97,9 +97,9 @@ SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, cons
 SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double place[3], float out[3])
 {
     const kernel_cell *c = &s->cell;
-    if (c->type != GRID_TET) {
+    if (!kernel_is_linear(c->type)) {
         for (int k = 0; k < 3; k++)
-            out[k] = (float)kernel_polynomial_at(s->polynomial[k], c->type == GRID_PYRAMID, place);
+            out[k] = (float)kernel_polynomial_at(s->polynomial[k], kernel_has_apex(c->type), place);
         return;
     }
     double corner[4][3], share[4];
@@ -138,7 +138,7 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
         float out[3];
         if (part < 0) continue;
         if (known.part != part || known.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
-        if (known.cell.type == GRID_TET)
+        if (kernel_is_linear(known.cell.type))
             kernel_ray_point(p, ray, t[ray], place);
         else
             for (int a = 0; a < 3; a++) place[a] = (double)normal[a][ray];

@@ -29,13 +29,14 @@
 #include "simd.h"
 
 enum {
-    KERNEL_BATCH_PIXELS = 32, /* of a cell's box: with more of them, the cell is traced block by block */
-    KERNEL_BATCH_RAYS = SIMD_WIDTH * KERNEL_BATCH_PIXELS
+    KERNEL_BATCH_PIXELS = 32 /* in a cell's box: with more of them, the cell is traced block by block */
 };
+
+_Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
 
 typedef struct kernel_batch {
     int count, layer, part; /* -1: of none yet */
-    kernel_arrays arrays;   /* of the layer's field on the part */
+    kernel_arrays arrays;   /* the layer's field on the part */
     bool takes_batches;     /* its tets may be put into batches */
     bool is_of_faces;       /* the layer's */
     /* cell by cell */
@@ -48,9 +49,7 @@ typedef struct kernel_batch {
     kernel_placed tets; /* f: field less the isovalue, scaled */
     bool has_normals;
     vf normal[3];
-    /* Rays to trace: pixel of the tile, row by row, and the cell's lane. */
-    int ray_count;
-    uint8_t pixel[KERNEL_BATCH_RAYS + KERNEL_TILE], lane[KERNEL_BATCH_RAYS + KERNEL_TILE];
+    kernel_pixel_list rays; /* to trace */
 } kernel_batch;
 
 /* ---- lanes are cells ---- */
@@ -61,27 +60,7 @@ static void kernel_batch_begin(kernel_batch *b)
     b->layer = b->part = -1;
 }
 
-/* kernel_cell_relative(). */
-SIMD_INLINE void kernel_batch_relative(kernel_batch *b)
-{
-    for (int n = b->count; n < SIMD_WIDTH; n++) b->isovalue[n] = b->isovalue[0];
-    for (int half = 0; half < 2; half++) {
-        kernel_half isovalue, v[4], largest;
-        memcpy(&isovalue, b->isovalue + half * KERNEL_HALF, sizeof isovalue);
-        for (int i = 0; i < 4; i++) v[i] = b->tets.values[i].half[half] - isovalue;
-        largest = kernel_half_max(kernel_half_max(kernel_half_abs(v[0]), kernel_half_abs(v[1])),
-                                  kernel_half_max(kernel_half_abs(v[2]), kernel_half_abs(v[3])));
-        /* kernel_mirrored_power() */
-        kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
-        const kernel_half_mask low = exponent < 23;
-        const kernel_half_mask high = exponent > 2023;
-        exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
-        const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
-        for (int i = 0; i < 4; i++) kernel_half_put(&b->tets.f[i], half, v[i] * scale);
-    }
-}
-
-/* kernel_tet_normal(), for the cells that are hit first. */
+/* Finds the gradients in all of the cells, as kernel_tet_normal() does, when one is hit first. */
 static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, const kernel_frame *f)
 {
     const double scale = f->job->space.scale;
@@ -122,12 +101,12 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, i
 
 /* ---- lanes are pixels ---- */
 
-/* kernel_tet_surface() on the rays: those that hit, and where. */
-SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, float t_near, const kernel_tet_rays *r,
-                                vf far, vf *out)
+/* Returns the rays that hit their cells' surfaces, and where. */
+SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kernel_lane_rays *r, vf *out)
 {
+    const vf far = r->far;
     kernel_interval i;
-    kernel_tet_rays_interval(&b->tets, tile, r, &i);
+    kernel_tet_rays_interval(&b->tets, r, &i);
     if (!vm_any(i.mask)) return i.mask;
     const vf v_out = kernel_end_in_cell(i.v_in, i.v_out, b->is_of_faces);
     const vm near = vm_and(i.mask, vm_and(vf_le(i.t_in, far), vf_le(vf_set(t_near), i.t_out)));
@@ -162,57 +141,37 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi pl
 SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 {
     unsigned nearer = 0;
-    for (int first = 0; first < b->ray_count; first += SIMD_WIDTH) {
-        const int left = b->ray_count - first;
-        kernel_tet_rays r;
+    kernel_pixel_list_close(&b->rays);
+    for (int first = 0; first < b->rays.count; first += SIMD_WIDTH) {
+        kernel_lane_rays r;
         vf depth;
-        r.active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-        kernel_tet_rays_of(&r, t->frame, &t->tile, kernel_bytes(b->pixel + first), kernel_bytes(b->lane + first));
-        const vi at = kernel_batch_at(r.column, r.row);
-        const vf far = kernel_batch_far(t, at);
-        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->near), r.lane), far));
+        kernel_lane_rays_begin(&r, t, &b->rays, first);
+        r.far = kernel_batch_far(t, r.at);
+        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->near), r.lane), r.far));
         if (!vm_any(r.active)) continue;
-        const vm hit = kernel_batch_hit(b, &t->tile, t->t_near, &r, far, &depth);
-        if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, at, b->lane + first, vm_bits(hit), depth);
+        const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
+        if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
     }
     for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
-    b->ray_count = 0;
+    b->rays.count = 0;
 }
 
 /* ---- batches ---- */
 
-/* The pixels of a box, row by row, are the rays to come. */
-SIMD_INLINE void kernel_batch_rays_of(kernel_batch *b, int n, int columns, int rows)
-{
-    static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    typedef uint8_t kernel_row_bytes __attribute__((vector_size(KERNEL_TILE)));
-    kernel_row_bytes row;
-    const unsigned box = b->box[n];
-    memcpy(&row, ramp, sizeof row);
-    row += (uint8_t)((box & 15) | (box >> 8 & 15) << 4);
-    const kernel_row_bytes lane = (kernel_row_bytes){0} + (uint8_t)n;
-    for (int y = 0; y < rows; y++, row += KERNEL_TILE) {
-        memcpy(b->pixel + b->ray_count, &row, sizeof row);
-        memcpy(b->lane + b->ray_count, &lane, sizeof lane);
-        b->ray_count += columns;
-    }
-}
-
 static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b)
 {
     kernel_place_tets(&b->tets, &b->arrays, t->frame, &t->tile, b->vertex, b->count);
-    kernel_batch_relative(b);
+    for (int n = b->count; n < SIMD_WIDTH; n++) b->isovalue[n] = b->isovalue[0];
+    kernel_lanes_relative(b->tets.values, 4, b->isovalue, b->tets.f);
     b->has_normals = false;
-    b->ray_count = 0;
+    b->rays.count = 0;
     for (int n = 0; n < b->count; n++) {
-        const unsigned box = b->box[n], blocks = b->blocks[n] & kernel_blocks_beyond(t, b->near[n]);
-        const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
-        const int rows = (int)(box >> 12) - (int)(box >> 8 & 15) + 1;
-        if (columns * rows <= KERNEL_BATCH_PIXELS) {
-            if (blocks) kernel_batch_rays_of(b, n, columns, rows);
+        const unsigned blocks = b->blocks[n] & kernel_blocks_beyond(t, b->near[n]);
+        if (!blocks) continue;
+        if (kernel_box_pixels(b->box[n]) <= KERNEL_BATCH_PIXELS) {
+            kernel_pixel_list_add_box(&b->rays, b->box[n], n);
             continue;
         }
-        if (!blocks) continue;
         if (!b->has_normals) kernel_batch_normals(b, t->frame);
         kernel_batch_cell(b, n, t->cell);
         kernel_blocks_meet(t, blocks, b->part, t->cell->index, t->cell, b->value[n]);

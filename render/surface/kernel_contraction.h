@@ -81,9 +81,9 @@ SIMD_INLINE void kernel_sight_of(const kernel_rays *rays, const vf origin[3], co
 SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
 {
     const vf half = 0.5f + rim;
-    if (type == GRID_HEX) {
+    if (kernel_is_box(type)) {
         for (int a = 0; a < 3; a++) r[a] = vf_clamp(r[a], -half, half);
-    } else if (type == GRID_WEDGE) {
+    } else if (kernel_is_prism(type)) {
         const vf low = -1.0f / 3 - rim, most = 1.0f / 3 + 2.0f * rim, high = most - low;
         const vm over = vf_lt(most, r[0] + r[1]);
         const vf slant = vf_clamp(0.5f * ((r[0] - r[1]) + most), low, high);
@@ -106,8 +106,8 @@ SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
 SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
 {
     const vf half = 0.5f + rim;
-    if (type == GRID_HEX) return half * ((vf_abs(s[0]) + vf_abs(s[1])) + vf_abs(s[2]));
-    if (type == GRID_WEDGE) {
+    if (kernel_is_box(type)) return half * ((vf_abs(s[0]) + vf_abs(s[1])) + vf_abs(s[2]));
+    if (kernel_is_prism(type)) {
         const vf low = -1.0f / 3 - rim, side = 1.0f + 4.0f * rim;
         return low * (s[0] + s[1]) + side * vf_max(vf_max(s[0], s[1]), vf_set(0)) + half * vf_abs(s[2]);
     }
@@ -118,7 +118,7 @@ SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
 SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = r[i];
-    if (type != GRID_PYRAMID) return;
+    if (!kernel_has_apex(type)) return;
     for (int i = 0; i < 2; i++) out[i] -= 0.5f * r[2];
 }
 
@@ -128,7 +128,7 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
     vf local[3];
     kernel_contraction_local(type, r, local);
     const vf inside = kernel_local_inside(type, local);
-    return inside * (type == GRID_HEX ? 1.0f : 0.7f);
+    return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
 
 /* Rays on which s at q says that there is no root in D. A root needs
@@ -138,7 +138,7 @@ SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, co
 {
     const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);
     vf blur = 8.0f * c->blur;
-    if (type == GRID_PYRAMID) blur = 4.0f * c->rim; /* twice what faces are off by, as D is no wider */
+    if (kernel_has_apex(type)) blur = 4.0f * c->rim; /* twice what faces are off by, as D is no wider */
     return vf_lt(2.0f * most + blur, 0.999f * kernel_dot(s, s));
 }
 
@@ -161,7 +161,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
         kernel_contraction_hold(type, c->rim, q);
         kernel_contraction_local(type, q, local);
         kernel_bend_at(type, local, &bend);
-        if (type == GRID_PYRAMID) bend.term[0] += 0.25f * q[2]; /* kernel_bounds.h has J0 at a b / k² of a half */
+        if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2]; /* kernel_bounds.h has J0 at a b / k² of a half */
         for (int i = 0; i < 3; i++) {
             vf at = a[i];
             for (int k = 0; k < terms; k++) at -= slope[k][i] * bend.term[k];
@@ -180,7 +180,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
     vf e = ray->level + c->middle;
     for (int k = 0; k < terms; k++) e += c->field[k] * bend.term[k];
     out->t = -(e * over);
-    if (type == GRID_PYRAMID) return;
+    if (kernel_has_apex(type)) return;
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];
 }
 

@@ -42,7 +42,7 @@
 #include "render.h"
 #include "simd.h"
 
-enum { KERNEL_CURVED_PIXELS = 64 }; /* of a large cell's box in the tile there are more */
+enum { KERNEL_CURVED_PIXELS = 64 }; /* a large cell's box has more in the tile */
 
 /* Cells of one type that wait to be placed together. */
 typedef struct kernel_curved_batch_pending {
@@ -57,7 +57,7 @@ typedef struct kernel_curved_batch_pending {
 
 typedef struct kernel_curved_batch {
     int layer, part;                        /* -1: of none yet */
-    kernel_arrays arrays;                   /* of the layer's field on the part */
+    kernel_arrays arrays;                   /* the layer's field on the part */
     kernel_curved_batch_pending pending[3]; /* by kernel_shape_number() */
     kernel_curved_batch_pending *own;       /* those that are traced */
     kernel_placed_curved placed;
@@ -67,17 +67,16 @@ typedef struct kernel_curved_batch {
     kernel_cell cells[SIMD_WIDTH];
     kernel_curved curved[SIMD_WIDTH];
     kernel_pixel_list rays, met, found, others;
-    uint8_t faces[KERNEL_LIST_ROOM]; /* of those met: the first, and 8 times the second */
+    uint8_t faces[KERNEL_LIST_ROOM]; /* which those met cross: the first, and 8 times the second */
     kernel_curved_ends found_ends, other_ends;
 } kernel_curved_batch;
 
 static void kernel_curved_batch_begin(kernel_curved_batch *h)
 {
-    static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     h->rays.count = 0;
     h->layer = h->part = -1;
     for (int n = 0; n < 3; n++) {
-        h->pending[n].type = types[n];
+        h->pending[n].type = kernel_curved_types[n];
         h->pending[n].count = 0;
     }
     memset(h->colours, 0, sizeof h->colours);
@@ -132,8 +131,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
 
 /* ---- rays ---- */
 
-/* kernel_linear_at(). */
-SIMD_INLINE vf kernel_curved_batch_linear_at(const kernel_curved_batch *h, const kernel_curved_packet *p, vf t)
+/* Returns L (kernel_bounds.h) of each ray's cell, on the ray at depth t. */
+SIMD_INLINE vf kernel_curved_batch_linear_at(const kernel_curved_batch *h, const kernel_lane_rays *p, vf t)
 {
     vf g[3], at[3];
     for (int a = 0; a < 3; a++) {
@@ -145,8 +144,7 @@ SIMD_INLINE vf kernel_curved_batch_linear_at(const kernel_curved_batch *h, const
 }
 
 /* Rays on which L leaves the cell's slab out on one side from depth to depth. */
-SIMD_INLINE vm kernel_curved_batch_far(const kernel_curved_batch *h, const kernel_curved_packet *p, vf side, vf from,
-                                       vf to)
+SIMD_INLINE vm kernel_curved_batch_far(const kernel_curved_batch *h, const kernel_lane_rays *p, vf side, vf from, vf to)
 {
     const vf thick = kernel_curved_take(h->bounds.thickness, p->lane);
     return vm_and(vf_lt(thick, side * kernel_curved_batch_linear_at(h, p, from)),
@@ -154,8 +152,7 @@ SIMD_INLINE vm kernel_curved_batch_far(const kernel_curved_batch *h, const kerne
 }
 
 /* The rays as their cells have them. */
-SIMD_INLINE void kernel_curved_batch_sight(const kernel_curved_batch *h, const kernel_curved_packet *p,
-                                           kernel_sight *out)
+SIMD_INLINE void kernel_curved_batch_sight(const kernel_curved_batch *h, const kernel_lane_rays *p, kernel_sight *out)
 {
     vf origin[3], normal[3][3], gradient[3];
     for (int a = 0; a < 3; a++) {
@@ -225,11 +222,12 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
     int kept = 0;
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
-        kernel_curved_packet p;
+        kernel_lane_rays p;
         kernel_sight ray;
         kernel_contraction c;
         kernel_contracted at;
-        kernel_curved_packet_begin(&p, t, &h->rays, n);
+        kernel_lane_rays_begin(&p, t, &h->rays, n);
+        p.far = kernel_batch_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_curved_take(h->own->near, p.lane), p.far));
         kernel_curved_batch_sight(h, &p, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
@@ -255,10 +253,11 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
     unsigned nearer = 0;
     h->met.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
-        kernel_curved_packet p;
+        kernel_lane_rays p;
         kernel_curved_crossed crossed;
         uint8_t faces[SIMD_WIDTH];
-        kernel_curved_packet_begin(&p, t, &h->rays, n);
+        kernel_lane_rays_begin(&p, t, &h->rays, n);
+        p.far = kernel_batch_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_curved_take(h->own->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
         kernel_curved_faces(&h->placed, &p, type, &crossed);
@@ -282,16 +281,18 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_meet(kernel_tile_t
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_meet_of, t, h);
 }
 
-/* kernel_curved_intervals() and the begin of kernel_curved_surface() and kernel_search_ends(). */
+/* Finds where rays go in and out of their cells. Those with one root by their ends go to the found ones; those that
+ * must be searched for roots to the others. */
 SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     h->found.count = h->others.count = 0;
     for (int n = 0; n < h->met.count; n += SIMD_WIDTH) {
-        kernel_curved_packet p;
+        kernel_lane_rays p;
         kernel_curved_place face[2], ends[2];
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
         const vi faces = kernel_bytes(h->faces + n);
-        kernel_curved_packet_begin(&p, t, &h->met, n);
+        kernel_lane_rays_begin(&p, t, &h->met, n);
+        p.far = kernel_batch_far(t, p.at);
         kernel_curved_cross(&h->placed, &p, type, faces, face);
         const vm swap = vf_lt(face[1].t, face[0].t);
         kernel_curved_place_select(swap, &face[1], &face[0], &ends[0]);
@@ -318,11 +319,11 @@ static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_til
     KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
 }
 
-/* kernel_map_setup() of a cell a lane. */
+/* Sets up each ray's map, of its own cell. */
 SIMD_INLINE void kernel_curved_maps(const kernel_curved_batch *h, int type, vi lane, kernel_map_lanes *out)
 {
     const int count = grid_type_vertices(type);
-    out->is_pyramid = type == GRID_PYRAMID;
+    out->is_pyramid = kernel_has_apex(type);
     out->tolerance = KERNEL_MAP_TOLERANCE;
     for (int n = 0; n < 4; n++) {
         vf v[8], *const c = n < 3 ? out->position[n] : out->field;
@@ -339,7 +340,7 @@ SIMD_INLINE void kernel_curved_maps(const kernel_curved_batch *h, int type, vi l
     }
 }
 
-/* kernel_map_colour() of a cell a lane, and kernel_map_value() of it. */
+/* Returns the colours' field at r in each ray's own cell. */
 SIMD_INLINE vf kernel_curved_batch_colour_value(const kernel_curved_batch *h, vi lane, const vf r[3], int type)
 {
     const int count = grid_type_vertices(type);
@@ -351,8 +352,8 @@ SIMD_INLINE vf kernel_curved_batch_colour_value(const kernel_curved_batch *h, vi
         kernel_half_fit(type, e, d);
         for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
     }
-    const kernel_product m = kernel_product_at(type == GRID_PYRAMID, r);
-    return kernel_value_of(c, type == GRID_PYRAMID, &m, r);
+    const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
+    return kernel_value_of(c, kernel_has_apex(type), &m, r);
 }
 
 /* The colours' field of the lanes' cells, in the order of their vertices. */
@@ -378,7 +379,7 @@ typedef struct kernel_curved_batch_places {
 /* Returns the blocks in which something is nearer. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
-                                                                     const kernel_curved_packet *p, unsigned hit,
+                                                                     const kernel_lane_rays *p, unsigned hit,
                                                                      const kernel_curved_batch_places *places)
 {
     const render_surface_layer *layer = t->surface->layer;
@@ -406,7 +407,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     return blocks;
 }
 
-/* kernel_map_normal() and kernel_unshear(); or r, where kernel_vertex_normals() wants it. */
+/* Finds the field's gradients at r, in camera axes; or takes r, from which kernel_vertex_normals() finds normals. */
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
                                             vf normal[3])
 {
@@ -420,7 +421,7 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
 
 /* Takes hits of the rays found, from n on. */
 SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curved_batch *h, int n,
-                                              const kernel_curved_packet *p, const kernel_map_lanes *map,
+                                              const kernel_lane_rays *p, const kernel_map_lanes *map,
                                               const kernel_point *at, vm hit)
 {
     kernel_curved_batch_places places;
@@ -430,15 +431,16 @@ SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curve
     return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
 }
 
-/* kernel_polish() and kernel_curved_accept(). */
+/* Polishes the roots that are found, and takes those that are visible. */
 SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
-        kernel_curved_packet p;
+        kernel_lane_rays p;
         kernel_map_lanes map;
         kernel_point ends[2], at;
-        kernel_curved_packet_begin(&p, t, &h->found, n);
+        kernel_lane_rays_begin(&p, t, &h->found, n);
+        p.far = kernel_batch_far(t, p.at);
         for (int e = 0; e < 2; e++) {
             ends[e].t = vf_load(h->found_ends.t[e] + n);
             ends[e].value = vf_load(h->found_ends.v[e] + n);
@@ -464,10 +466,11 @@ SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_c
 {
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
-        kernel_curved_packet p;
+        kernel_lane_rays p;
         kernel_map_lanes map;
         kernel_point at;
-        kernel_curved_packet_begin(&p, t, &h->found, n);
+        kernel_lane_rays_begin(&p, t, &h->found, n);
+        p.far = kernel_batch_far(t, p.at);
         at.t = vf_load(h->found_ends.t[0] + n);
         for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
         kernel_curved_maps(h, type, p.lane, &map);
@@ -487,12 +490,12 @@ _Static_assert(offsetof(kernel_bounds, coarsest) == offsetof(kernel_bounds, inve
                    offsetof(kernel_bounds, inverse) + 16 * sizeof(float) <= sizeof(kernel_bounds),
                "the inverse and what follows it are read as rows of four");
 
-/* kernel_limits_spread(), each lane with its own cell's. */
+/* Gathers the limits of each ray's own cell. */
 SIMD_INLINE void kernel_curved_batch_limits(const kernel_curved_batch *h, vi lane, kernel_limits *out)
 {
     const kernel_bounds *b = &h->curved[0].bounds;
     int32_t at[SIMD_WIDTH];
-    vf row[4][4]; /* of the inverse and what follows it */
+    vf row[4][4]; /* the inverse and what follows it */
     vi_store(at, lane * (int)(sizeof(kernel_curved) / sizeof(float)));
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 4; j++) out->bent[i][j] = vf_set(0);
@@ -508,18 +511,18 @@ SIMD_INLINE void kernel_curved_batch_limits(const kernel_curved_batch *h, vi lan
     out->is_monotone = vf_le(vf_set(0), kernel_curved_take(h->bounds.jump, lane));
 }
 
-/* kernel_curved_robust() of the others from n on, of which kernel_curved_batch_cross() has asked what their ends tell.
- */
+/* Searches the other rays from n on, whose ends kernel_curved_batch_cross() has looked at, for their first root. */
 SIMD_INLINE unsigned kernel_curved_batch_search_of(kernel_tile_trace *t, kernel_curved_batch *h, int n, int type)
 {
     const kernel_curved_ends *ends = &h->other_ends;
-    kernel_curved_packet p;
+    kernel_lane_rays p;
     kernel_map_lanes map;
     kernel_limits limits;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
     kernel_curved_batch_places places = {.t = vf_set(0)};
     vm hits = vm_none();
-    kernel_curved_packet_begin(&p, t, &h->others, n);
+    kernel_lane_rays_begin(&p, t, &h->others, n);
+    p.far = kernel_batch_far(t, p.at);
     i.mask = p.active;
     i.t_in = vf_load(ends->t[0] + n);
     i.t_out = vf_load(ends->t[1] + n);

@@ -33,7 +33,7 @@ typedef struct kernel_probe {
     const kernel_surface *surface;
     int layer; /* for the cache */
     double isovalue;
-    vf z; /* of the points */
+    vf z; /* the points' */
     vm found;
     vf sample;
 } kernel_probe;
@@ -50,7 +50,7 @@ SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const bool is_tet = c->type == GRID_TET;
+    const bool is_tet = kernel_is_linear(c->type);
     int count = 1;
     if (is_tet)
         kernel_tet_interval(p, c, rays, false, &list[0]);
@@ -97,7 +97,7 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
     const render_field *field = &probe->surface->layer->field;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
-        if (!c->is_finite || c->type == GRID_POLYHEDRON) continue;
+        if (!c->is_finite || kernel_has_own_faces(c->type)) continue;
         const bool is_fresh = !c->is_placed;
         if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
         if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
@@ -148,7 +148,7 @@ static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p
                           .isovalue = s->layer->values[value]};
     for (int i = 0; i < RENDER_DIFFERENCE_SAMPLES; i++) {
         out->found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
-        out->values[i] = probe.sample + 0.0f; /* of -0 and 0 neither is the lesser: 0 */
+        out->values[i] = probe.sample + 0.0f; /* 0 instead of -0, which is not less */
     }
 }
 

@@ -72,7 +72,7 @@ typedef struct kernel_occluders {
 
 /* A ray in tree space. */
 typedef struct kernel_straight {
-    float origin[3], direction[3]; /* of unit length */
+    float origin[3], direction[3]; /* unit length */
     float far;
     bool is_open;
 } kernel_straight;
@@ -99,7 +99,7 @@ typedef struct kernel_plumb {
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz: the direction's largest axis */
     float shear_x, shear_y, stretch;
-    float size; /* of places: for what slabs round by */
+    float size; /* for places: for what slabs round by */
 } kernel_plumb;
 
 SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)

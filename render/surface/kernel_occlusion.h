@@ -175,7 +175,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     const render_surface_layer *layer = o->surface->layer;
     kernel_cell *c =
         kernel_cell_find(p, o->layer, occluder->part, &layer->field.fields[occluder->part], occluder->cell);
-    if (c->type == GRID_POLYHEDRON) {
+    if (kernel_has_own_faces(c->type)) {
         kernel_occlusion_polyhedra(p, o, occluder);
         return;
     }
@@ -184,7 +184,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     o->vertex_count = c->count;
     kernel_occlusion_place(p, c, occluder->part);
     kernel_cell_relative(c, layer->values[occluder->value]);
-    if (c->type == GRID_TET)
+    if (kernel_is_linear(c->type))
         kernel_occlusion_tet(p, o, c, p->active);
     else
         kernel_occlusion_curved(p, o, c, p->active);

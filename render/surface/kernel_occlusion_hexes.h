@@ -149,7 +149,7 @@ static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pa
 SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pairs, vm active, vf far)
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach);
-    kernel_curved_packet p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
+    kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
     kernel_curved_crossed crossed;
     kernel_curved_place face[2], ends[2];
     int32_t lanes[SIMD_WIDTH];
@@ -166,7 +166,7 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
-    /* Of a change the root lies where the counted part is left out, if at all there. */
+    /* Where the sign changes the root lies where the counted part is left out, if at all there. */
     const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
     const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
     out.blocked = vm_and(near, vm_and(change, vm_and(before, behind)));

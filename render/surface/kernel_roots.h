@@ -142,10 +142,10 @@ typedef struct kernel_search {
     const kernel_map_lanes *map; /* set up where more is asked than the interval's ends tell, as the limits are */
     const kernel_limits *limits;
     const kernel_interval *interval;
-    int64_t *failures; /* of the map */
+    int64_t *failures; /* the map's */
     vm open;           /* rays that have pieces left */
     vm ended;          /* rays that came to the end: side is that of their last piece */
-    vf side;           /* of from: 1 or -1 */
+    vf side;           /* from's: 1 or -1 */
     vf number, size, pieces;
     kernel_point from, end;
     vm found; /* rays with a root between low and high, */

@@ -259,7 +259,7 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
 SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                      kernel_curved *curved, int value, vm rays)
 {
-    if (c->type == GRID_TET)
+    if (kernel_is_linear(c->type))
         kernel_tet_surface(p, state, c, value, rays);
     else
         kernel_curved_surface(p, state, c, curved, value, rays);
@@ -513,7 +513,7 @@ typedef struct kernel_walk {
     vm below;                   /* rays below the isovalue at the end of the piece */
     vm jump_in, jump_out;       /* rays whose face value and profile's end are on different sides */
     kernel_profile_piece piece; /* each ray's own */
-    vf t, w;                    /* of the crossing that was found, and the colour field there */
+    vf t, w;                    /* the crossing that was found, and the colour field there */
 } kernel_walk;
 
 static void kernel_walk_begin(const kernel_stay *stay, vm rays, kernel_walk *walk)

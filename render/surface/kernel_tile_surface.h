@@ -41,7 +41,7 @@ typedef struct kernel_tile_finder {
     /* Looks at a leaf's cells, of the layer under way. */
     void (*look)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
     float column_scale, row_scale; /* pixels a slope, or a scaled unit where the camera is orthographic */
-    float pad[2];                  /* of columns and rows, in pixels */
+    float pad[2];                  /* for columns and rows, in pixels */
     kernel_find_plane planes[KERNEL_FIND_PLANES];
 } kernel_tile_finder;
 
@@ -55,7 +55,7 @@ enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_
 typedef struct kernel_tile_node {
     int64_t ref;
     float near;
-    uint16_t box, count; /* of cells, in a leaf; 0: an inner node */
+    uint16_t box, count; /* how many cells a leaf has; 0: an inner node */
 } kernel_tile_node;
 
 /* Boxes and ranges of nodes in lanes. */

@@ -30,8 +30,8 @@ static void box_of(const occluder_pieces *p, int64_t i, float *lower, float *upp
 typedef struct widening {
     const occluder_pieces *of;
     const mmbvh *binary;
-    int64_t *first, *count; /* of the occluder_pieces below each node, among the tree's cells */
-    float *boxes;           /* of each node, lower and upper */
+    int64_t *first, *count; /* the first and the count of the occluder_pieces below each node, among the tree's cells */
+    float *boxes;           /* for each node, lower and upper */
     int width;
     kernel_occluder_tree *out;
 } widening;

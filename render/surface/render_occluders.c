@@ -78,7 +78,7 @@ typedef struct subject {
     const kernel_frame *frame;
     int surface, part, value;
     uint32_t index;
-    int count; /* of vertices; a polyhedron's come more than once */
+    int count; /* vertices; a polyhedron's come more than once */
     list places, values;
     double reach;
 } subject;
@@ -287,7 +287,7 @@ static int32_t add_hex(subject *s, const kernel_cell *c, double isovalue)
 
 static void add_slab(subject *s, const kernel_cell *c, double isovalue)
 {
-    const int32_t record = c->type == GRID_HEX ? add_hex(s, c, isovalue) : -1;
+    const int32_t record = kernel_is_box(c->type) ? add_hex(s, c, isovalue) : -1;
     slab *out = add(s->into, &s->into->slabs, sizeof *out);
     if (!out) return;
     fill_slab(s, isovalue, out);
@@ -325,7 +325,7 @@ static void find_in_cell(subject *s)
     const grid_field *field = &layer->field.fields[s->part];
     kernel_cell c = {.type = 0};
     kernel_cell_fetch(&c, g, field, s->index);
-    const bool is_polyhedron = c.type == GRID_POLYHEDRON;
+    const bool is_polyhedron = kernel_has_own_faces(c.type);
     if (!is_polyhedron && !c.is_finite) return;
     s->count = 0;
     s->places.count = s->values.count = 0;
@@ -334,7 +334,7 @@ static void find_in_cell(subject *s)
     for (s->value = 0; s->value < layer->value_count; s->value++) {
         const double isovalue = layer->values[s->value];
         if (!straddles(s, isovalue)) continue;
-        if (c.type == GRID_TET)
+        if (kernel_is_linear(c.type))
             add_tet(s, isovalue);
         else
             add_slab(s, &c, isovalue);

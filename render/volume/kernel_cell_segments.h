@@ -69,7 +69,7 @@ typedef struct kernel_bisection {
     const kernel_span *span;
     const kernel_exact_map *map; /* NULL: linear, as the interval has it */
     double u, v, slope, shift;   /* at depth t the ray is at (u, v) (slope t + shift) */
-    kernel_knot in, out;         /* of the interval, as the faces have it */
+    kernel_knot in, out;         /* the interval's ends, as the faces have them */
     double per_t, length, light; /* unit distances per t, of the stretch; what light gets to the subinterval */
     int64_t *map_failures;
     int count;
@@ -138,7 +138,7 @@ static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_kno
 
 /* ---- what a subinterval may do to the light ---- */
 
-/* Of the transfer function over some values. */
+/* Bounds of the transfer function over some values. */
 typedef struct kernel_medium_range {
     double least, most, slope, colour_slope; /* least, most: of the extinction */
 } kernel_medium_range;
@@ -180,7 +180,7 @@ static inline void kernel_medium_range_widen(kernel_medium_range *s, const kerne
         s->colour_slope = fmax(s->colour_slope, fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
 }
 
-/* Of the values between low and high; by the bins' bounds where these are many. */
+/* Bounds them between low and high; by the bins' bounds if these are many. */
 static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double low, double high)
 {
     const double last = KERNEL_BOUND_BINS - 1, begin = (double)t->bin_low, per_bin = (double)t->bound_inverse;
@@ -603,7 +603,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     if (!vm_any(mine)) return;
     kernel_double precise;
     if (list->is_double) {
-        /* Of segments whose ends float32 does not tell apart, many may lie on one ray. */
+        /* Many segments whose ends float32 does not tell apart may lie on one ray. */
         precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
         mine = vm_and(mine, vf_lt(vf_set(0), precise.length));
     }

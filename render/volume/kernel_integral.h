@@ -220,8 +220,8 @@ SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf
 /* A step on the way. */
 typedef struct kernel_stretch {
     vf opacity, clear; /* at its begin, and 1 - it */
-    vf rise;           /* of the opacity, over the whole way in the piece */
-    vf share;          /* of the way that is taken now */
+    vf rise;           /* the opacity's, over the whole way in the piece */
+    vf share;          /* the share of the way that is taken now */
     vf length;         /* taken now, in unit distances */
     vm is_opaque;
 } kernel_stretch;

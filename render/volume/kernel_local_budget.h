@@ -52,7 +52,7 @@
 
 enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32 };
 
-/* Of the error allowed, what Newton's method may leave. */
+/* The share of the allowed error that Newton's method may leave. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
 /* Lane by lane, what a field that is off does to the light over the cell's values (kernel_swing). */
@@ -112,8 +112,8 @@ typedef struct kernel_local_pairs {
     kernel_local_crossing ends[2];
     kernel_local_deviations off_chord;
     vm active;
-    vf begin;     /* of the window */
-    vf count;     /* of segments */
+    vf begin;     /* for the window */
+    vf count;     /* segments */
     float unseen; /* the share that is taken of kernel_local_nonlinear's */
 } kernel_local_pairs;
 

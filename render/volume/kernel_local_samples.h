@@ -33,7 +33,7 @@
 typedef struct kernel_tile_ray_samples {
     kernel_samples samples;
     kernel_blend blend;
-    vm active; /* of the packet, whose own is narrowed to the rays that are lit */
+    vm active; /* the packet's, whose own is narrowed to the rays that are lit */
 } kernel_tile_ray_samples;
 
 enum {
@@ -46,7 +46,7 @@ enum {
 typedef struct kernel_local_batch {
     kernel_tile_ray_samples *packets; /* the tile's */
     kernel_local_lanes lanes;
-    int first, count; /* of the window's samples */
+    int first, count; /* the window's samples */
     kernel_pixel_list rays;
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
@@ -106,7 +106,7 @@ static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trac
         kernel_fill_some(p, &state, cells->cell.is_constant ? NULL : &cells->map, &list[k], number, number + 1);
 }
 
-/* Of a vector of samples from n on, those inside get their values. */
+/* Gives those of a vector of samples, from n on, that are inside their cells their values. */
 SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batch *b, const kernel_local_queue *q,
                                          int type, int n)
 {
@@ -165,9 +165,9 @@ SIMD_INLINE void kernel_local_fill(kernel_tile_trace *t, kernel_local_batch *b, 
 {
     vf_store(b->bits + b->sample_count, vf_set(0));
     vf_store(b->t + b->sample_count, vf_set(0));
-    if (type == GRID_HEX)
+    if (kernel_is_box(type))
         kernel_local_fill_hexes(t, b);
-    else if (type == GRID_WEDGE)
+    else if (kernel_is_prism(type))
         kernel_local_fill_wedges(t, b);
     else
         kernel_local_fill_pyramids(t, b);
@@ -223,8 +223,8 @@ static __attribute__((noinline)) unsigned kernel_local_place_any(kernel_tile_tra
                                                                  unsigned *lanes)
 {
     vf lists[4][8];
-    if (type == GRID_HEX) return kernel_local_place(t, &b->lanes, GRID_HEX, lists, 4, KERNEL_LOCAL_BENT, lanes);
-    if (type == GRID_WEDGE) return kernel_local_place(t, &b->lanes, GRID_WEDGE, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    if (kernel_is_box(type)) return kernel_local_place(t, &b->lanes, GRID_HEX, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    if (kernel_is_prism(type)) return kernel_local_place(t, &b->lanes, GRID_WEDGE, lists, 4, KERNEL_LOCAL_BENT, lanes);
     return kernel_local_place(t, &b->lanes, GRID_PYRAMID, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
@@ -236,11 +236,10 @@ static __attribute__((noinline)) unsigned kernel_local_fetch_any(kernel_local_ba
 /* The first cells that wait in a queue. */
 static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_batch *b, int queue)
 {
-    static const int types[KERNEL_LOCAL_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     kernel_local_queue *q = &b->lanes.queues[queue];
     unsigned placed;
-    const unsigned all = kernel_local_fetch_any(b, q, types[queue]);
-    const unsigned showing = kernel_local_place_any(t, b, types[queue], &placed) & all;
+    const unsigned all = kernel_local_fetch_any(b, q, kernel_curved_types[queue]);
+    const unsigned showing = kernel_local_place_any(t, b, kernel_curved_types[queue], &placed) & all;
     placed &= all;
     t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~placed));
     b->sample_count = b->rays.count = 0;
@@ -249,10 +248,10 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
         unsigned box = q->box[n];
         if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
         kernel_pixel_list_add_box(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_cast(t, b, types[queue]);
+        if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_cast(t, b, kernel_curved_types[queue]);
     }
-    kernel_local_cast(t, b, types[queue]);
-    if (b->sample_count) kernel_local_fill(t, b, types[queue]);
+    kernel_local_cast(t, b, kernel_curved_types[queue]);
+    if (b->sample_count) kernel_local_fill(t, b, kernel_curved_types[queue]);
     for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         kernel_tile_meet_cell(t, b->lanes.volume, b->lanes.part, q->cell[n], true, q->blocks[n], b->lanes.take);
@@ -262,7 +261,7 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
 
 SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_batch *b)
 {
-    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++)
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++)
         while (b->lanes.queues[i].count) kernel_local_run(t, b, i);
 }
 

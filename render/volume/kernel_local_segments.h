@@ -47,7 +47,7 @@ typedef struct kernel_tile_ray_segments {
     kernel_segment_state state;
     kernel_blend blend;
     vf t_last; /* where the ray ends: at what is opaque, or behind all cells */
-    vm active; /* of the packet, whose own is narrowed to the rays that are under way */
+    vm active; /* the packet's, whose own is narrowed to the rays that are under way */
 } kernel_tile_ray_segments;
 
 /* Adds the cell's segments on the packet's active rays. map is NULL for a constant field. */
@@ -315,7 +315,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
-    if (type != GRID_HEX) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
+    if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
     if (__builtin_expect(vm_any(crossed.alone), 0)) kernel_local_segments_alone(t, b, q, &rays, vm_bits(crossed.alone));
 }
 
@@ -396,9 +396,9 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
     kernel_pixel_list_close(&b->rays);
     b->met.count = 0;
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
-    if (type == GRID_HEX)
+    if (kernel_is_box(type))
         kernel_local_segments_hexes(t, b, q);
-    else if (type == GRID_WEDGE)
+    else if (kernel_is_prism(type))
         kernel_local_segments_wedges(t, b, q);
     else
         kernel_local_segments_pyramids(t, b, q);
@@ -472,8 +472,7 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
 static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                 int queue)
 {
-    static const int types[KERNEL_LOCAL_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
-    const int type = types[queue];
+    const int type = kernel_curved_types[queue];
     kernel_local_queue *q = &b->lanes.queues[queue];
     unsigned placed;
     const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
@@ -498,7 +497,7 @@ static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trac
 
 SIMD_INLINE void kernel_local_segments_end(kernel_tile_trace *t, kernel_local_stretches *b)
 {
-    for (int i = 0; i < KERNEL_LOCAL_TYPES; i++)
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++)
         while (b->lanes.queues[i].count) kernel_local_segments_run(t, b, i);
 }
 

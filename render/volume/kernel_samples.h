@@ -32,7 +32,7 @@ typedef struct kernel_samples {
     int first, count;
     float pad; /* numbers of samples are known to so much */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
-    vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* of the owning interval; only where contact is asked for */
+    vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* the owning interval's ends; only if contact matters */
     vf marked; /* where the rays' nearest sample with two owners is, of those of this window and before */
 } kernel_samples;
 
@@ -149,7 +149,7 @@ typedef struct kernel_blend {
     vm open;
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
-    vf depth, lost[3]; /* of segments: -ln(transmittance), and what colour has lost to rounding */
+    vf depth, lost[3]; /* for segments: -ln(transmittance), and what colour has lost to rounding */
     vf light;          /* what reaches this rank's next sample through all its samples so far */
     /* Used where all samples and segments go to the fold (render_fold.h): the last one's stretch, and the light that
      * passes all so far. light is then the light at the last stretch's end. */

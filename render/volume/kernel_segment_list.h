@@ -199,7 +199,7 @@ SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kern
     return true;
 }
 
-/* Of rays whose window they are of. precise: NULL unless the list is in double. */
+/* Adds segments of rays whose windows they begin in. precise: NULL unless the list is in double. */
 SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
                                      const kernel_interval *i, const kernel_double *precise)
 {
@@ -293,7 +293,7 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
  * linear field each (kernel_segments.h): into equal subintervals, or, where these do not suffice, by bisection
  * (kernel_cell_segments.h). */
 
-/* Of equal subintervals. */
+/* The most equal subintervals. */
 enum { KERNEL_MAX_SUBDIVISIONS = 256 };
 /* exp(-it) is KERNEL_BLACK, or a little more. */
 #define KERNEL_DARK_DEPTH 18.4f
@@ -312,7 +312,7 @@ typedef struct kernel_span {
     const kernel_map *map;   /* NULL: linear */
     const kernel_cell *cell; /* NULL: a tet or a polyhedron; without a map it is of one value */
     const kernel_interval *interval;
-    const kernel_double *precise; /* of a tet's interval in double; NULL: none */
+    const kernel_double *precise; /* for a tet's interval in double; NULL: none */
     float cost;                 /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
     int first_step, step_count; /* the steps of the opacity among the cell's values */
     bool is_steep, is_narrow;   /* steep ramps are, narrow ones */
@@ -391,7 +391,7 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
     return any;
 }
 
-/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/development/error_budget.md:
+/* What float32 rounds a stretch's values by, up to 1 or of their size (docs/development/error_budget.md:
  * 4e-7 at most).
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f

@@ -40,14 +40,4 @@ static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lane
     return others;
 }
 
-/* The listed rays from n on. Returns where they are in the tile, by packet and lane. */
-SIMD_INLINE vi kernel_small_tets_rays(const kernel_tile_trace *t, const kernel_pixel_list *rays, int n,
-                                      kernel_tet_rays *out)
-{
-    const int left = rays->count - n;
-    kernel_tet_rays_of(out, t->frame, &t->tile, kernel_bytes(rays->pixel + n), kernel_bytes(rays->lane + n));
-    out->active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    return kernel_batch_at(out->column, out->row);
-}
-
 #endif

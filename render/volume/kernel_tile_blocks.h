@@ -60,7 +60,7 @@ SIMD_INLINE unsigned kernel_tet_blocks(const kernel_block_rays *r, const kernel_
             above[n] = vm_not(vf_lt(e, vf_set(-reach)));
             below[n] = vm_not(vf_lt(vf_set(reach), e));
         }
-        for (int n = 0; n < 4; n++) { /* kernel_inside() of each face */
+        for (int n = 0; n < 4; n++) { /* rays on one side of all three edges of a face cross it */
             const signed char *edge = kernel_tet_face[n] + 3;
             met = vm_or(met, vm_and(vm_and(above[edge[0]], above[edge[1]]), below[edge[2]]));
             met = vm_or(met, vm_and(vm_and(below[edge[0]], below[edge[1]]), above[edge[2]]));

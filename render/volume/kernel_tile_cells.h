@@ -53,7 +53,7 @@ typedef struct kernel_tile_cells {
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
     kernel_cell cell;     /* the one under way, */
     kernel_map map;       /* and its map */
-    kernel_arrays arrays; /* of the volume's field on the part: */
+    kernel_arrays arrays; /* the volume's field on the part: */
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
@@ -79,8 +79,8 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     if (!meets) return 0;
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
-    if (is_pencil || c->type == GRID_TET) kernel_cell_lines(c, t->frame, &t->tile);
-    if (c->type == GRID_TET) return meets & kernel_tet_blocks(&cells->block_rays, c);
+    if (is_pencil || kernel_is_linear(c->type)) kernel_cell_lines(c, t->frame, &t->tile);
+    if (kernel_is_linear(c->type)) return meets & kernel_tet_blocks(&cells->block_rays, c);
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
 }
@@ -108,12 +108,12 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     const grid *g = t->frame->job->parts[part].cells;
     t->thread->volume_cells++;
     kernel_cell_fetch(c, g, &t->frame->job->volumes[volume].field.fields[part], index);
-    if (c->type == GRID_POLYHEDRON) {
+    if (kernel_has_own_faces(c->type)) {
         take(t, part, c, NULL, blocks);
         return;
     }
     blocks = kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
-    if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
+    if (blocks) take(t, part, c, kernel_is_linear(c->type) || c->is_constant ? NULL : &cells->map, blocks);
 }
 
 enum { KERNEL_ALL_PIXELS = -1 };
@@ -137,7 +137,7 @@ SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
 
 /* ---- tets, as many at once as there are lanes ---- */
 
-/* kernel_cell_domain(). */
+/* Takes the values into the domain of the transfer function. */
 SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
@@ -286,7 +286,7 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_v
     if (!waits) kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
     const unsigned box = kernel_tile_box(blocks, KERNEL_ALL_PIXELS);
     for (int n = 0; n < count; n++)
-        if (waits && kernel_arrays_type(&pending->arrays, cells[n]) == GRID_TET)
+        if (waits && kernel_is_linear(kernel_arrays_type(&pending->arrays, cells[n])))
             kernel_tile_wait(t, pending, cells[n], blocks, box, visitor->take);
         else
             kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
@@ -424,7 +424,8 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
                                        kernel_tile_take *take)
 {
     const int part = (int)item->source;
-    if (kernel_tile_wait_for(t, cells, 0, part, take) && kernel_arrays_type(&cells->arrays, item->cell) == GRID_TET)
+    if (kernel_tile_wait_for(t, cells, 0, part, take) &&
+        kernel_is_linear(kernel_arrays_type(&cells->arrays, item->cell)))
         kernel_tile_wait(t, cells, item->cell, blocks, item->box, take);
     else
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);

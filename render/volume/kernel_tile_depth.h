@@ -23,13 +23,13 @@
 typedef struct kernel_tile_depth {
     /* How deep behind its begin the last tile's rays, or most of them, had lost their light; +inf: they kept it. */
     float dark;
-    /* of the tile under way */
+    /* for the tile under way */
     float own_dark; /* the same, once it is known */
     float begin;    /* where its first cell is known to be, or the first sample is; +inf: none has been yet */
     bool has_met;   /* any */
     float expected; /* how much deeper than the last window its rays are to be dark, by the light left after it */
     float before;   /* the brightest ray's light before the last window */
-    /* of the last window, of rays that have lost any light */
+    /* the last window's, over rays that have lost any light */
     int met, ended;
     float brightest, first, last; /* first: where they begin; last: where those that are dark end */
 } kernel_tile_depth;

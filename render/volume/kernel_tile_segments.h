@@ -45,7 +45,7 @@ typedef struct kernel_tile_segments {
     kernel_double_cell precise;
     kernel_local_stretches stretches;
     int volume;  /* the one under way */
-    float depth; /* of windows; 0: not known yet */
+    float depth; /* for windows; 0: not known yet */
 } kernel_tile_segments;
 
 /* ---- cells ---- */
@@ -55,7 +55,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
                                       unsigned blocks)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (c->type == GRID_TET && t->frame->is_double)
+    if (kernel_is_linear(c->type) && t->frame->is_double)
         kernel_double_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->precise);
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
@@ -64,9 +64,9 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
             const int i = block * KERNEL_BLOCK_PACKETS + n;
             kernel_packet *p = &t->packets[i];
             kernel_segment_state *state = &s->packets[i].state;
-            if (c->type == GRID_POLYHEDRON)
+            if (kernel_has_own_faces(c->type))
                 kernel_polyhedron_segments(p, state, part, c->index, p->active);
-            else if (c->type == GRID_TET)
+            else if (kernel_is_linear(c->type))
                 kernel_tet_segments(p, state, c, &s->precise, p->active);
             else
                 kernel_curved_segments(p, state, c, map);
@@ -134,13 +134,14 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
     kernel_local_stretches *b = &s->stretches;
     const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes, &b->rays);
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
-        kernel_tet_rays r;
+        kernel_lane_rays r;
         kernel_interval i;
         vf begin, end, near, far;
-        const vi at = kernel_small_tets_rays(t, &b->rays, n, &r);
+        kernel_lane_rays_begin(&r, t, &b->rays, n);
+        const vi at = r.at;
         vf_gather_pair(b->window, 2 * at, &begin, &end);
         r.active = vm_and(r.active, vf_lt(begin, end));
-        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &t->tile, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &r, &i);
         if (!vm_any(i.mask)) continue;
         vf_gather_pair(b->reach, 2 * at, &near, &far);
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));

@@ -72,9 +72,9 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
             kernel_packet *p = &t->packets[i];
             kernel_volume_state state = {v->volume, &v->packets[i].samples};
-            if (c->type == GRID_POLYHEDRON)
+            if (kernel_has_own_faces(c->type))
                 kernel_polyhedron_volume(p, &state, part, c->index, p->active);
-            else if (c->type == GRID_TET)
+            else if (kernel_is_linear(c->type))
                 kernel_tile_tet_samples(p, &state, c);
             else
                 kernel_tile_curved_samples(p, &state, c, map);
@@ -93,10 +93,11 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
 
 /* ---- small tets: samples by kernel_samples.h's operations, to the same bits ---- */
 
-/* Of tets with larger boxes packets take samples as fast. */
+/* Packets take the samples of tets with larger boxes as fast. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
-/* As kernel_local_fits(). */
+/* May samples of tets be made a ray and its tet a lane? Not where surfaces may end rays, nor where each sample is a
+ * fragment of its own. */
 SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
 {
     return !f->surface_count && !f->job->separate_samples;
@@ -133,7 +134,7 @@ SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch
     }
 }
 
-/* kernel_fill() of the rays. */
+/* Gives the samples that the rays' intervals own their values. */
 SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batch *b, const kernel_interval *i, vi at)
 {
     vf base, step;
@@ -159,11 +160,12 @@ static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_t
     kernel_local_batch *b = &t->thread->tile_volume->batch;
     const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_SAMPLE_PIXELS, &b->lanes, &b->rays);
     for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
-        kernel_tet_rays r;
+        kernel_lane_rays r;
         kernel_interval i;
-        const vi at = kernel_small_tets_rays(t, &b->rays, n, &r);
+        kernel_lane_rays_begin(&r, t, &b->rays, n);
+        const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &t->tile, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
     b->rays.count = 0;

@@ -1,0 +1,94 @@
+/* One vertex, or one edge, of as many cells at once as a vector has lanes: its place in tile space, its values relative
+ * to an isovalue, and an edge's line (kernel_cell.h). What is computed in double is computed in two halves. The
+ * operations are those of a cell alone in the same order, so that the numbers have the same bits. */
+#ifndef RENDER_KERNEL_LANES_CELL_H
+#define RENDER_KERNEL_LANES_CELL_H
+
+#include <math.h>
+#include <string.h>
+
+#include "kernel_cell.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+/* Moves a vertex into tile space. */
+SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const kernel_whole *const world[3],
+                                    vf out[3])
+{
+    const double *eye = f->job->camera.eye;
+    for (int half = 0; half < 2; half++) {
+        kernel_half d[3], at[3];
+        for (int a = 0; a < 3; a++) d[a] = world[a]->half[half] - eye[a];
+        for (int a = 0; a < 3; a++)
+            at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+        const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+        kernel_half_put(&out[0], half, at[0] - tile->centre_x * depth);
+        kernel_half_put(&out[1], half, at[1] - tile->centre_y * depth);
+        kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
+    }
+}
+
+/* Takes count values relative to the isovalues in double, and scales each cell's by a power of two that brings the
+ * largest near 1. */
+SIMD_INLINE void kernel_lanes_relative(const kernel_whole *values, int count, const double isovalues[SIMD_WIDTH],
+                                       vf *out)
+{
+    for (int half = 0; half < 2; half++) {
+        kernel_half isovalue, v[8], largest = {0};
+        memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
+        for (int i = 0; i < count; i++) {
+            v[i] = values[i].half[half] - isovalue;
+            largest = kernel_half_max(kernel_half_abs(v[i]), largest);
+        }
+        /* The exponent of the largest, mirrored, and held so that the power is a normal number. */
+        kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
+        const kernel_half_mask low = exponent < 23;
+        const kernel_half_mask high = exponent > 2023;
+        exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
+        const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
+        for (int i = 0; i < count; i++) kernel_half_put(&out[i], half, v[i] * scale);
+    }
+}
+
+/* N of a vertex at a place in tile space (kernel_cell.h). */
+SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
+{
+    vf depth = vf_set(1);
+    if (!f->job->camera.is_orthographic) depth = vf_abs(at[2]) + fabsf((float)f->depth_shift);
+    return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
+}
+
+/* The bound of doubt of a line between vertices of these N. */
+SIMD_INLINE vf kernel_lanes_doubt(vf size_a, vf size_b)
+{
+    return 6 * 6e-8f * (size_a * size_b);
+}
+
+/* Finds c, cu and cv of the line from a to b. */
+SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const vf b[3], vf line[3])
+{
+    const bool flat = f->job->camera.is_orthographic;
+    for (int half = 0; half < 2; half++) {
+        const kernel_half ax = kernel_half_of(&a[0], half), ay = kernel_half_of(&a[1], half);
+        const kernel_half bx = kernel_half_of(&b[0], half), by = kernel_half_of(&b[1], half);
+        kernel_half da = kernel_half_of(&a[2], half) + f->depth_shift;
+        kernel_half db = kernel_half_of(&b[2], half) + f->depth_shift;
+        if (flat) da = db = (kernel_half){0} + 1;
+        kernel_half_put(&line[0], half, ax * by - bx * ay);
+        kernel_half_put(&line[1], half, db * ay - da * by);
+        kernel_half_put(&line[2], half, da * bx - db * ax);
+    }
+}
+
+/* Finds the error that the line's edge function may have, and the edge's extent (kernel_blur). */
+SIMD_INLINE void kernel_lanes_line_blur(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
+                                        vf *extent)
+{
+    vf apart[3];
+    for (int i = 0; i < 3; i++) apart[i] = vf_abs(a[i] - b[i]);
+    *error = 6e-8f * (3 * vf_abs(line[0]) + radius * (4 * vf_abs(line[1]) + 3 * vf_abs(line[2])));
+    *extent = apart[2] + 0.25f * (apart[0] + apart[1]);
+}
+
+#endif
