@@ -50,6 +50,8 @@ typedef struct kernel_packet {
     int sample_first;
     /* The part of the ray that clips leave for volumes; -inf and +inf without clips. */
     vf clip_in, clip_out;
+    vf clip_stretch; /* how many times as long that part is as clip_out - clip_in: where a ray grazes a sphere, rounding
+                        both ends may change much of it */
     /* The part of the rays that surfaces leave, kept where volumes have clips of their own. */
     vm all_active;
     vf surface_near, surface_far;
@@ -183,28 +185,31 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
 }
 
 /* Finds the stretch, by its number, that the clips leave of each of the packet's rays in front of the eye. */
-static __attribute__((noinline, cold)) void kernel_packet_part(const kernel_packet *p, uint32_t clips, int number,
-                                                               vf *begin, vf *end)
+static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p, uint32_t clips, int number)
 {
     const kernel_frame *f = p->frame;
     kernel_lanes l;
-    float from[SIMD_WIDTH], to[SIMD_WIDTH];
+    float from[SIMD_WIDTH], to[SIMD_WIDTH], stretch[SIMD_WIDTH];
     kernel_packet_lanes(p, &l);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         kernel_clip_ray ray;
         kernel_tree_ray(f, l.px[i], l.py[i], ray.base, ray.direction);
         const kernel_ray_part part = kernel_clip_part(f->job, clips, &ray, -f->depth_shift, number);
+        const double length = part.end - part.begin;
         from[i] = (float)part.begin;
         to[i] = (float)part.end;
+        if (length > 0 && to[i] <= from[i]) to[i] = nextafterf(from[i], INFINITY);
+        stretch[i] = length > 0 && length < 1 ? (float)(length / ((double)to[i] - (double)from[i])) : 1;
     }
-    *begin = vf_load(from);
-    *end = vf_load(to);
+    p->clip_in = vf_load(from);
+    p->clip_out = vf_load(to);
+    p->clip_stretch = vf_load(stretch);
 }
 
 /* Applies the clips that all layers are cut by. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
-    kernel_packet_part(p, p->frame->common_clips, 0, &p->clip_in, &p->clip_out);
+    kernel_packet_part(p, p->frame->common_clips, 0);
     p->t_near = vf_max(p->t_near, p->clip_in);
     p->t_far = p->clip_out;
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
@@ -219,7 +224,7 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
         p->surface_near = p->t_near;
         p->surface_far = p->t_far;
     }
-    kernel_packet_part(p, p->frame->job->volume_clips, turn, &p->clip_in, &p->clip_out);
+    kernel_packet_part(p, p->frame->job->volume_clips, turn);
     p->t_near = vf_max(p->surface_near, p->clip_in);
     p->t_far = vf_min(p->surface_far, p->clip_out);
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
@@ -255,6 +260,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     if (f->volume_count) {
         p->clip_in = vf_set(-INFINITY);
         p->clip_out = vf_set(INFINITY);
+        p->clip_stretch = vf_set(1);
     }
     if (f->common_clips) kernel_packet_clip(p);
 }

@@ -180,7 +180,7 @@ SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_
 {
     const kernel_frame *f = p->frame;
     const float mixing = f->job->separate_samples ? f->mixing : 0;
-    r->list.per_t = f->volumes[volume].exponent / p->sample_step;
+    r->list.per_t = f->volumes[volume].exponent / p->sample_step * p->clip_stretch;
     r->state = (kernel_segment_state){&r->list, &f->pieces[volume], volume, f->allowance, mixing, f->reach[volume]};
 }
 
