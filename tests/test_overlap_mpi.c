@@ -213,14 +213,12 @@ static bool same_images(const image *whole, const image *other, const drawing *d
     return !depths && colour <= bound;
 }
 
-/* Tells whether rounding may turn one of the ray's decisions, or its root finder has more than one answer. */
+/* Tells whether rounding may turn one of the ray's decisions. */
 static bool is_doubtful(const reference_ray *ray)
 {
     const double margin = fixture_usual_bounds.margin;
-    if (ray->ambiguous || ray->map_failed || ray->edge_margin < margin || ray->value_margin < margin ||
-        ray->sample_margin < margin || ray->eye_margin < margin)
-        return true;
-    for (int i = 0; i < ray->hit_count; i++) return false;
+    return ray->ambiguous || ray->map_failed || ray->edge_margin < margin || ray->value_margin < margin ||
+           ray->sample_margin < margin || ray->eye_margin < margin;
 }
 
 /* Usually every fifth pixel, of a picture of 67 a row. Cells that overlap have many surfaces and faces in a pixel: a
