@@ -41,7 +41,7 @@ else()
   set_target_properties(insitu_fortran PROPERTIES Fortran_MODULE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/fortran)
   target_include_directories(insitu_fortran PUBLIC ${CMAKE_CURRENT_BINARY_DIR}/fortran)
   add_executable(six_calls_fortran ${PROJECT_SOURCE_DIR}/examples/six_calls.f90)
-  add_executable(test_fortran test_fortran.f90)
+  add_executable(test_fortran test_fortran.f90 test_fortran_blocks.f90)
   foreach(target insitu_fortran six_calls_fortran test_fortran)
     if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
       target_compile_options(${target} PRIVATE -std=f2008 -Wall -Wextra -Wno-function-elimination ${insitu_werror}

@@ -53,6 +53,7 @@ program test_fortran
     use mpi_f08
     use insitu
     use test_fortran_maker
+    use test_fortran_blocks
     implicit none
     save ! so that what is still allocated as the program ends is no leak
     integer, parameter :: n = 5, vertices = n**3, cells = (n - 1)**3
@@ -127,6 +128,7 @@ program test_fortran
     call parameters_are_read()
     call procedures_make_values()
     call errors_are_told()
+    call test_blocks(prefix)
     call MPI_Finalize()
 
 contains
@@ -271,6 +273,7 @@ contains
         call MPI_Allreduce(is_well, is_well_everywhere, 1, MPI_LOGICAL, MPI_LAND, MPI_COMM_WORLD)
         if (is_well_everywhere) return
         if (.not. is_well) write (error_unit, '(a, i0, 2a)') 'rank ', rank, ': not so: ', what
+        flush (error_unit)
         call MPI_Abort(MPI_COMM_WORLD, 1)
     end subroutine expect
 

@@ -163,6 +163,195 @@ def parameters_are_numbers():
     raises(ValueError, "closed", s.parameter, "inflow")
 
 
+def drawn(name, hand_over, scene=SCENE):
+    """The picture of what a function hands over, when nobody but the session knows its arrays."""
+    with insitu.Session(comm, scene_text=scene.format(name=name, folder=folder)) as session:
+        hand_over(session)
+        gc.collect()
+        rubbish = [numpy.full(n, numpy.nan) for n in (64, 125, 343, 512, 1029) for _ in range(64)]
+        session.step(0, 0.0)
+        del rubbish
+    comm.Barrier()
+    with open(f"{folder}/{name}.png", "rb") as file:
+        found = file.read()
+    comm.Barrier()
+    return found
+
+
+def laid(values, order, low=0, high=0):
+    """An array of these values [i, j, k, ...] in an order of memory, in the midst of NaN or 1 where there is padding."""
+    wide = numpy.full([n + low + high for n in values.shape[:3]] + list(values.shape[3:]),
+                      numpy.nan if values.dtype.kind == "f" else 1, values.dtype, order=order)
+    inside = wide[tuple(slice(low, low + n) for n in values.shape[:3])]
+    inside[...] = values
+    return inside
+
+
+def blocks_are_their_hexes():
+    """Uniform, rectilinear and curvilinear blocks, in both orders, with padding and ghost layers: bitwise the hexes."""
+    xyz, hexes, f = lattice()
+    n = 5
+    places = xyz.reshape(n, n, n, 3).transpose(2, 1, 0, 3)  # [i, j, k], x y z
+    values, cells = f.reshape(n, n, n).transpose(2, 1, 0), (4, 4, 4)
+    of_cells = values[1:, 1:, 1:] + 0.1 * (numpy.arange(64).reshape(cells) % 3)
+    uniform = dict(spacing=(1, 1, 1), first=(4 * comm.rank, 0, 0))
+
+    def hand_hexes(s):
+        s.set_mesh("m", coordinates=xyz.copy(), connectivity=hexes, cell_type=insitu.HEX)
+        s.set_field("m", "f", f.copy())
+
+    def hand_cells(s):
+        s.set_mesh("m", coordinates=xyz.copy(), connectivity=hexes, cell_type=insitu.HEX)
+        s.set_field("m", "f", of_cells.transpose(2, 1, 0).reshape(-1).copy(), centring=insitu.CELL)
+
+    def block(order, make, low=0, high=0, components=None, of=insitu.VERTEX, **named):
+        def hand_over(s):
+            own = laid(values if of == insitu.VERTEX else of_cells, order, low, high)
+            if components is not None:  # along an axis of their own, which may be the first or the last
+                own = numpy.moveaxis(laid(numpy.stack([values, values + 3], axis=-1), order), -1, components)
+            s.set_block("m", cells, **make(), **{"vertex_layout" if of == insitu.VERTEX else "cell_layout": own}, **named)
+            s.set_field("m", "f", own if components is None else own[tuple(slice(0, 1) if axis == components % 4 else
+                                                                           slice(None) for axis in range(4))], centring=of)
+        return hand_over
+
+    plain = {insitu.VERTEX: drawn("block_plain", hand_hexes), insitu.CELL: drawn("block_cells", hand_cells)}
+    everywhere(plain[insitu.VERTEX] != plain[insitu.CELL], "fields at vertices and in cells differ")
+    axes = [numpy.arange(n) + 4 * comm.rank, numpy.arange(n), numpy.arange(n)]
+    forms = {
+        "uniform": lambda: uniform,
+        "axes": lambda: dict(coordinates=tuple(axis.astype("f4") for axis in axes)),
+        "strided_axes": lambda: dict(coordinates=tuple(numpy.repeat(axis.astype("f8"), 2)[::2] for axis in axes)),
+    }
+    for form, make in forms.items():
+        for order in "CF":
+            for of in insitu.VERTEX, insitu.CELL:
+                everywhere(drawn("block", block(order, make, of=of)) == plain[of], f"{form}, {order}, packed, {of}")
+                everywhere(drawn("block", block(order, make, 1, 2, of=of)) == plain[of], f"{form}, {order}, padded, {of}")
+    for order in "CF":
+        for name, make in {
+            "x, y, z": lambda: dict(coordinates=tuple(laid(places[..., i], order, 2, 1) for i in range(3))),
+            "of 4 bytes": lambda: dict(coordinates=tuple(laid(places[..., i].astype("f4"), order, 2, 1) for i in range(3))),
+            "xyz": lambda: dict(coordinates=numpy.moveaxis(laid(places, order, 2, 1), -1, 0)),
+        }.items():
+            if name == "xyz" and order == "F":
+                continue  # its components are farthest apart
+            everywhere(drawn("block", block(order, make, 2, 1)) == plain[insitu.VERTEX], f"curvilinear {name}, {order}")
+        everywhere(drawn("block", block(order, lambda: uniform, components=-1)) == plain[insitu.VERTEX], "components after")
+        everywhere(drawn("block", block(order, lambda: uniform, components=0)) == plain[insitu.VERTEX], "components before")
+
+    def with_layers(s):
+        """A block of 6 x 6 x 6 of which the outer layers are ghosts, with flags as well, and values by a callable."""
+        s.set_block("m", (6, 6, 6), spacing=(1, 1, 1), first=(4 * comm.rank - 1, -1, -1), interior_first=(1, 1, 1),
+                    interior_end=(5, 5, 5), ghosts=laid(numpy.zeros((6, 6, 6), "u1"), "F", 0, 1),
+                    vertex_layout=laid(values, "C", 1, 1).base)
+        s.set_field("m", "f", lambda: laid(values, "C", 1, 1).base)
+
+    everywhere(drawn("block", with_layers) == plain[insitu.VERTEX], "ghost layers")
+
+    def indexed(s):
+        s.set_block("m", cells, **uniform)
+        s.set_field("m", "f", f.copy(), index=numpy.arange(n**3).reshape(n, n, n).transpose(2, 1, 0).copy())
+
+    everywhere(drawn("block", indexed) == plain[insitu.VERTEX], "values by an index [i, j, k]")
+
+
+def blocks_of_two_dimensions_are_their_quads():
+    scene = SCENE.split("    layers:")[0] + """    layers: [{{surface: {{colour_by: {{field: f}}}}}}]
+    outputs: [{{path: {folder}/{name}.png}}]
+"""
+    i, j = numpy.meshgrid(range(6), range(5), indexing="ij")
+    x, z = i + 5.0 * comm.rank, 0.3 * (i + 5 * comm.rank) * j
+    v = numpy.arange(30).reshape(6, 5)
+    quads = numpy.stack([v[:-1, :-1], v[1:, :-1], v[1:, 1:], v[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+    def hand_quads(height):
+        def hand_over(s):
+            s.set_mesh("m", coordinates=tuple(a.reshape(-1) for a in (x, 1.0 * j, height)), connectivity=quads,
+                       cell_type=insitu.QUAD)
+            s.set_field("m", "f", (x + j).reshape(-1))
+        return hand_over
+
+    def hand_block(**named):
+        def hand_over(s):
+            s.set_block("m", (5, 4), **named)
+            s.set_field("m", "f", x + j)
+        return hand_over
+
+    bent, flat = drawn("quads", hand_quads(z), scene), drawn("quads", hand_quads(0 * z), scene)
+    everywhere(bent != flat and len(flat) > 300, "the quads are seen")
+    everywhere(drawn("quads", hand_block(coordinates=(x, 1.0 * j, z)), scene) == bent, "a surface in space")
+    everywhere(drawn("quads", hand_block(coordinates=(x[:, 0], j[0] * 1.0)), scene) == flat, "axes")
+    everywhere(drawn("quads", hand_block(spacing=(1, 1), first=(5 * comm.rank, 0)), scene) == flat, "uniform")
+
+
+def wrong_blocks_are_refused():
+    n = 5
+    f, c = numpy.ones((n, n, n)), numpy.ones((4, 4, 4))
+    axis, flags = numpy.arange(5.0), numpy.zeros((4, 4, 4), "u1")
+    uniform = dict(cells=(4, 4, 4), spacing=(1, 1, 1), coordinates=None)
+    axes, curved = dict(uniform, spacing=None, coordinates=(axis, axis, axis)), dict(uniform, spacing=None, coordinates=(f, f, f))
+    with insitu.Session(comm, scene_text=SCENE.format(name="wrong", folder=folder)) as s:
+        for named, kind, words in [
+            (dict(uniform, cells=(4,)), ValueError, "cells: are (4,), expected two or three numbers"),
+            (dict(uniform, cells=(4, 0, 4)), ValueError, "cells: are (4, 0, 4), expected"),
+            (dict(uniform, cells=(4, -4, 4)), ValueError, "cells: are (4, -4, 4), expected"),
+            (dict(uniform, cells=(2**40, 2**40, 2**40)), ValueError, "too many, expected at most 4294967294"),
+            (dict(uniform, cells=(4.5, 4, 4)), TypeError, "float"),
+            (dict(uniform, spacing=(1, 0, 1)), insitu.Error, "the spacing along j is 0"),
+            (dict(uniform, spacing=(1, numpy.nan, 1)), insitu.Error, "along j are not finite"),
+            (dict(uniform, spacing=(1,)), ValueError, "spacing: has 1 numbers, expected 3"),
+            (dict(uniform, first=(2**63, 0, 0)), ValueError, "first: has the number 9223372036854775808"),
+            (dict(uniform, spacing=None, origin=(0, 0, 0)), TypeError, "expected one of them"),
+            (dict(axes, first=(1, 0, 0)), TypeError, "spacing: is not given, and origin or first is"),
+            (dict(uniform, coordinates=(axis, axis, axis)), TypeError, "expected one of them"),
+            (dict(uniform, interior_first=(1, 1, 1)), TypeError, "one is given, expected both or none"),
+            (dict(uniform, interior_first=(1, 1, 1), interior_end=(5, 4, 4)), insitu.Error, "the interior along i is 1..5"),
+            (dict(uniform, ghosts=flags[1:]), ValueError, "ghosts: has the shape (3, 4, 4), expected (4, 4, 4) for the cells"),
+            (dict(uniform, ghosts=flags.reshape(-1)[1:]), ValueError, "ghosts: is a list of 63, expected one of 64"),
+            (dict(uniform, ghosts=c), insitu.Error, "ghost flags are of element type 2, not uint8"),
+            (dict(uniform, ghosts=flags.copy("F"), cell_layout=c), ValueError, "ghosts: has strides of (1, 4, 16) bytes, which "
+             "are as (1, 4, 16), expected as (16, 4, 1)"),
+            (dict(axes, coordinates=(axis, axis[1:], axis)), ValueError, "coordinates[1]: has 4 elements, expected 5"),
+            (dict(axes, coordinates=(axis, axis)), ValueError, "coordinates: are along 2 axes, expected 3"),
+            (dict(curved, coordinates=(f, f.astype(int), f)), insitu.Error, "y coordinates are of element type 4"),
+            (dict(curved, coordinates=(f, f)), ValueError, "are 2 for each vertex, expected x, y and z"),
+            (dict(curved, coordinates=(f, f[:-1], f)), ValueError, "coordinates[1]: has the shape (4, 5, 5), expected (5, 5, 5)"),
+            (dict(curved, coordinates=(f, f, f[::-1])), ValueError, "coordinates[2]: has strides of (-200, 40, 8) bytes, expected "
+             "positive ones"),
+            (dict(curved, coordinates=(f, f, f.copy("F"))), ValueError, "coordinates[2]: has strides of (8, 40, 200) bytes, which "
+             "are as (1, 5, 25), expected as (25, 5, 1)"),
+            (dict(curved, coordinates=(f, f, axis)), ValueError, "coordinates[2]: is a list of 5, expected one of 125"),
+            (dict(curved, coordinates=(f, f, numpy.broadcast_to(axis, f.shape))), ValueError, "strides of (0, 0, 8) bytes"),
+        ]:
+            raises(kind, words, s.set_block, "m", **named)
+        s.set_block("m", **uniform)
+        for values, centring, kind, words in [
+            (f[1:], insitu.VERTEX, ValueError, "values: has the shape (4, 5, 5), expected (5, 5, 5), with components before or"),
+            (c, insitu.VERTEX, ValueError, "values: has the shape (4, 4, 4), expected (5, 5, 5)"),
+            (f, insitu.CELL, ValueError, "values: has the shape (5, 5, 5), expected (4, 4, 4)"),
+            (f.copy("F"), insitu.VERTEX, ValueError, "values: has strides of (8, 40, 200) bytes, which are as (1, 5, 25), expected "
+             "as (25, 5, 1): all arrays of the vertices of block \"m\" have one order and padding (set_block's vertex_layout"),
+            (numpy.ones((n, n, n + 1))[:, :, :n], insitu.VERTEX, ValueError, "as (30, 6, 1), expected as (25, 5, 1)"),
+            (f[0], insitu.VERTEX, ValueError, "values: has 2 dimensions, expected 1 or 3 or 4"),
+            (f.reshape(-1)[1:], insitu.VERTEX, ValueError, "values: is a list of 124, expected one of 125"),
+            (numpy.ones(512), insitu.CORNER, insitu.Error, "values at corners, and the mesh is a lattice"),
+        ]:
+            raises(kind, words, s.set_field, "m", "f", values, centring=centring)
+        s.set_field("m", "f", lambda: f[1:])
+        error = raises(insitu.Error, "its fill returned", s.step, 0, 0.0)
+        everywhere("values: has the shape (4, 5, 5)" in str(error.__cause__), f"{error.__cause__}")
+        s.set_block("m", (4, 4, 4), spacing=None, coordinates=(axis, axis * numpy.nan, axis))
+        s.set_field("m", "f", f)
+        raises(insitu.Error, "coordinate 0 along j is not finite: nan", s.step, 1, 0.0)
+        s.set_block("m", **uniform)
+        s.set_field("m", "f", f)
+        s.step(2, 0.0)
+        everywhere(s.report["images"] == 1, "the session goes on after errors")
+        xyz, hexes, values = lattice()
+        s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        raises(ValueError, "values: has 3 dimensions, expected 1 or 2", s.set_field, "m", "f", f)
+
+
 def pictures_are_arrays():
     xyz, hexes, f = lattice()
     with insitu.Session(comm, scene_text=SCENE.format(name="kept", folder=folder)) as s:
@@ -465,10 +654,12 @@ def derived_fields_are_fields():
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
-    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("field", insitu._Field), ("patch", insitu._Patch), ("report", insitu._Report),
+    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("lattice", insitu._Lattice),
+                       ("field", insitu._Field), ("patch", insitu._Patch), ("report", insitu._Report),
                        ("picture", insitu._Picture)]:
         body = re.search(r"typedef struct insitu_%s \{(.*?)\}" % name, header, flags=re.S)[1]
-        theirs = [re.search(r"(\w+)(\[\d+\])?$", line.strip())[1] for line in body.split(";") if line.strip()]
+        theirs = [re.search(r"(\w+)(\[\d+\])?$", each.strip())[1]
+                  for line in body.split(";") for each in line.split(",") if each.strip()]
         everywhere(theirs == [field[0] for field in ours._fields_], f"insitu_{name}: {theirs}")
 
 
@@ -479,6 +670,9 @@ layouts_draw_the_same_picture()
 planes_go_without_z()
 what_cannot_be_borrowed_is_refused()
 parameters_are_numbers()
+blocks_are_their_hexes()
+blocks_of_two_dimensions_are_their_quads()
+wrong_blocks_are_refused()
 pictures_are_arrays()
 finite_volumes_are_their_hexes()
 boundaries_have_values_of_their_own()

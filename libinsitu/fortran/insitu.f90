@@ -30,13 +30,16 @@ module insitu
 
     integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 5
 
-    ! A borrowed array: elements one after the other, in so many rows of equal length.
+    ! A borrowed array: elements one after the other, in so many rows of equal length; or of up to four dimensions, as
+    ! those of a block.
     type, public :: insitu_array
         private
         type(c_ptr) :: data = c_null_ptr
         integer(c_int) :: kind = float32
         integer(c_int64_t) :: rows = 1, columns = 0      ! rows: 1, or the first extent of a matrix
         integer(c_int64_t) :: row_stride = 0, stride = 0 ! bytes, along the first extent and along the last
+        integer :: dimensions = 1
+        integer(c_int64_t) :: extents(4) = 0, steps(4) = 0 ! steps: bytes, 0 where the extent is 1
     end type insitu_array
 
     ! Faces as a list of vertices each: pointers to them, and how many each has.
@@ -59,6 +62,13 @@ module insitu
         integer(c_int64_t) :: stride
     end type c_array
 
+    type, bind(C) :: c_lattice
+        integer(c_int64_t) :: cells(3), vertex_strides(3), cell_strides(3), interior_first(3), interior_end(3)
+        real(c_double) :: origin(3), spacing(3)
+        integer(c_int64_t) :: first(3)
+        type(c_array) :: axes(3)
+    end type c_lattice
+
     type, bind(C) :: c_mesh
         integer(c_int64_t) :: vertex_count
         type(c_array) :: coordinates(3)
@@ -78,6 +88,7 @@ module insitu
         type(c_array) :: neighbour, face_sizes, face_lists
         integer(c_int) :: keep_polyhedra, vertex_order
         integer(c_int64_t) :: connectivity_row
+        type(c_ptr) :: lattice
         integer(c_int64_t) :: boundary_face_count
         type(c_array) :: boundary_face_offsets
         integer(c_int64_t) :: boundary_face_connectivity_count
@@ -149,10 +160,27 @@ module insitu
     end interface
     public :: insitu_fill
 
+    ! How the arrays of a structured block lie: those of its vertices (1) and of its cells (2). Strides are whole numbers
+    ! without a common divisor, so that arrays of any kinds and numbers of components have the same ones; the first array
+    ! decides on them.
+    type :: block_shape
+        integer :: dimensions = 0 ! 0: no block
+        integer(c_int64_t) :: extents(3, 2) = 1, strides(3, 2) = 1
+        logical :: has_strides(2) = .false.
+    end type block_shape
+
+    ! An array of a block as C is told of it. components: their number, and the bytes between them.
+    type :: block_array
+        type(c_array) :: array
+        integer(c_int64_t) :: count = 0, components = 1, component_stride = 0
+    end type block_array
+
     ! The data that C passes to the function that it calls. It stays where it is until the session ends.
     type :: fill_record
         character(:), allocatable :: mesh, field
+        type(block_shape) :: block
         procedure(insitu_fill), pointer, nopass :: fill => null()
+        character(:), allocatable :: fault ! of the values that it has made in this step
         type(fill_record), pointer :: next => null()
     end type fill_record
 
@@ -161,6 +189,7 @@ module insitu
         character(:), allocatable :: name
         integer(c_int64_t) :: vertices = 0, cells = 0, corners = 0
         integer :: cell_size = 0 ! vertices of a cell; 0: cells have offsets
+        type(block_shape) :: block
     end type mesh_size
 
     ! A session. create, step and destroy are collective, the others local. status: INSITU_OK, or what error() explains.
@@ -176,16 +205,19 @@ module insitu
         generic :: create_from_text => text_integer, text_f08             ! (comm, scene_text, status)
         procedure, private :: set_faces_by_offsets, set_faces_by_lists
         generic :: set_mesh_of_faces => set_faces_by_offsets, set_faces_by_lists
-        procedure :: set_mesh, remove_mesh, set_field, set_filled_field, step, report, error, destroy
+        procedure :: set_mesh, set_block, remove_mesh, set_field, set_filled_field, step, report, error, destroy
         procedure :: keep_pictures, pictures
         procedure :: parameter => read_parameter
     end type insitu_session
 
     ! An array of any kind that the library takes: reals and integers of 4 and 8 bytes, integers of 1 byte; a list, or a
-    ! matrix: connectivity (corners, cells), values (components, tuples).
+    ! matrix: connectivity (corners, cells), values (components, tuples). Of blocks also arrays (i, j, k), and of fields
+    ! with components, (components, i, j, k) or (i, j, k, components).
     interface insitu_borrow
         module procedure borrow_r4, borrow_r8, borrow_i1, borrow_i4, borrow_i8
-        module procedure borrow_r4_2, borrow_r8_2, borrow_i4_2, borrow_i8_2
+        module procedure borrow_r4_2, borrow_r8_2, borrow_i1_2, borrow_i4_2, borrow_i8_2
+        module procedure borrow_r4_3, borrow_r8_3, borrow_i1_3, borrow_i4_3, borrow_i8_3
+        module procedure borrow_r4_4, borrow_r8_4, borrow_i4_4, borrow_i8_4
     end interface insitu_borrow
 
     ! Coordinates (3, vertices), or x, y and z. Without z, which is 0 then: (2, vertices), or x and y.
@@ -277,98 +309,181 @@ contains
         bytes_between = transfer(to, 0_c_intptr_t) - transfer(from, 0_c_intptr_t)
     end function bytes_between
 
-    function list_of(kind, count, first, second) result(out)
+    ! An array of these extents, whose memory is not known yet.
+    function array_of(kind, extents) result(out)
         integer(c_int), intent(in) :: kind
-        integer, intent(in) :: count
-        type(c_ptr), intent(in) :: first, second
+        integer, intent(in) :: extents(:)
         type(insitu_array) :: out
-        out%data = first
         out%kind = kind
-        out%columns = count
-        if (count > 1) out%stride = bytes_between(first, second)
-    end function list_of
+        out%dimensions = size(extents)
+        out%extents(:size(extents)) = extents
+        if (size(extents) > 1) out%rows = extents(1)
+        if (all(extents > 0)) out%columns = extents(size(extents))
+    end function array_of
+
+    ! at: the first element, and for each dimension the element after it, or the first itself.
+    subroutine put_memory(array, at)
+        type(insitu_array), intent(inout) :: array
+        type(c_ptr), intent(in) :: at(:)
+        integer :: i
+        array%data = at(1)
+        do i = 1, array%dimensions
+            array%steps(i) = bytes_between(at(1), at(i + 1))
+        end do
+        array%stride = array%steps(array%dimensions)
+        if (array%dimensions > 1) array%row_stride = array%steps(1)
+    end subroutine put_memory
 
     function borrow_r4(a) result(out)
         real(real32), intent(in), target :: a(:)
         type(insitu_array) :: out
-        if (size(a) > 0) out = list_of(float32, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
-        out%kind = float32
+        out = array_of(float32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
     end function borrow_r4
 
     function borrow_r8(a) result(out)
         real(real64), intent(in), target :: a(:)
         type(insitu_array) :: out
-        if (size(a) > 0) out = list_of(float64, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
-        out%kind = float64
+        out = array_of(float64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
     end function borrow_r8
 
     function borrow_i1(a) result(out)
         integer(int8), intent(in), target :: a(:)
         type(insitu_array) :: out
-        if (size(a) > 0) out = list_of(bytes, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
-        out%kind = bytes
+        out = array_of(bytes, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
     end function borrow_i1
 
     function borrow_i4(a) result(out)
         integer(int32), intent(in), target :: a(:)
         type(insitu_array) :: out
-        if (size(a) > 0) out = list_of(integer32, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
-        out%kind = integer32
+        out = array_of(integer32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
     end function borrow_i4
 
     function borrow_i8(a) result(out)
         integer(int64), intent(in), target :: a(:)
         type(insitu_array) :: out
-        if (size(a) > 0) out = list_of(integer64, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
-        out%kind = integer64
+        out = array_of(integer64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
     end function borrow_i8
-
-    ! below, beside: the elements after the first along both extents, or the first itself.
-    function matrix_of(kind, extents, first, below, beside) result(out)
-        integer(c_int), intent(in) :: kind
-        integer, intent(in) :: extents(2)
-        type(c_ptr), intent(in) :: first, below, beside
-        type(insitu_array) :: out
-        out = list_of(kind, extents(2), first, beside)
-        out%rows = extents(1)
-        if (extents(1) > 1) out%row_stride = bytes_between(first, below)
-    end function matrix_of
 
     function borrow_r4_2(a) result(out)
         real(real32), intent(in), target :: a(:, :)
         type(insitu_array) :: out
-        if (size(a) > 0) out = matrix_of(float32, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
-            c_loc(a(1, min(2, size(a, 2)))))
-        out%kind = float32
-        out%rows = size(a, 1)
+        out = array_of(float32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2))))])
     end function borrow_r4_2
 
     function borrow_r8_2(a) result(out)
         real(real64), intent(in), target :: a(:, :)
         type(insitu_array) :: out
-        if (size(a) > 0) out = matrix_of(float64, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
-            c_loc(a(1, min(2, size(a, 2)))))
-        out%kind = float64
-        out%rows = size(a, 1)
+        out = array_of(float64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2))))])
     end function borrow_r8_2
+
+    function borrow_i1_2(a) result(out)
+        integer(int8), intent(in), target :: a(:, :)
+        type(insitu_array) :: out
+        out = array_of(bytes, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2))))])
+    end function borrow_i1_2
 
     function borrow_i4_2(a) result(out)
         integer(int32), intent(in), target :: a(:, :)
         type(insitu_array) :: out
-        if (size(a) > 0) out = matrix_of(integer32, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
-            c_loc(a(1, min(2, size(a, 2)))))
-        out%kind = integer32
-        out%rows = size(a, 1)
+        out = array_of(integer32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2))))])
     end function borrow_i4_2
 
     function borrow_i8_2(a) result(out)
         integer(int64), intent(in), target :: a(:, :)
         type(insitu_array) :: out
-        if (size(a) > 0) out = matrix_of(integer64, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
-            c_loc(a(1, min(2, size(a, 2)))))
-        out%kind = integer64
-        out%rows = size(a, 1)
+        out = array_of(integer64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2))))])
     end function borrow_i8_2
+
+    function borrow_r4_3(a) result(out)
+        real(real32), intent(in), target :: a(:, :, :)
+        type(insitu_array) :: out
+        out = array_of(float32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
+    end function borrow_r4_3
+
+    function borrow_r8_3(a) result(out)
+        real(real64), intent(in), target :: a(:, :, :)
+        type(insitu_array) :: out
+        out = array_of(float64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
+    end function borrow_r8_3
+
+    function borrow_i1_3(a) result(out)
+        integer(int8), intent(in), target :: a(:, :, :)
+        type(insitu_array) :: out
+        out = array_of(bytes, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
+    end function borrow_i1_3
+
+    function borrow_i4_3(a) result(out)
+        integer(int32), intent(in), target :: a(:, :, :)
+        type(insitu_array) :: out
+        out = array_of(integer32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
+    end function borrow_i4_3
+
+    function borrow_i8_3(a) result(out)
+        integer(int64), intent(in), target :: a(:, :, :)
+        type(insitu_array) :: out
+        out = array_of(integer64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1)), c_loc(a(1, 1, min(2, size(a, 3))))])
+    end function borrow_i8_3
+
+    function borrow_r4_4(a) result(out)
+        real(real32), intent(in), target :: a(:, :, :, :)
+        type(insitu_array) :: out
+        out = array_of(float32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
+            c_loc(a(1, 1, 1, min(2, size(a, 4))))])
+    end function borrow_r4_4
+
+    function borrow_r8_4(a) result(out)
+        real(real64), intent(in), target :: a(:, :, :, :)
+        type(insitu_array) :: out
+        out = array_of(float64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
+            c_loc(a(1, 1, 1, min(2, size(a, 4))))])
+    end function borrow_r8_4
+
+    function borrow_i4_4(a) result(out)
+        integer(int32), intent(in), target :: a(:, :, :, :)
+        type(insitu_array) :: out
+        out = array_of(integer32, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
+            c_loc(a(1, 1, 1, min(2, size(a, 4))))])
+    end function borrow_i4_4
+
+    function borrow_i8_4(a) result(out)
+        integer(int64), intent(in), target :: a(:, :, :, :)
+        type(insitu_array) :: out
+        out = array_of(integer64, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1, 1, 1)), c_loc(a(min(2, size(a, 1)), 1, 1, 1)), &
+            c_loc(a(1, min(2, size(a, 2)), 1, 1)), c_loc(a(1, 1, min(2, size(a, 3)), 1)), &
+            c_loc(a(1, 1, 1, min(2, size(a, 4))))])
+    end function borrow_i8_4
 
     ! So many elements that are not there: the coordinates z that plane meshes go without.
     function absent(count) result(out)
@@ -424,8 +539,8 @@ contains
         type(insitu_array) :: out
         out%kind = integer32
         if (present(kind)) out%kind = merge(integer64, integer32, kind == int64)
-        if (size(pointers) == 0) return
-        out = list_of(out%kind, size(pointers), c_loc(pointers(1)), c_loc(pointers(min(2, size(pointers)))))
+        out = array_of(out%kind, shape(pointers))
+        if (size(pointers) > 0) call put_memory(out, [c_loc(pointers(1)), c_loc(pointers(min(2, size(pointers))))])
     end function pointers_of
 
     function lists_i4(pointers, sizes, kind) result(out)
@@ -460,7 +575,7 @@ contains
     ! Rows follow one another as a list would.
     logical function is_list(a)
         type(insitu_array), intent(in) :: a
-        is_list = a%rows <= 1 .or. a%columns <= 1 .or. a%stride == a%rows * a%row_stride
+        is_list = a%dimensions <= 2 .and. (a%rows <= 1 .or. a%columns <= 1 .or. a%stride == a%rows * a%row_stride)
     end function is_list
 
     ! Elements from one column's first to the next one's, where there are others between; 0: there are none, or no whole
@@ -468,11 +583,220 @@ contains
     integer(c_int64_t) function row_of(a)
         type(insitu_array), intent(in) :: a
         row_of = 0
-        if (is_list(a) .or. a%row_stride == 0) return
+        if (is_list(a) .or. a%row_stride == 0 .or. a%dimensions > 2) return
         if (mod(a%stride, a%row_stride) == 0 .and. a%stride / a%row_stride > a%rows) row_of = a%stride / a%row_stride
     end function row_of
 
+    ! ---- blocks ---------------------------------------------------------------------------------------------------
+
+    ! A block of so many cells, whose strides are not known yet, and its lattice, which has nothing but cells.
+    subroutine make_block(cells, lattice, block, fault)
+        integer, intent(in) :: cells(:)
+        type(c_lattice), intent(out) :: lattice
+        type(block_shape), intent(out) :: block
+        character(:), allocatable, intent(out) :: fault
+        type(c_array), parameter :: none = c_array(c_null_ptr, float32, 0)
+        integer(c_int64_t), parameter :: zero(3) = 0
+        lattice = c_lattice(zero, zero, zero, zero, zero, [0, 0, 0], [0, 0, 0], zero, [none, none, none])
+        fault = 'cells are '//as_text(int(cells, c_int64_t))//', expected two or three numbers of at least 1, or all 0 '// &
+            'without cells'
+        if (size(cells) < 2 .or. size(cells) > 3) return
+        if (any(cells < 0) .or. (any(cells == 0) .and. any(cells /= 0))) return
+        fault = 'cells are '//as_text(int(cells, c_int64_t))//', too many, expected at most 4294967294 in all'
+        if (product(real(cells, real64)) > 4294967294.0_real64) return
+        fault = ''
+        block%dimensions = size(cells)
+        lattice%cells(:size(cells)) = cells
+        block%extents(:size(cells), 2) = cells
+        block%extents(:size(cells), 1) = cells + merge(1, 0, cells > 0)
+    end subroutine make_block
+
+    ! Three numbers of the caller's, of which those of a block of two dimensions may lack the third.
+    subroutine check_size(what, length, dimensions, fault)
+        character(*), intent(in) :: what
+        integer, intent(in) :: length, dimensions
+        character(:), allocatable, intent(inout) :: fault
+        if (len(fault) > 0 .or. length == dimensions .or. length == 3) return
+        fault = what//' has '//as_text([int(length, c_int64_t)])//' numbers, expected '// &
+            as_text([int(dimensions, c_int64_t)])//', one for each axis'
+    end subroutine check_size
+
+    subroutine put_ranges(lattice, dimensions, fault, spacing, origin, first, interior_first, interior_last)
+        type(c_lattice), intent(inout) :: lattice
+        integer, intent(in) :: dimensions
+        character(:), allocatable, intent(inout) :: fault
+        real(real64), intent(in), optional :: spacing(:), origin(:)
+        integer, intent(in), optional :: first(:), interior_first(:), interior_last(:)
+        if (present(spacing)) call check_size('spacing', size(spacing), dimensions, fault)
+        if (present(origin)) call check_size('origin', size(origin), dimensions, fault)
+        if (present(first)) call check_size('first', size(first), dimensions, fault)
+        if (present(interior_first)) call check_size('interior_first', size(interior_first), dimensions, fault)
+        if (present(interior_last)) call check_size('interior_last', size(interior_last), dimensions, fault)
+        if (len(fault) == 0 .and. .not. present(spacing) .and. (present(origin) .or. present(first))) &
+            fault = 'spacing is not given, and origin or first is; expected it for a uniform block'
+        if (len(fault) == 0 .and. (present(interior_first) .neqv. present(interior_last))) &
+            fault = 'one of interior_first and interior_last is given, expected both or none'
+        if (len(fault) > 0) return
+        if (present(spacing)) lattice%spacing(:size(spacing)) = spacing
+        if (present(origin)) lattice%origin(:size(origin)) = origin
+        if (present(first)) lattice%first(:size(first)) = first
+        if (.not. present(interior_first)) return
+        lattice%interior_end(3) = 1
+        lattice%interior_first(:size(interior_first)) = interior_first - 1
+        lattice%interior_end(:size(interior_last)) = interior_last
+        if (any(lattice%interior_first /= 0) .or. any(lattice%interior_end /= 0)) return
+        lattice%interior_first = 1 ! all 0 would mean all cells to C
+        lattice%interior_end = 1
+    end subroutine put_ranges
+
+    ! Coordinates of a block: a list along the axis, or an array of its vertices.
+    subroutine put_places(block, mesh, lattice, axis, what, fault, nothing, given)
+        type(block_shape), intent(inout) :: block
+        type(c_mesh), intent(inout) :: mesh
+        type(c_lattice), intent(inout) :: lattice
+        integer, intent(in) :: axis
+        character(*), intent(in) :: what
+        character(:), allocatable, intent(inout) :: fault
+        real(real64), intent(in), target :: nothing
+        type(insitu_array), intent(in), optional :: given
+        type(block_array) :: laid
+        if (.not. present(given)) return
+        if (len(fault) > 0 .or. block%extents(1, 2) == 0) return
+        if (given%dimensions > 1) then
+            call borrow_for(block, what, 1, .false., laid, fault, nothing, given)
+            mesh%coordinates(axis) = laid%array
+        else if (given%columns /= block%extents(axis, 1)) then
+            fault = what//' has '//as_text([given%columns])//' elements, expected '//as_text(block%extents(axis:axis, 1))// &
+                ', one more than there are cells, or the shape '//as_text(block%extents(:block%dimensions, 1))
+        else
+            lattice%axes(axis) = as_c(given, nothing)
+        end if
+    end subroutine put_places
+
+    ! Borrows an array of a block's vertices (of = 1) or cells (2): (i, j, k), with components before or after, or a list as
+    ! long as the block's arrays.
+    subroutine borrow_for(block, what, of, may_have_components, laid, fault, nothing, given)
+        type(block_shape), intent(inout) :: block
+        character(*), intent(in) :: what
+        integer, intent(in) :: of
+        logical, intent(in) :: may_have_components
+        type(block_array), intent(out) :: laid
+        character(:), allocatable, intent(inout) :: fault
+        real(real64), intent(in), target :: nothing
+        type(insitu_array), intent(in), optional :: given
+        integer :: skipped, dimensions, beside
+        laid%array = c_array(c_null_ptr, float32, 0)
+        if (.not. present(given) .or. len(fault) > 0) return
+        dimensions = block%dimensions
+        laid%array = as_c(given, nothing)
+        laid%array%stride = given%stride
+        laid%count = count_of(block, of)
+        if (given%dimensions == 1) then
+            if (given%columns == laid%count) return
+            fault = what//' is a list of '//as_text([given%columns])//', expected '//as_text([laid%count])//' or '// &
+                shape_text(block, of, .false.)
+            return
+        end if
+        skipped = 0 ! components come before
+        if (may_have_components .and. given%dimensions == dimensions + 1) then
+            if (all(given%extents(2:dimensions + 1) == block%extents(:dimensions, of))) skipped = 1
+            beside = merge(1, dimensions + 1, skipped == 1)
+            laid%components = given%extents(beside)
+            laid%component_stride = given%steps(beside)
+        end if
+        if (laid%count == 0) then
+            laid%array%data = c_loc(nothing)
+        else if (given%dimensions - merge(1, 0, may_have_components .and. given%dimensions > dimensions) /= dimensions .or. &
+            any(given%extents(skipped + 1:skipped + dimensions) /= block%extents(:dimensions, of))) then
+            fault = what//' has the shape '//as_text(given%extents(:given%dimensions))//', expected '// &
+                shape_text(block, of, may_have_components)
+        else
+            call fit(block, what, of, given%steps(skipped + 1:skipped + dimensions), laid%array%stride, fault)
+        end if
+    end subroutine borrow_for
+
+    ! Finds the common divisor of an array's strides, in bytes; all arrays have the same strides in units of theirs.
+    subroutine fit(block, what, of, steps, unit, fault)
+        type(block_shape), intent(inout) :: block
+        character(*), intent(in) :: what
+        integer, intent(in) :: of
+        integer(c_int64_t), intent(in) :: steps(:)
+        integer(c_int64_t), intent(out) :: unit
+        character(:), allocatable, intent(inout) :: fault
+        integer(c_int64_t) :: strides(3)
+        integer :: axis
+        character(*), parameter :: things(2) = ['vertices', 'cells   '], layouts(2) = ['vertex_layout', 'cell_layout  ']
+        unit = 0
+        do axis = 1, size(steps)
+            if (block%extents(axis, of) > 1) unit = divisor(unit, steps(axis))
+            if (block%extents(axis, of) > 1 .and. steps(axis) <= 0) fault = what//' has strides of '//as_text(steps)// &
+                ' bytes, expected positive ones'
+        end do
+        if (len(fault) > 0 .or. unit == 0) return
+        strides = 1
+        where (block%extents(:size(steps), of) > 1) strides(:size(steps)) = steps / unit
+        if (.not. block%has_strides(of)) block%strides(:, of) = strides
+        block%has_strides(of) = .true.
+        if (all(strides == block%strides(:, of))) return
+        fault = what//' has strides of '//as_text(steps)//' bytes, which are as '//as_text(strides(:size(steps)))// &
+            ', expected as '//as_text(block%strides(:size(steps), of))//': all arrays of the '//trim(things(of))// &
+            ' of a block have one order and padding ('//trim(layouts(of))//' of set_block says which)'
+    end subroutine fit
+
+    pure recursive integer(c_int64_t) function divisor(a, b) result(out)
+        integer(c_int64_t), intent(in) :: a, b
+        out = a
+        if (b /= 0) out = divisor(b, mod(a, b))
+    end function divisor
+
+    ! Without an array that says otherwise, i is fastest and nothing lies between.
+    subroutine pack_strides(block, of)
+        type(block_shape), intent(inout) :: block
+        integer, intent(in) :: of
+        if (block%has_strides(of)) return
+        block%strides(:, of) = [1_c_int64_t, block%extents(1, of), block%extents(1, of) * block%extents(2, of)]
+        where (block%extents(:, of) <= 1) block%strides(:, of) = 1
+        block%has_strides(of) = .true.
+    end subroutine pack_strides
+
+    ! The length of arrays, from the first to the last element of the block.
+    pure integer(c_int64_t) function count_of(block, of)
+        type(block_shape), intent(in) :: block
+        integer, intent(in) :: of
+        type(block_shape) :: packed
+        packed = block
+        if (.not. block%has_strides(of)) &
+            packed%strides(:, of) = [1_c_int64_t, block%extents(1, of), block%extents(1, of) * block%extents(2, of)]
+        count_of = 1 + sum((packed%extents(:, of) - 1) * packed%strides(:, of))
+        if (any(block%extents(:, of) == 0)) count_of = 0
+    end function count_of
+
+    function shape_text(block, of, may_have_components) result(out)
+        type(block_shape), intent(in) :: block
+        integer, intent(in) :: of
+        logical, intent(in) :: may_have_components
+        character(:), allocatable :: out
+        out = as_text(block%extents(:block%dimensions, of))
+        if (may_have_components) out = out//', with components before or after,'
+        out = out//' for the '//trim(merge('vertices', 'cells   ', of == 1))//' of the block'
+    end function shape_text
+
     ! ---- texts ----------------------------------------------------------------------------------------------------
+
+    ! Numbers as in messages: 5, or (1, 12, 144).
+    function as_text(numbers) result(out)
+        integer(c_int64_t), intent(in) :: numbers(:)
+        character(:), allocatable :: out
+        character(24) :: digits
+        integer :: i
+        out = ''
+        do i = 1, size(numbers)
+            write (digits, '(i0)') numbers(i)
+            if (i > 1) out = out//', '
+            out = out//trim(digits)
+        end do
+        if (size(numbers) /= 1) out = '('//out//')'
+    end function as_text
 
     ! A text of C's, as those of a report; valid as long as they are.
     function insitu_text(from) result(out)
@@ -544,13 +868,13 @@ contains
         type(insitu_face_lists), intent(in), optional :: face_lists
         character(:), allocatable :: out
         out = ''
-        if (points(1)%rows /= 1) then
+        if (points(1)%rows /= 1 .or. any(points%dimensions > 1)) then
             out = 'points have another first extent than 2 or 3'
         else if (any(points%columns /= points(1)%columns)) then
             out = 'x, y and z are of different lengths'
         else if (row == 0 .and. .not. is_list(connectivity)) then
             out = 'connectivity or faces have gaps between their columns, which must follow one another'
-        else if (any(lists%rows > 1)) then
+        else if (any(lists%rows > 1 .or. lists%dimensions > 2)) then
             out = 'cell_types, offsets, face_offsets, owner, neighbour, ghosts and vertex_ids are lists, one is a matrix'
         end if
         if (len(out) > 0 .or. .not. present(face_lists)) return
@@ -851,6 +1175,19 @@ contains
         sizes = [sizes, new]
     end subroutine note_size
 
+    ! The shape of a mesh that is a block, for fields at its vertices or in its cells.
+    function block_of(sizes, mesh, centring) result(out)
+        type(mesh_size), allocatable, intent(in) :: sizes(:)
+        character(*), intent(in) :: mesh
+        integer(c_int), intent(in) :: centring
+        type(block_shape) :: out
+        integer :: i
+        if (.not. allocated(sizes) .or. (centring /= INSITU_VERTEX .and. centring /= INSITU_CELL)) return
+        do i = 1, size(sizes)
+            if (sizes(i)%name == trim(mesh)) out = sizes(i)%block
+        end do
+    end function block_of
+
     ! Has the index of a field an entry for each vertex, cell or corner of the mesh? What C refuses anyway is well.
     logical function is_as_long(sizes, mesh, centring, row, length)
         type(mesh_size), allocatable, intent(in) :: sizes(:)
@@ -872,6 +1209,57 @@ contains
         end do
     end function is_as_long
 
+    ! Hand over this rank's part of a mesh as a structured block of so many cells along i, j and k, or along i and j: then
+    ! they are quads. docs/structured.md is the page about blocks. Uniform: spacing and origin (0 by default), of the whole
+    ! lattice, of which first cells lie before the block along each axis. Rectilinear: x, y, z are lists along the axes.
+    ! Curvilinear: x, y, z (i, j, k). Cells with indices from interior_first to interior_last, counted from 1, are drawn,
+    ! the others are ghost layers. vertex_layout, cell_layout: any arrays that lie in memory as those of later fields at
+    ! vertices and in cells do; without them, and where no other array is given, fields are packed with i fastest.
+    subroutine set_block(self, name, cells, status, spacing, origin, first, x, y, z, interior_first, interior_last, ghosts, &
+        vertex_ids, vertex_layout, cell_layout, changed)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        integer, intent(in) :: cells(:)
+        integer, intent(out) :: status
+        real(real64), intent(in), optional :: spacing(:), origin(:)
+        integer, intent(in), optional :: first(:), interior_first(:), interior_last(:), changed
+        type(insitu_array), intent(in), optional :: x, y, z, ghosts, vertex_ids, vertex_layout, cell_layout
+        type(c_mesh), target :: mesh
+        type(c_lattice), target :: lattice
+        type(block_shape) :: block
+        type(block_array) :: laid
+        real(real64), target :: nothing
+        character(:), allocatable :: fault
+        nothing = 0
+        call c_mesh_defaults(mesh)
+        call make_block(cells, lattice, block, fault)
+        if (len(fault) == 0) call put_ranges(lattice, size(cells), fault, spacing, origin, first, interior_first, interior_last)
+        call borrow_for(block, 'vertex_layout', 1, .true., laid, fault, nothing, vertex_layout)
+        call borrow_for(block, 'cell_layout', 2, .true., laid, fault, nothing, cell_layout)
+        call put_places(block, mesh, lattice, 1, 'x', fault, nothing, x)
+        call put_places(block, mesh, lattice, 2, 'y', fault, nothing, y)
+        call put_places(block, mesh, lattice, 3, 'z', fault, nothing, z)
+        call borrow_for(block, 'vertex_ids', 1, .false., laid, fault, nothing, vertex_ids)
+        if (present(vertex_ids)) mesh%vertex_ids = laid%array
+        call borrow_for(block, 'ghosts', 2, .false., laid, fault, nothing, ghosts)
+        if (present(ghosts)) mesh%ghosts = laid%array
+        if (len(fault) == 0) fault = find_zero(name)
+        status = INSITU_ERROR_ARGUMENT
+        if (is_refused(self, fault)) return
+        call pack_strides(block, 1)
+        call pack_strides(block, 2)
+        lattice%vertex_strides = block%strides(:, 1)
+        lattice%cell_strides = block%strides(:, 2)
+        mesh%vertex_count = count_of(block, 1)
+        mesh%cell_count = count_of(block, 2)
+        mesh%index_base = 1
+        if (present(changed)) mesh%changed = changed
+        mesh%lattice = c_loc(lattice)
+        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_loc(mesh)), status)
+        if (status /= INSITU_OK) return
+        call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0, block))
+    end subroutine set_block
+
     ! Take this rank's part of a mesh away.
     subroutine remove_mesh(self, name, status)
         class(insitu_session), intent(inout) :: self
@@ -882,7 +1270,8 @@ contains
         call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_null_ptr), status)
     end subroutine remove_mesh
 
-    ! Hand over this rank's part of a field: a list, or a matrix (components, tuples). index: the tuple that each
+    ! Hand over this rank's part of a field: a list, or a matrix (components, tuples); on a block (i, j, k), with
+    ! components before or after. index: the tuple that each
     ! vertex, cell or corner has, from 1 or from the mesh's index_base; for corners a list, or a matrix (corners,
     ! cells), also its first rows. corner_row, for corners: tuples (or entries of a list index) from the first of a cell
     ! to that of the next. patches, for cells: the values on the boundary.
@@ -895,6 +1284,8 @@ contains
         type(insitu_array), intent(in), optional :: index
         type(insitu_patch), intent(in), optional :: patches(:)
         type(c_patch), allocatable, target :: table(:)
+        type(block_shape) :: block
+        type(block_array) :: laid
         integer(c_int64_t) :: entries
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(c_field) :: field
@@ -913,9 +1304,19 @@ contains
         field%values = as_c(values, nothing)
         field%values%stride = values%stride
         status = INSITU_ERROR_ARGUMENT
-        if (is_refused(self, find_zero(name, mesh))) return
-        fault = ''
+        fault = find_zero(name, mesh)
+        block = block_of(self%sizes, mesh, field%centring)
+        if (block%dimensions > 0) call borrow_for(block, 'index', field%centring + 1, .false., laid, fault, nothing, index)
         if (present(index)) then
+            field%index = laid%array
+        else if (block%dimensions > 0) then
+            call put_block_values(block, field, values, nothing, fault)
+        end if
+        if (len(fault) == 0 .and. (block%dimensions == 0 .or. present(index)) .and. values%dimensions > 2) &
+            fault = 'values have '//as_text([int(values%dimensions, c_int64_t)])//' dimensions, expected a list or a matrix: '// &
+            'the mesh is no block, or an index is given'
+        if (is_refused(self, fault)) return
+        if (present(index) .and. block%dimensions == 0) then
             field%index = as_c(index, nothing)
             if (field%centring == INSITU_CORNER .and. .not. present(corner_row)) field%corner_row = row_of(index)
             entries = index%rows * index%columns &
@@ -942,6 +1343,20 @@ contains
         call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
     end subroutine set_field
 
+    subroutine put_block_values(block, field, values, nothing, fault)
+        type(block_shape), intent(inout) :: block
+        type(c_field), intent(inout) :: field
+        type(insitu_array), intent(in) :: values
+        real(real64), intent(in), target :: nothing
+        character(:), allocatable, intent(inout) :: fault
+        type(block_array) :: laid
+        call borrow_for(block, 'values', field%centring + 1, .true., laid, fault, nothing, values)
+        field%values = laid%array
+        field%count = laid%count
+        field%component_count = int(laid%components, c_int)
+        field%component_stride = laid%component_stride
+    end subroutine put_block_values
+
     ! Lengths that C is not told, and would read beyond.
     function find_patch_fault(patches, components) result(out)
         type(insitu_patch), intent(in) :: patches(:)
@@ -956,6 +1371,8 @@ contains
                 out = 'a patch has not as many values as faces'
             else if (is_given(patches(i)%offsets) .and. patches(i)%offsets%columns /= patches(i)%values%columns + 1) then
                 out = 'offsets of a patch are not one more than its values'
+            else if (any([patches(i)%values%dimensions, patches(i)%faces%dimensions, patches(i)%offsets%dimensions] > 2)) then
+                out = 'arrays of patches are lists or matrices, one has more dimensions'
             else if (patches(i)%faces%rows > 1 .or. patches(i)%offsets%rows > 1) then
                 out = 'faces and offsets of patches are lists, one is a matrix'
             else if (.not. is_list(patches(i)%connectivity)) then
@@ -1002,12 +1419,19 @@ contains
         call c_f_pointer(data, record)
         call record%fill(values, own_status)
         status = int(own_status, c_int)
+        record%fault = ''
         if (own_status /= INSITU_OK) return
         field%count = values%columns
         field%component_count = int(values%rows, c_int)
         field%component_stride = values%row_stride
         field%values = as_c(values, nothing)
         field%values%stride = values%stride
+        if (record%block%dimensions > 0) then
+            call put_block_values(record%block, field, values, nothing, record%fault)
+        else if (values%dimensions > 2) then
+            record%fault = 'values have more than two dimensions, and the mesh is no block'
+        end if
+        if (len(record%fault) > 0) status = INSITU_ERROR_FIELD
     end function run_fill
 
     ! The record of the field, a new one if it has none.
@@ -1021,6 +1445,7 @@ contains
             out => out%next
         end do
         allocate (out)
+        out%fault = ''
         out%mesh = trim(mesh)
         out%field = trim(name)
         out%next => self%fills
@@ -1045,6 +1470,7 @@ contains
         field%name = c_loc(c_name)
         if (present(centring)) field%centring = centring
         if (present(components)) field%component_count = components
+        record%block = block_of(self%sizes, mesh, field%centring)
         field%fill = c_funloc(run_fill)
         field%fill_data = c_loc(record)
         call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
@@ -1097,8 +1523,16 @@ contains
         integer, intent(in) :: cycle
         real(real64), intent(in) :: time
         integer, intent(out) :: status
+        type(fill_record), pointer :: record
         self%own_error = ''
         call take_status(self, c_step(self%handle, int(cycle, c_int64_t), real(time, c_double)), status)
+        record => self%fills
+        do while (associated(record))
+            if (status /= INSITU_OK .and. len(record%fault) > 0) &
+                self%own_error = insitu_text(c_error(self%handle))//': '//record%fault
+            record%fault = ''
+            record => record%next
+        end do
     end subroutine step
 
     ! The report of the last step. All zero before the first.

@@ -12,6 +12,7 @@ closed. Errors are exceptions. insitu.h says more of each argument; docs/python.
 
 import collections
 import ctypes
+import math
 import operator
 import os
 import re
@@ -42,6 +43,20 @@ class _Array(ctypes.Structure):
     _fields_ = [("data", ctypes.c_void_p), ("type", ctypes.c_int), ("stride_bytes", ctypes.c_int64)]
 
 
+class _Lattice(ctypes.Structure):
+    _fields_ = [
+        ("cells", ctypes.c_int64 * 3),
+        ("vertex_strides", ctypes.c_int64 * 3),
+        ("cell_strides", ctypes.c_int64 * 3),
+        ("interior_first", ctypes.c_int64 * 3),
+        ("interior_end", ctypes.c_int64 * 3),
+        ("origin", ctypes.c_double * 3),
+        ("spacing", ctypes.c_double * 3),
+        ("first", ctypes.c_int64 * 3),
+        ("axes", _Array * 3),
+    ]
+
+
 class _Mesh(ctypes.Structure):
     _fields_ = [
         ("vertex_count", ctypes.c_int64),
@@ -68,6 +83,7 @@ class _Mesh(ctypes.Structure):
         ("keep_polyhedra", ctypes.c_int),
         ("vertex_order", ctypes.c_int),
         ("connectivity_row", ctypes.c_int64),
+        ("lattice", ctypes.POINTER(_Lattice)),
         ("boundary_face_count", ctypes.c_int64),
         ("boundary_face_offsets", _Array),
         ("boundary_face_connectivity_count", ctypes.c_int64),
@@ -300,7 +316,148 @@ def _axes(given):
     return arrays, axes[0][1], [held for _, _, held in axes]
 
 
-def _put_values(field, given):
+def _numbers(what, given, count, convert, rest=0):
+    """Three numbers, of which an array of two dimensions may lack the third: then it is the rest."""
+    numbers = tuple(convert(n) for n in given)
+    if len(numbers) not in (count, 3):
+        raise ValueError(f"{what}: has {len(numbers)} numbers, expected {count}, one for each axis")
+    for n in numbers:
+        if not -2**63 <= n < 2**63 and convert is operator.index:
+            raise ValueError(f"{what}: has the number {n}, expected whole numbers of 64 bits")
+    return numbers + (rest,) * (3 - len(numbers))
+
+
+class _Block:
+    """How the arrays of a structured block lie. Pairs are of its vertices and its cells, in the order of VERTEX and CELL.
+    Strides are whole numbers without a common divisor, so that arrays of any element types and any numbers of components
+    have the same ones; the first array decides on them."""
+
+    def __init__(self, name, cells):
+        if len(cells) not in (2, 3) or min(cells) < 0 or (0 in cells and any(cells)):
+            raise ValueError(f"cells: are {cells}, expected two or three numbers of at least 1, or all 0 without cells")
+        if math.prod(cells) > 4294967294:
+            raise ValueError(f"cells: {cells} are too many, expected at most 4294967294 in all")
+        self.name, self.is_empty = name, not any(cells)
+        self.extents = tuple(n + (not self.is_empty) for n in cells), cells
+        self.strides = [None, None]
+
+    def strides_of(self, of):
+        """The strides; if no array has decided on them, those of packed arrays [i, j, k]."""
+        if self.strides[of] is None:
+            extents = self.extents[of]
+            self.strides[of] = tuple(math.prod(extents[axis + 1:]) for axis in range(len(extents)))
+        return self.strides[of]
+
+    def count(self, of):
+        """The length of arrays, from the first to the last element of the block."""
+        if self.is_empty:
+            return 0
+        return 1 + sum((n - 1) * stride for n, stride in zip(self.extents[of], self.strides_of(of)))
+
+    def borrow(self, what, given, of, may_have_components=False):
+        """The caller's array of values at the vertices or in the cells: the array of the C interface, the number of
+        components and their stride in bytes, and what is borrowed. It is [i, j, k], with components before or after, or
+        a list as long as the block's arrays."""
+        extents = self.extents[of]
+        rank = len(extents)
+        array = _view(what, given, (1, rank, rank + 1) if may_have_components else (1, rank))
+        if array.ndim == 1:
+            return self._list(what, array, of), 1, 0, array
+        before = 0 if array.ndim == rank or array.shape[:rank] == extents else 1
+        after = array.ndim - rank - before
+        shape = array.shape[before:array.ndim - after]
+        apart = (array.shape[:before] + array.shape[array.ndim - after:] + (1,))[0]
+        step = (array.strides[:before] + array.strides[array.ndim - after:] + (0,))[0] if apart > 1 else 0
+        if self.is_empty:
+            return _strided(what, array.reshape(-1)[:0], 0), apart, 0, array
+        if shape != extents:
+            raise ValueError(f"{what}: has the shape {array.shape}, expected {self._shapes(of, may_have_components)}")
+        if apart > 1 and step == 0:
+            raise ValueError(f"{what}: repeats one element (a stride of 0), expected an array with memory of its own")
+        unit = self._fit(what, of, array.strides[before:array.ndim - after], array.itemsize)
+        return _Array(array.ctypes.data, _TYPES[array.dtype.name], unit), apart, step, array
+
+    def _shapes(self, of, may_have_components):
+        text = f"{self.extents[of]}" + (", with components before or after," if may_have_components else "")
+        return f"{text} for the {('vertices', 'cells')[of]} of block \"{self.name}\""
+
+    def _list(self, what, array, of):
+        if array.size != self.count(of):
+            raise ValueError(f"{what}: is a list of {array.size}, expected one of {self.count(of)}, or the shape "
+                             f"{self._shapes(of, False)}")
+        return _strided(what, array, array.strides[0])
+
+    def _fit(self, what, of, steps, itemsize):
+        """The common divisor of the steps, in bytes. Along an axis with one index a step means nothing."""
+        used = [step for step, n in zip(steps, self.extents[of]) if n > 1]
+        if min(used, default=1) <= 0:
+            raise ValueError(f"{what}: has strides of {steps} bytes, expected positive ones: it runs backwards or repeats "
+                             "elements")
+        unit = math.gcd(*used) or itemsize
+        if unit % itemsize:
+            raise ValueError(f"{what}: has strides of {steps} bytes, expected multiples of its elements' {itemsize}")
+        strides = tuple(step // unit if n > 1 else 1 for step, n in zip(steps, self.extents[of]))
+        if self.strides[of] is None:
+            self.strides[of] = strides
+        expected = self.strides[of]
+        if any(n > 1 and a != b for a, b, n in zip(strides, expected, self.extents[of])):
+            thing = ("vertices", "cells")[of]
+            raise ValueError(f"{what}: has strides of {steps} bytes, which are as {strides}, expected as {expected}: all "
+                             f"arrays of the {thing} of block \"{self.name}\" have one order and padding (set_block's "
+                             f"{('vertex_layout', 'cell_layout')[of]} says which)")
+        return unit
+
+
+def _put_places(lattice, rank, spacing, origin, first):
+    """Gives a uniform block its coordinates."""
+    if spacing is None and (origin is not None or first is not None):
+        raise TypeError("spacing: is not given, and origin or first is; expected it for a uniform block")
+    if spacing is not None:
+        lattice.spacing[:] = _numbers("spacing", spacing, rank, float, 0.0)
+        lattice.origin[:] = _numbers("origin", (0, 0, 0) if origin is None else origin, rank, float, 0.0)
+        lattice.first[:] = _numbers("first", (0, 0, 0) if first is None else first, rank, operator.index)
+
+
+def _put_interior(lattice, rank, first, end):
+    if (first is None) != (end is None):
+        raise TypeError("interior_first, interior_end: one is given, expected both or none")
+    if first is not None:
+        lattice.interior_first[:] = _numbers("interior_first", first, rank, operator.index)
+        lattice.interior_end[:] = _numbers("interior_end", end, rank, operator.index, 1)
+        if not any(lattice.interior_first) and not any(lattice.interior_end):  # all 0 would mean all cells to C
+            lattice.interior_first[0] = lattice.interior_end[0] = 1
+
+
+def _put_coordinates(block, given, mesh, lattice):
+    """Gives a block its coordinates along the axes or at the vertices; returns what is borrowed."""
+    rank = len(block.extents[CELL])
+    if isinstance(given, (tuple, list)) and all(numpy.ndim(axis) == 1 for axis in given):
+        axes = [_list(f"coordinates[{i}]", axis) for i, axis in enumerate(given)]
+        if len(axes) not in (rank, 3):
+            raise ValueError(f"coordinates: are along {len(axes)} axes, expected {rank}")
+        for i, (n, (_, size, _)) in enumerate(zip(block.extents[VERTEX] + (1,), axes)):
+            if size != n and not block.is_empty:
+                raise ValueError(f"coordinates[{i}]: has {size} elements, expected {n}, one more than there are cells")
+        lattice.axes[:len(axes)] = [array for array, _, _ in axes]
+        return [held for _, _, held in axes]
+    if isinstance(given, (tuple, list)):
+        made = [block.borrow(f"coordinates[{i}]", axis, VERTEX) for i, axis in enumerate(given)]
+        axes, held = [array for array, _, _, _ in made], [held for _, _, _, held in made]
+    else:
+        array, count, step, held = block.borrow("coordinates", given, VERTEX, True)
+        axes = [_Array((array.data or 0) + i * step, array.type, array.stride_bytes) for i in range(count)]
+    if len(axes) != 3:
+        raise ValueError(f"coordinates: are {len(axes)} for each vertex, expected x, y and z")
+    mesh.coordinates[:] = axes
+    return [held]
+
+
+def _put_values(field, given, block=None):
+    if block is not None and field.centring in (VERTEX, CELL):
+        field.count = block.count(field.centring)
+        field.values, field.component_count, field.component_stride_bytes, array = block.borrow(
+            "values", given, field.centring, True)
+        return array
     array = _view("values", given, (1, 2))
     field.count, field.component_count, field.component_stride_bytes = array.shape[0], 1, 0
     if array.ndim == 2:
@@ -341,13 +498,13 @@ def _patches(field, given):
     return [table, *(held for _, held in made)]
 
 
-def _fill_by(make, index, row, made, raised, running):
+def _fill_by(make, index, row, block, made, raised, running):
     """A C function that has make() give the values. made: holds them until the step is over; raised: what went wrong;
     running: holds something while make() runs."""
     def fill(_, field):
         running.append(make)
         try:
-            made.append(_put_values(field.contents, make()))
+            made.append(_put_values(field.contents, make(), block))
             field.contents.index, field.contents.corner_row = index, row
             return 0
         except BaseException as error:  # C must not be passed by
@@ -367,6 +524,7 @@ class Session:
             raise TypeError("scene, scene_text: both are given, expected one of them")
         self._session = ctypes.c_void_p()
         self._counts = {}  # mesh: its vertices, cells and corners, and the vertices of a cell
+        self._blocks = {}  # mesh: its _Block, if it is one
         self._held = {}  # mesh: {None: what the mesh borrows, field: what that borrows}
         self._retired = []  # borrowed before it was set again: until a step has returned
         self._made = []  # by callables: until the step has returned
@@ -431,16 +589,58 @@ class Session:
         size = _CORNERS.get(mesh.cell_type, 0) if cell_types is None and offsets is None else 0
         corners = mesh.cell_count * size if size else mesh.connectivity_count
         self._counts[name] = mesh.vertex_count, mesh.cell_count, corners, size
+        self._blocks.pop(name, None)
+
+    def set_block(self, name, cells, *, spacing=None, origin=None, first=None, coordinates=None, interior_first=None,
+                  interior_end=None, ghosts=None, vertex_ids=None, vertex_layout=None, cell_layout=None,
+                  changed=CHANGED_ALL):
+        """Hand over this rank's part of a mesh as a structured block of so many cells along i, j and k, or along i and j:
+        then they are quads. Local. All arrays are [i, j, k], in any order and with any padding, in one of the vertices
+        and in one of the cells. docs/structured.md is the page about blocks.
+
+        Uniform: spacing and origin (0 by default), of the whole lattice, in which the block's first vertex has the indices
+        first. Rectilinear: coordinates=(x, y, z), lists along the axes. Curvilinear: coordinates=(x, y, z), arrays, or
+        one array with components x, y, z. Cells from interior_first to interior_end - 1 are drawn, the others are ghost
+        layers. vertex_layout, cell_layout: any arrays that lie as those of later fields do; without them, and where no
+        other array is given, fields are packed with k fastest."""
+        mesh, lattice, held = _Mesh(), _Lattice(), []
+        _library.insitu_mesh_defaults(ctypes.byref(mesh))
+        cells = tuple(map(operator.index, cells))
+        block = _Block(name, cells)
+        rank = len(cells)
+        if (spacing is None) == (coordinates is None):
+            raise TypeError("spacing, coordinates: expected one of them")
+        lattice.cells[:] = _numbers("cells", cells, rank, operator.index)
+        _put_places(lattice, rank, spacing, origin, first)
+        _put_interior(lattice, rank, interior_first, interior_end)
+        for what, given, of in ("vertex_layout", vertex_layout, VERTEX), ("cell_layout", cell_layout, CELL):
+            if given is not None:
+                block.borrow(what, given, of, True)
+        if coordinates is not None:
+            held += _put_coordinates(block, coordinates, mesh, lattice)
+        for key, given, of in ("vertex_ids", vertex_ids, VERTEX), ("ghosts", ghosts, CELL):
+            if given is not None:
+                borrowed, _, _, array = block.borrow(key, given, of)
+                setattr(mesh, key, borrowed)
+                held.append(array)
+        for of, strides in (VERTEX, lattice.vertex_strides), (CELL, lattice.cell_strides):
+            strides[:] = block.strides_of(of) + (1,) * (3 - rank)
+        mesh.vertex_count, mesh.cell_count, mesh.changed = block.count(VERTEX), block.count(CELL), changed
+        mesh.lattice = ctypes.pointer(lattice)
+        self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
+        self._counts[name] = mesh.vertex_count, mesh.cell_count, 0, 0
+        self._blocks[name] = block
 
     def remove_mesh(self, name):
         """Take this rank's part of a mesh away, and its fields. Local."""
         _check(_library.insitu_set_mesh(self._open(), _encoded("name", name), None), self._session, False)
         self._retired.append(self._held.pop(name, None))
+        self._blocks.pop(name, None)
 
     def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
                   patches=(), changed=CHANGED_ALL):
-        """Hand over this rank's part of a field: values of n tuples, or n x components. index: the tuple that each
-        vertex, cell or corner has, from the mesh's index_base on; for corners it may be the first columns of a table:
+        """Hand over this rank's part of a field: values of n tuples, or n x components; on a block [i, j, k], or with
+        components before or after. index: the tuple that each vertex, cell or corner has, from the mesh's index_base on; for corners it may be the first columns of a table:
         dofs[:, :8]. corner_row, for corners: values (or entries of index) from one cell's first to the next one's.
         patches, for cells: the values on the boundary, each a Patch.
 
@@ -455,12 +655,12 @@ class Session:
         if callable(values):
             if len(patches) > 0:
                 raise TypeError("patches: are given, and values are made by a callable; expected an array of values")
-            field.fill = _fill_by(values, borrowed, corner_row, self._made, self._raised,
-                                  self._running)
+            field.fill = _fill_by(values, borrowed, corner_row, None if index is not None else self._blocks.get(mesh),
+                                  self._made, self._raised, self._running)
             field.component_count = components
             held.append(field.fill)
         else:
-            held.append(_put_values(field, values))
+            held.append(_put_values(field, values, None if index is not None else self._blocks.get(mesh)))
             field.index = borrowed
             held.append(_patches(field, patches))
         field.corner_row = corner_row
@@ -564,8 +764,11 @@ class Session:
 
     def _index(self, mesh, given, centring, row):
         """The index of a field, its length, and its row where it is of corners and has gaps."""
-        counts = self._counts.get(mesh)
-        if centring != CORNER or counts is None:
+        counts, block = self._counts.get(mesh), self._blocks.get(mesh)
+        if block is not None and centring in (VERTEX, CELL):
+            borrowed, _, _, array = block.borrow("index", given, centring)
+            return borrowed, None, row, array
+        if centring != CORNER or counts is None or block is not None:
             borrowed, size, array = _list("index", given)
             expected = size if counts is None else counts[centring == CELL]
         elif numpy.ndim(given) == 2:
