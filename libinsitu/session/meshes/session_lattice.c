@@ -135,6 +135,9 @@ static insitu_status check_interior(const insitu_lattice *l, base_error *error)
     return INSITU_OK;
 }
 
+/* Beyond it some whole numbers have no double. */
+static const int64_t largest_first = (int64_t)1 << 53;
+
 static insitu_status check_uniform(const insitu_lattice *l, base_error *error)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -143,6 +146,9 @@ static insitu_status check_uniform(const insitu_lattice *l, base_error *error)
                              l->origin[axis], l->spacing[axis], axis_name[axis]);
         if (l->spacing[axis] == 0 && l->cells[axis])
             return base_fail(error, INSITU_ERROR_MESH, "lattice: the spacing along %c is 0", axis_name[axis]);
+        if (l->first[axis] < -largest_first || l->first[axis] > largest_first)
+            return base_fail(error, INSITU_ERROR_MESH, "lattice: first along %c is %lld, expected at most %lld in size",
+                             axis_name[axis], (long long)l->first[axis], (long long)largest_first);
     }
     if (is_rectilinear(l))
         return base_fail(error, INSITU_ERROR_MESH,
@@ -198,6 +204,9 @@ insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error)
         return base_fail(error, INSITU_ERROR_MESH,
                          "lattice: %s and coordinates of vertices are given: give one of them",
                          is_uniform(l) ? "spacing" : "axes");
+    if (!status && !session_has_axes(mesh) && !mesh->coordinates[0].data && !mesh->coordinates[1].data &&
+        !mesh->coordinates[2].data)
+        return base_fail(error, INSITU_ERROR_MESH, "lattice: neither spacing nor axes nor coordinates are given");
     if (!status && is_uniform(l)) status = check_uniform(l, error);
     if (!status && !is_uniform(l) && is_rectilinear(l)) status = check_axes(l, error);
     return status;

@@ -238,13 +238,13 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
 static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
 {
     insitu_status status = check_counts(mesh, error);
+    if (!status && mesh->lattice) status = session_check_lattice(mesh, error);
     if (!status) status = check_arrays(mesh, error);
     if (!status) status = check_choices(mesh, error);
     if (!status) status = check_face_lists(mesh, error);
     if (!status) status = check_owner(mesh, error);
     if (!status) status = check_shape(mesh, error);
     if (!status) status = check_rows(mesh, error);
-    if (!status && mesh->lattice) status = session_check_lattice(mesh, error);
     return status;
 }
 

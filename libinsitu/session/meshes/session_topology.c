@@ -87,6 +87,7 @@ void session_read_topology(session_mesh *mesh)
 
 int session_given_type(const session_mesh *mesh, int64_t cell)
 {
+    if (mesh->cells.lattice) return mesh->cells.cell_type;
     const grid given = as_grid(&mesh->given);
     return grid_cell_type(&given, cell);
 }
