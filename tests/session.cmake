@@ -20,6 +20,10 @@ insitu_add_mpi_test(session_recentre test_session_recentre 1 3 WHOLE 2 4 7 TIMEO
 insitu_session_program(test_session_lattice)
 insitu_add_mpi_test(session_lattice test_session_lattice 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_lattice_changes)
+insitu_add_mpi_test(session_lattice_changes test_session_lattice_changes 1 3 WHOLE 2 TIMEOUT 120
+  ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_slices)
 insitu_add_mpi_test(session_slices test_session_slices 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -278,7 +278,7 @@ contains
         call s%set_block('m', [huge(1), huge(1), huge(1)], status, spacing=spacing)
         call refused(s, 'too many, expected at most 4294967294')
         call s%set_block('m', cells, status)
-        call refused(s, 'coordinates are not given')
+        call refused(s, 'lattice: neither spacing nor axes nor coordinates are given')
         call s%set_block('m', cells, status, spacing=spacing(:1))
         call refused(s, 'spacing has 1 numbers, expected 3')
         call s%set_block('m', cells, status, spacing=[1.0_real64, 0.0_real64, 1.0_real64])
