@@ -271,7 +271,7 @@ void session_take_lattice(session_mesh *mesh)
         out->cells[axis] = l->cells[axis];
         out->drawn_first[axis] = has_all ? 0 : l->interior_first[axis];
         out->drawn_end[axis] = has_all ? cells[axis] : l->interior_end[axis];
-        out->axes[axis] = (grid_axis){NULL, vertices[axis], &out->by_vertex, axis};
+        out->axes[axis] = (grid_axis){own->places[axis], vertices[axis], &out->by_vertex, axis};
     }
     packed_strides(vertices, packed);
     out->by_vertex = number(are_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
