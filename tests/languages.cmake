@@ -18,6 +18,19 @@ foreach(example finite_volume finite_elements)
   insitu_add_same_pictures_test(${example}_example_draws_on_2_ranks $<TARGET_FILE:${example}>)
 endforeach()
 
+# Structured blocks: a domain is the same picture on 1 rank and on 2, whose blocks are others.
+function(insitu_add_block_example name scene)
+  add_test(NAME ${name}_example_draws_the_same_on_2_ranks
+    COMMAND ${CMAKE_COMMAND} "-DPROGRAM=${ARGN}" "-DTRUTH=${ARGN}" -DTRUTH_RANKS=1
+      -DSCENE=${PROJECT_SOURCE_DIR}/examples/${scene}.yaml -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}_example
+      "-DMPIRUN=${MPIEXEC_EXECUTABLE};${MPIEXEC_NUMPROC_FLAG}" -P ${CMAKE_CURRENT_SOURCE_DIR}/languages_run.cmake)
+  set_tests_properties(${name}_example_draws_the_same_on_2_ranks PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}"
+    TIMEOUT 120 PROCESSORS 2)
+endfunction()
+add_executable(blocks ${PROJECT_SOURCE_DIR}/examples/blocks.c)
+target_link_libraries(blocks PRIVATE insitu insitu_flags m)
+insitu_add_block_example(blocks blocks $<TARGET_FILE:blocks>)
+
 # C++: from the header alone, under more warnings than our own code has. MPI's header is the system's, and not asked.
 add_executable(six_calls_cpp ${PROJECT_SOURCE_DIR}/examples/six_calls.cpp)
 set_target_properties(six_calls_cpp PROPERTIES CXX_EXTENSIONS OFF) # -std=c++17
@@ -41,17 +54,19 @@ else()
   set_target_properties(insitu_fortran PROPERTIES Fortran_MODULE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/fortran)
   target_include_directories(insitu_fortran PUBLIC ${CMAKE_CURRENT_BINARY_DIR}/fortran)
   add_executable(six_calls_fortran ${PROJECT_SOURCE_DIR}/examples/six_calls.f90)
+  add_executable(curvilinear ${PROJECT_SOURCE_DIR}/examples/curvilinear.f90)
   add_executable(test_fortran test_fortran.f90 test_fortran_blocks.f90)
-  foreach(target insitu_fortran six_calls_fortran test_fortran)
+  foreach(target insitu_fortran six_calls_fortran curvilinear test_fortran)
     if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
       target_compile_options(${target} PRIVATE -std=f2008 -Wall -Wextra -Wno-function-elimination ${insitu_werror}
         -fcheck=all -ffp-contract=off)
     endif()
   endforeach()
-  foreach(target six_calls_fortran test_fortran)
+  foreach(target six_calls_fortran curvilinear test_fortran)
     target_link_libraries(${target} PRIVATE insitu_fortran)
   endforeach()
   insitu_add_same_pictures_test(fortran_example_draws_on_2_ranks $<TARGET_FILE:six_calls_fortran>)
+  insitu_add_block_example(curvilinear curvilinear $<TARGET_FILE:curvilinear>)
   insitu_add_mpi_test(fortran test_fortran 1 2 ARGS ${CMAKE_CURRENT_BINARY_DIR}/fortran_)
 endif()
 
@@ -65,6 +80,7 @@ else()
     ${PROJECT_SOURCE_DIR}/examples/six_calls.py)
   insitu_add_same_pictures_test(discontinuous_example_draws_on_2_ranks ${INSITU_TEST_PYTHON}
     ${PROJECT_SOURCE_DIR}/examples/discontinuous.py)
+  insitu_add_block_example(uniform_block blocks ${INSITU_TEST_PYTHON} ${PROJECT_SOURCE_DIR}/examples/uniform_block.py)
   # Telling what has changed saves work and changes no picture: the program that tells nothing draws the same.
   set(moving_mesh ${PROJECT_SOURCE_DIR}/examples/moving_mesh.py)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${moving_mesh})
@@ -90,7 +106,7 @@ else()
       TIMEOUT 7200 LABELS long)
   endif()
   foreach(test python_example_draws_on_2_ranks discontinuous_example_draws_on_2_ranks
-      moving_mesh_example_draws_on_2_ranks python_np1 python_np2)
+      moving_mesh_example_draws_on_2_ranks uniform_block_example_draws_the_same_on_2_ranks python_np1 python_np2)
     set_tests_properties(${test} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}" TIMEOUT 120
       PROCESSORS 2)
   endforeach()

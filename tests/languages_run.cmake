@@ -1,10 +1,10 @@
 # cmake -DPROGRAM=<command, a list> -DTRUTH=<the same, or a folder of its pictures> -DSCENE=... -DFOLDER=...
-# -DMPIRUN=<command, a list> -P languages_run.cmake: PROGRAM writes the pictures that TRUTH writes, to the byte, on 2 ranks,
-# and nothing on the standard output.
-function(draw folder)
+# -DMPIRUN=<command, a list> [-DTRUTH_RANKS=n] -P languages_run.cmake: PROGRAM on 2 ranks writes the pictures that TRUTH
+# writes on as many, or on n, to the byte, and nothing on the standard output.
+function(draw folder ranks)
   file(REMOVE_RECURSE ${folder})
   file(MAKE_DIRECTORY ${folder})
-  execute_process(COMMAND ${MPIRUN} 2 ${ARGN} ${SCENE} WORKING_DIRECTORY ${folder}
+  execute_process(COMMAND ${MPIRUN} ${ranks} ${ARGN} ${SCENE} WORKING_DIRECTORY ${folder}
     RESULT_VARIABLE status OUTPUT_VARIABLE out ERROR_VARIABLE complaints)
   if(NOT status EQUAL 0 OR NOT "${out}${complaints}" STREQUAL "")
     message(FATAL_ERROR "${ARGN}: status ${status}, output: ${out}${complaints}")
@@ -13,10 +13,13 @@ endfunction()
 set(truth ${TRUTH})
 if(NOT IS_DIRECTORY "${TRUTH}")
   set(truth ${FOLDER}/TRUTH)
-  draw(${truth} ${TRUTH})
+  if(NOT TRUTH_RANKS)
+    set(TRUTH_RANKS 2)
+  endif()
+  draw(${truth} ${TRUTH_RANKS} ${TRUTH})
 endif()
 set(found ${FOLDER}/PROGRAM)
-draw(${found} ${PROGRAM})
+draw(${found} 2 ${PROGRAM})
 foreach(who truth found)
   file(GLOB_RECURSE ${who}_pictures RELATIVE ${${who}} ${${who}}/*)
 endforeach()

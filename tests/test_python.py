@@ -2,6 +2,7 @@
 and what cannot be borrowed, or is wrong, is an exception. Verdicts are reduced, so that no rank waits for one that failed."""
 
 import gc
+import math
 import os
 import re
 import sys
@@ -253,6 +254,53 @@ def blocks_are_their_hexes():
         s.set_field("m", "f", f.copy(), index=numpy.arange(n**3).reshape(n, n, n).transpose(2, 1, 0).copy())
 
     everywhere(drawn("block", indexed) == plain[insitu.VERTEX], "values by an index [i, j, k]")
+
+    def mirrored(s):
+        s.set_block("m", cells, spacing=(1, -1, 1), first=(4 * comm.rank, -4, 0))
+        s.set_field("m", "f", values[:, ::-1].copy())
+
+    def downwards(s):
+        s.set_block("m", cells, coordinates=(axes[0] * 1.0, axes[1] * 1.0, axes[2][::-1] * 1.0))
+        s.set_field("m", "f", values[:, :, ::-1].copy())
+
+    everywhere(drawn("block", mirrored) == plain[insitu.VERTEX], "a negative spacing")
+    everywhere(drawn("block", downwards) == plain[insitu.VERTEX], "an axis that runs downwards")
+
+
+def levels_are_their_hexes():
+    """A coarse level under a finer one of ratio 2 on each rank, cell values, isosurfaces across both: bitwise the hexes, of
+    which none is covered. Ghosts flag the covered ones."""
+    origin, spacing = (0.1, -0.3, 0.7), (0.3, 0.2, 0.25)
+
+    def centres(first, cells, ratio):
+        return numpy.meshgrid(*(origin[a] + spacing[a] / ratio * (first[a] + numpy.arange(cells[a]) + 0.5) for a in range(3)),
+                              indexing="ij")
+
+    levels = {"coarse": ((4 * comm.rank, 0, 0), (4, 6, 6), 1), "fine": ((8 * comm.rank + 2, 4, 4), (4, 4, 6), 2)}
+    covered = numpy.zeros((4, 6, 6), bool)
+    covered[1:3, 2:4, 2:5] = True
+
+    def set_blocks(s):
+        for name, (first, cells, ratio) in levels.items():
+            s.set_block(name, cells, origin=origin, spacing=tuple(h / ratio for h in spacing), first=first,
+                        ghosts=covered if ratio == 1 else None)
+            x, y, z = centres(first, cells, ratio)
+            s.set_field(name, "f", 1 + 0.4 * x + numpy.sin(3 * y) * z, centring=insitu.CELL)
+
+    def set_hexes(s):
+        for name, (first, cells, ratio) in levels.items():
+            axes = [origin[a] + spacing[a] / ratio * (first[a] + numpy.arange(cells[a] + 1)) for a in range(3)]
+            corners = numpy.arange(math.prod(n + 1 for n in cells)).reshape([n + 1 for n in cells])
+            low, high = slice(None, -1), slice(1, None)
+            around = [(low, low), (high, low), (high, high), (low, high)]
+            hexes = numpy.stack([corners[i, j, k] for k in (low, high) for i, j in around], axis=-1)
+            own = ~covered if ratio == 1 else numpy.ones(cells, bool)
+            s.set_mesh(name, coordinates=tuple(a.reshape(-1) for a in numpy.meshgrid(*axes, indexing="ij")),
+                       connectivity=hexes[own], cell_type=insitu.HEX)
+            x, y, z = centres(first, cells, ratio)
+            s.set_field(name, "f", (1 + 0.4 * x + numpy.sin(3 * y) * z)[own], centring=insitu.CELL)
+
+    everywhere(drawn("levels", set_blocks) == drawn("levels", set_hexes), "levels of blocks are levels of hexes")
 
 
 def blocks_of_two_dimensions_are_their_quads():
@@ -671,6 +719,7 @@ planes_go_without_z()
 what_cannot_be_borrowed_is_refused()
 parameters_are_numbers()
 blocks_are_their_hexes()
+levels_are_their_hexes()
 blocks_of_two_dimensions_are_their_quads()
 wrong_blocks_are_refused()
 pictures_are_arrays()
