@@ -442,14 +442,9 @@ static void changed_blocks_are_drawn_as_new_ones(void **state)
     free(b);
 }
 
-static int run(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_blocks_are_told_to_all_ranks),
                                        cmocka_unit_test(changed_blocks_are_drawn_as_new_ones)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
-
-int main(int argc, char **argv)
-{
-    return run_session_tests(argc, argv, run);
+    return run_session_tests(argc, argv, tests, NULL, NULL);
 }
