@@ -16,9 +16,9 @@ typedef struct session_extent {
     int rank_count;      /* ranks that have some */
 } session_extent;
 
-/* The axis that flat data is flat along; -1 if the data is not flat: if it has cells with a volume, or if it is more
- * than 1e-6 as wide along each axis as along the widest. Twice the places of float32 fit in that share; a sheet that is
- * bent by less than a thousandth of a pixel looks flat. */
+/* The axis that flat data is flat along, the last of several; -1 if the data is not flat: if it has cells with a
+ * volume, or if it is more than 1e-6 as wide along each axis as along the widest. That is some sixteen roundings of
+ * float32, and a thirtieth of a pixel of the widest picture. Local; the same on every rank. */
 int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {
