@@ -64,7 +64,6 @@ planted render/cells/seeded.h '#include "kernel_finder.h"' 'cells must not inclu
 planted render/find/seeded.c '#include "kernel_surface.h"' 'find must not include kernel_surface.h of surface'
 planted render/volume/seeded.h '#include "kernel_roots.h"' 'volume must not include kernel_roots.h of surface'
 planted render/surface/seeded.h '#include "kernel_samples.h"' 'surface must not include kernel_samples.h of volume'
-planted render/volume/seeded.h '#include "kernel_roots.h"' 'volume must not include kernel_roots.h of surface'
 planted render/volume/seeded.h '#include "render_frame.h"' 'no file of the tree is called render_frame.h'
 planted libinsitu/session/seeded.c '#include "kernel_types.h"' 'session must not include kernel_types.h of rays'
 planted libinsitu/session/seeded.c '#include <vtkPoints.h>' 'session includes vtkPoints.h'
