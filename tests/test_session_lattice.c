@@ -333,8 +333,14 @@ static void lattices_are_their_hexes(void **state)
                 compare((place_form)form, (array_order)order, (form + order) % 2, (form + order) % 3 == 0, count);
 }
 
+static int begin_tests(void **state)
+{
+    (void)state;
+    return enter_folder("lattice") ? 0 : 1;
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes)};
-    return run_session_tests(argc, argv, tests, NULL, NULL);
+    return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

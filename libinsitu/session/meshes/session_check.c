@@ -448,7 +448,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
-    if (mesh->given.coordinates[2].data || tally->drawn == tally->shells) return INSITU_OK;
+    if (mesh->given.coordinates[2].data || g->lattice || tally->drawn == tally->shells) return INSITU_OK;
     int64_t cell = 0;
     while (cell + 1 < g->cell_count && (grid_is_ghost(g, cell) || grid_is_shell_type(grid_cell_type(g, cell)))) cell++;
     return base_fail(
