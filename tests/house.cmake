@@ -15,7 +15,7 @@ add_test(NAME house_tests_can_fail
   COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_seeded.sh ${PROJECT_SOURCE_DIR} ${CMAKE_C_COMPILER})
 set_tests_properties(
   house_arrows_go_down house_library_shows_insitu_only house_kernels_show_their_table_only house_tests_can_fail
-  PROPERTIES TIMEOUT 60)
+  PROPERTIES TIMEOUT 180)
 add_test(NAME house_figures_are_held
   COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/house_figures.py --hold ${PROJECT_SOURCE_DIR})
 add_test(NAME house_regions_are_entered COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_regions.sh ${PROJECT_SOURCE_DIR})
