@@ -340,7 +340,10 @@ def wrong_blocks_are_refused():
     axes, curved = dict(uniform, spacing=None, coordinates=(axis, axis, axis)), dict(uniform, spacing=None, coordinates=(f, f, f))
     with insitu.Session(comm, scene_text=SCENE.format(name="wrong", folder=folder)) as s:
         for named, kind, words in [
-            (dict(uniform, cells=(4,)), ValueError, "cells: are (4,), expected two or three numbers"),
+            (dict(uniform, cells=(4,)), ValueError, "cells: has 1 numbers, expected 2 or 3"),
+            (dict(uniform, cells=4), TypeError, "cells: is 4, expected 2 or 3 numbers"),
+            (dict(uniform, spacing=0.5), TypeError, "spacing: is 0.5, expected 3 numbers"),
+            (dict(uniform, spacing=(1, 1)), ValueError, "spacing: has 2 numbers, expected 3"),
             (dict(uniform, cells=(4, 0, 4)), ValueError, "cells: are (4, 0, 4), expected"),
             (dict(uniform, cells=(4, -4, 4)), ValueError, "cells: are (4, -4, 4), expected"),
             (dict(uniform, cells=(2**40, 2**40, 2**40)), ValueError, "too many, expected at most 4294967294"),

@@ -318,9 +318,12 @@ def _axes(given):
 
 def _numbers(what, given, count, convert, rest=0):
     """Three numbers, of which an array of two dimensions may lack the third: then it is the rest."""
+    counts = " or ".join(map(str, sorted({count, 3})))
+    if numpy.ndim(given) != 1:
+        raise TypeError(f"{what}: is {given!r}, expected {counts} numbers")
     numbers = tuple(convert(n) for n in given)
     if len(numbers) not in (count, 3):
-        raise ValueError(f"{what}: has {len(numbers)} numbers, expected {count}, one for each axis")
+        raise ValueError(f"{what}: has {len(numbers)} numbers, expected {counts}")
     for n in numbers:
         if not -2**63 <= n < 2**63 and convert is operator.index:
             raise ValueError(f"{what}: has the number {n}, expected whole numbers of 64 bits")
@@ -333,8 +336,8 @@ class _Block:
     have the same ones; the first array decides on them."""
 
     def __init__(self, name, cells):
-        if len(cells) not in (2, 3) or min(cells) < 0 or (0 in cells and any(cells)):
-            raise ValueError(f"cells: are {cells}, expected two or three numbers of at least 1, or all 0 without cells")
+        if min(cells) < 0 or (0 in cells and any(cells)):
+            raise ValueError(f"cells: are {cells}, expected numbers of at least 1, or all 0 without cells")
         if math.prod(cells) > 4294967294:
             raise ValueError(f"cells: {cells} are too many, expected at most 4294967294 in all")
         self.name, self.is_empty = name, not any(cells)
@@ -605,12 +608,12 @@ class Session:
         other array is given, fields are packed with k fastest."""
         mesh, lattice, held = _Mesh(), _Lattice(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
+        lattice.cells[:] = _numbers("cells", cells, 2, operator.index)
         cells = tuple(map(operator.index, cells))
         block = _Block(name, cells)
         rank = len(cells)
         if (spacing is None) == (coordinates is None):
             raise TypeError("spacing, coordinates: expected one of them")
-        lattice.cells[:] = _numbers("cells", cells, rank, operator.index)
         _put_places(lattice, rank, spacing, origin, first)
         _put_interior(lattice, rank, interior_first, interior_end)
         for what, given, of in ("vertex_layout", vertex_layout, VERTEX), ("cell_layout", cell_layout, CELL):
