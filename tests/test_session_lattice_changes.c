@@ -362,6 +362,13 @@ SPOIL(make_lattice_again, {
 SPOIL(make_quads, (make_uniform(b), b->lattice.cells[2] = 0))
 SPOIL(make_cells, b->lattice.cells[2] = NK)
 
+/* The arrays are longer than the block, as are rows of the cells' alone: padding has no vertices. */
+SPOIL(fewer_layers, (make_curvilinear(b), b->lattice.cells[2] = NK - 1))
+SPOIL(shorter_rows, {
+    b->lattice.cells[0] = 2;
+    memcpy(b->lattice.cell_strides, (int64_t[]){1, NI, NI * NJ}, sizeof b->lattice.cell_strides);
+})
+
 /* What the caller names as changed; fields are set again where the mesh is another one, and where it says so. */
 typedef struct change {
     const char *name;
@@ -395,6 +402,8 @@ static const change changes[] = {
     {CHANGE(make_lattice_again, INSITU_CHANGED_NOTHING, true)},
     {CHANGE(make_quads, INSITU_CHANGED_NOTHING, true)},
     {CHANGE(make_cells, INSITU_CHANGED_NOTHING, true)},
+    {CHANGE(fewer_layers, INSITU_CHANGED_NOTHING, true)},
+    {CHANGE(shorter_rows, INSITU_CHANGED_NOTHING, true)},
 };
 
 static bool draw(insitu_session *session, int cycle, caught_picture *out)

@@ -256,6 +256,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
+    if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD; /* padding has no vertices, others are in range */
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
         place->next = grid_array_index(&g->offsets, cell + 1);
