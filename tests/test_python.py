@@ -166,12 +166,15 @@ def parameters_are_numbers():
 
 def drawn(name, hand_over, scene=SCENE):
     """The picture of what a function hands over, when nobody but the session knows its arrays."""
+def drawn(name, hand_over, scene=SCENE, copied=None):
+    """The picture of what a function hands over, when nobody but the session knows its arrays; copied: bytes."""
     with insitu.Session(comm, scene_text=scene.format(name=name, folder=folder)) as session:
         hand_over(session)
         gc.collect()
         rubbish = [numpy.full(n, numpy.nan) for n in (64, 125, 343, 512, 1029) for _ in range(64)]
         session.step(0, 0.0)
         del rubbish
+        everywhere(copied in (None, session.report["bytes_copied"]), f"{session.report['copied_why']}")
     comm.Barrier()
     with open(f"{folder}/{name}.png", "rb") as file:
         found = file.read()
@@ -226,7 +229,8 @@ def blocks_are_their_hexes():
     for form, make in forms.items():
         for order in "CF":
             for of in insitu.VERTEX, insitu.CELL:
-                everywhere(drawn("block", block(order, make, of=of)) == plain[of], f"{form}, {order}, packed, {of}")
+                copied = 8 * 3 * n if of == insitu.VERTEX else None  # along the axes; no bytes for cells or vertices
+                everywhere(drawn("block", block(order, make, of=of), copied=copied) == plain[of], f"{form}, {order}, {of}")
                 everywhere(drawn("block", block(order, make, 1, 2, of=of)) == plain[of], f"{form}, {order}, padded, {of}")
     for order in "CF":
         for name, make in {
@@ -236,7 +240,7 @@ def blocks_are_their_hexes():
         }.items():
             if name == "xyz" and order == "F":
                 continue  # its components are farthest apart
-            everywhere(drawn("block", block(order, make, 2, 1)) == plain[insitu.VERTEX], f"curvilinear {name}, {order}")
+            everywhere(drawn("block", block(order, make, 2, 1), copied=0) == plain[insitu.VERTEX], f"curvilinear {name}, {order}")
         everywhere(drawn("block", block(order, lambda: uniform, components=-1)) == plain[insitu.VERTEX], "components after")
         everywhere(drawn("block", block(order, lambda: uniform, components=0)) == plain[insitu.VERTEX], "components before")
 
