@@ -30,36 +30,37 @@ bool rows_fit(const grid *g, const grid_field *field)
            row_axis(g->lattice) >= 0;
 }
 
-/* poison is 0 while all are finite, then not a number. */
-#define UNITE_ROW(number, to, from, stride, count)                                                                     \
+/* The least and greatest of two. */
+#define LESS(a, b) ((a) < (b) ? (a) : (b))
+#define MORE(a, b) ((a) > (b) ? (a) : (b))
+
+/* Unites the values of four rows at each place; poison is 0 where all are finite, else not a number. */
+#define UNITE_ROWS(number, to, rows, stride, count)                                                                    \
     for (int64_t n = 0; n < (count); n++) {                                                                            \
-        const number v = *(const number *)(const void *)((from) + n * (stride));                                       \
-        (to)->low[n] = v < (to)->low[n] ? v : (to)->low[n];                                                            \
-        (to)->high[n] = v > (to)->high[n] ? v : (to)->high[n];                                                         \
-        (to)->poison[n] += v - v;                                                                                      \
+        const number a = *(const number *)(const void *)((rows)[0] + n * (stride));                                    \
+        const number b = *(const number *)(const void *)((rows)[1] + n * (stride));                                    \
+        const number c = *(const number *)(const void *)((rows)[2] + n * (stride));                                    \
+        const number d = *(const number *)(const void *)((rows)[3] + n * (stride));                                    \
+        const number ab = LESS(a, b), cd = LESS(c, d), most_ab = MORE(a, b), most_cd = MORE(c, d);                     \
+        (to)->low[n] = LESS(ab, cd);                                                                                   \
+        (to)->high[n] = MORE(most_ab, most_cd);                                                                        \
+        (to)->poison[n] = ((a - a) + (b - b)) + ((c - c) + (d - d));                                                   \
     }
 
 #define DEFINE_RANGES(name, number, places)                                                                            \
-    static void name(const char *const *rows, int row_count, int64_t stride, rows_ranges *out)                         \
+    static void name(const char *const rows[4], int64_t stride, rows_ranges *out)                                      \
     {                                                                                                                  \
         places of;                                                                                                     \
         const int64_t count = out->count + 1;                                                                          \
-        for (int64_t n = 0; n < count; n++) {                                                                          \
-            of.low[n] = (number)INFINITY;                                                                              \
-            of.high[n] = -(number)INFINITY;                                                                            \
-            of.poison[n] = 0;                                                                                          \
-        }                                                                                                              \
-        for (int row = 0; row < row_count; row++) {                                                                    \
-            if (stride == (int64_t)sizeof(number)) {                                                                   \
-                UNITE_ROW(number, &of, rows[row], (int64_t)sizeof(number), count)                                      \
-            } else {                                                                                                   \
-                UNITE_ROW(number, &of, rows[row], stride, count)                                                       \
-            }                                                                                                          \
+        if (stride == (int64_t)sizeof(number)) {                                                                       \
+            UNITE_ROWS(number, &of, rows, (int64_t)sizeof(number), count)                                              \
+        } else {                                                                                                       \
+            UNITE_ROWS(number, &of, rows, stride, count)                                                               \
         }                                                                                                              \
         memset(out->is_finite, 0, sizeof out->is_finite);                                                              \
         for (int64_t n = 0; n < out->count; n++) {                                                                     \
-            out->low[n] = (float)(of.low[n] < of.low[n + 1] ? of.low[n] : of.low[n + 1]);                              \
-            out->high[n] = (float)(of.high[n] > of.high[n + 1] ? of.high[n] : of.high[n + 1]);                         \
+            out->low[n] = (float)LESS(of.low[n], of.low[n + 1]);                                                       \
+            out->high[n] = (float)MORE(of.high[n], of.high[n + 1]);                                                    \
             out->is_finite[n] = of.poison[n] + of.poison[n + 1] == 0;                                                  \
         }                                                                                                              \
     }
@@ -102,22 +103,14 @@ bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end
     const char *rows[4];
     const char *data = field->values.data + field->component * field->component_stride;
     const int64_t vertex = grid_lattice_first(l, out->first), stride = field->values.stride;
-    int row_count = 0;
-    for (int side = 0; side < 4; side++) {
-        const int across[2] = {(along + 1) % 3, (along + 2) % 3};
-        int64_t at = vertex;
-        bool is_there = true;
-        for (int n = 0; n < 2; n++) {
-            if (!(side >> n & 1)) continue;
-            at += l->by_vertex.stride[across[n]];
-            is_there = is_there && l->cells[across[n]];
-        }
-        if (is_there) rows[row_count++] = data + at * stride;
-    }
+    /* Along an axis without cells the vertices' stride is 0, so that a row stands there twice. */
+    const int64_t across[2] = {l->by_vertex.stride[(along + 1) % 3], l->by_vertex.stride[(along + 2) % 3]};
+    for (int side = 0; side < 4; side++)
+        rows[side] = data + (vertex + (side & 1) * across[0] + (side >> 1) * across[1]) * stride;
     const int64_t step = stride * l->by_vertex.stride[along];
     if (field->values.is_wide)
-        double_ranges(rows, row_count, step, out);
+        double_ranges(rows, step, out);
     else
-        float_ranges(rows, row_count, step, out);
+        float_ranges(rows, step, out);
     return true;
 }
