@@ -12,9 +12,12 @@ set_tests_properties(docs_links_and_snippets PROPERTIES TIMEOUT 60 ENVIRONMENT
 add_test(NAME docs_checks_can_fail COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/docs_seeded.sh ${PROJECT_SOURCE_DIR}
   ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_BINARY_DIR}/docs_seeded)
 set_tests_properties(docs_checks_can_fail PROPERTIES TIMEOUT 60 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
-add_test(NAME docs_claims_have_tests COMMAND ${INSITU_SYSTEM_PYTHON} ${docs_scripts}/check_claims.py ${PROJECT_SOURCE_DIR}
-  ${PROJECT_BINARY_DIR})
-set_tests_properties(docs_claims_have_tests PROPERTIES TIMEOUT 60)
+# Builds by other compilers and with sanitizers lack some tests.
+if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_PROJECT_INCLUDE)
+  add_test(NAME docs_claims_have_tests COMMAND ${INSITU_SYSTEM_PYTHON} ${docs_scripts}/check_claims.py ${PROJECT_SOURCE_DIR}
+    ${PROJECT_BINARY_DIR})
+  set_tests_properties(docs_claims_have_tests PROPERTIES TIMEOUT 60)
+endif()
 
 # In a shell as a user has one. The address sanitizer would have to be loaded before Python, and linked into the programs.
 if(CMAKE_PROJECT_INCLUDE)

@@ -48,7 +48,8 @@ static int spared_count;
 static int note_library(struct dl_phdr_info *info, size_t size, void *context)
 {
     (void)size, (void)context;
-    if (!strstr(info->dlpi_name, "/libgomp") && !strstr(info->dlpi_name, "/ld-linux")) return 0;
+    const bool is_openmp = strstr(info->dlpi_name, "/libgomp") || strstr(info->dlpi_name, "/libomp");
+    if (!is_openmp && !strstr(info->dlpi_name, "/ld-linux")) return 0;
     for (int i = 0; i < info->dlpi_phnum && spared_count < MOST_RANGES; i++) {
         const ElfW(Phdr) *segment = &info->dlpi_phdr[i];
         if (segment->p_type != PT_LOAD || !(segment->p_flags & PF_X)) continue;

@@ -58,7 +58,9 @@ if(PYTHON)
   run(${PYTHON} -c "import insitu\nassert insitu.__file__.startswith('${prefix}/')")
 endif()
 
-# By pkg-config, as a makefile would.
+# By pkg-config, as a makefile would; by the library's own compiler, as a static one needs its OpenMP.
+set(ENV{OMPI_CC} ${CC})
+set(ENV{MPICH_CC} ${CC})
 set(ENV{PKG_CONFIG_PATH} ${prefix}/${LIBDIR}/pkgconfig)
 execute_process(COMMAND ${PKG_CONFIG} --cflags --libs insitu
   OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)

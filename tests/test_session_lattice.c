@@ -333,6 +333,73 @@ static void lattices_are_their_hexes(void **state)
                 compare((place_form)form, (array_order)order, (form + order) % 2, (form + order) % 3 == 0, count);
 }
 
+/* ---- quads ------------------------------------------------------------------------------------------------------ */
+
+enum { SHEET = 6 };
+
+/* A sheet without cells along one axis: uniform, or its vertices' places; packed, i fastest. */
+static caught_picture draw_sheet(int flat, bool is_lattice, bool is_uniform)
+{
+    static const char scene[] =
+        "images: [{name: s, size: [40, 30], layers: [{surface: {colour_by: {field: f}, edges: {}, "
+        "material: {}}}], camera: {automatic: {direction: [1, 2, 3]}}, outputs: [{path: s.exr}]}]\n";
+    enum { VERTICES = (SHEET + 1) * (SHEET + 1), CELLS = SHEET * SHEET };
+    double places[VERTICES][3], values[VERTICES];
+    int quads[CELLS][4], cell = 0;
+    const int a = flat == 0, b = flat == 2 ? 1 : 2; /* the axes that have cells */
+    for (int v = 0; v < VERTICES; v++) {
+        const int at[2] = {v % (SHEET + 1), v / (SHEET + 1)};
+        places[v][flat] = is_uniform ? 0.5 + 0.25 * 3 : 0.3 * sin(at[0] + 0.5 * at[1]);
+        places[v][a] = 0.5 + 0.25 * (3 + at[0]) + (is_uniform ? 0 : 0.05 * sin(at[1]));
+        places[v][b] = 0.5 + 0.25 * (3 + at[1]);
+        values[v] = sin(at[0]) * cos(0.7 * at[1]);
+    }
+    for (int j = 0; j < SHEET; j++)
+        for (int i = 0; i < SHEET; i++, cell++) {
+            const int v = i + j * (SHEET + 1);
+            const int corners[4] = {v, v + 1, v + SHEET + 2, v + SHEET + 1};
+            memcpy(quads[cell], corners, sizeof corners);
+        }
+    insitu_lattice lattice = {.cells = {SHEET, SHEET, SHEET}, .first = {3, 3, 3}};
+    lattice.cells[flat] = 0;
+    for (int axis = 0; axis < 3 && is_uniform; axis++) lattice.origin[axis] = 0.5, lattice.spacing[axis] = 0.25;
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    insitu_field_defaults(&field);
+    mesh.vertex_count = own_rank ? 0 : VERTICES;
+    mesh.cell_count = own_rank ? 0 : CELLS;
+    if (!is_lattice || !is_uniform) insitu_mesh_interleaved(&mesh, places, INSITU_FLOAT64);
+    if (is_lattice && !own_rank) mesh.lattice = &lattice;
+    mesh.cell_type = INSITU_QUAD;
+    if (!is_lattice || own_rank) {
+        mesh.connectivity_count = 4 * mesh.cell_count;
+        mesh.connectivity = (insitu_array){quads, INSITU_INT32, 0};
+    }
+    field.name = "f";
+    field.count = mesh.vertex_count;
+    field.values = (insitu_array){values, INSITU_FLOAT64, 0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK &&
+               insitu_set_field(session, "m", &field) == INSITU_OK);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    insitu_destroy(&session);
+    return take_caught();
+}
+
+static void sheets_across_any_axis_are_their_quads(void **state)
+{
+    (void)state;
+    for (int flat = 0; flat < 3; flat++)
+        for (int is_uniform = 0; is_uniform < 2; is_uniform++) {
+            forget_pictures();
+            caught_picture quads = draw_sheet(flat, false, is_uniform), lattice = draw_sheet(flat, true, is_uniform);
+            everywhere(own_rank || (is_same(&quads, &lattice) && covered(&quads) > 50));
+            free_caught(&quads);
+            free_caught(&lattice);
+        }
+}
+
 static int begin_tests(void **state)
 {
     (void)state;
@@ -341,6 +408,7 @@ static int begin_tests(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes),
+                                       cmocka_unit_test(sheets_across_any_axis_are_their_quads)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -148,7 +148,7 @@ static bool is_same(const caught_picture *a, const caught_picture *b)
         __VA_ARGS__;                                                                                                   \
     }
 
-SPOIL(no_cells_along_j, b->lattice.cells[1] = 0)
+SPOIL(no_cells_along_j_and_k, b->lattice.cells[1] = b->lattice.cells[2] = 0)
 SPOIL(no_cells_at_all, b->lattice.cells[0] = b->lattice.cells[1] = b->lattice.cells[2] = 0)
 SPOIL(negative_cells, b->lattice.cells[2] = -4)
 SPOIL(huge_cells, b->lattice.cells[0] = (int64_t)1 << 60)
@@ -218,10 +218,10 @@ typedef struct wrong_block {
 #define WRONG(spoil, at_once, words) #spoil, spoil, at_once, words, INSITU_ERROR_MESH
 
 static const wrong_block wrong_blocks[] = {
-    {WRONG(no_cells_along_j, true, "lattice: cells along j are 0, expected 1..4294967294")},
+    {WRONG(no_cells_along_j_and_k, true, "0 and 0 along i, j and k, expected 0 along at most one of them")},
     {WRONG(no_cells_at_all, true, "lattice: there are no cells along i, j and k, and cell_count is 120")},
     {WRONG(negative_cells, true, "lattice: cells along k are -4, expected 0..4294967294")},
-    {WRONG(huge_cells, true, "lattice: cells along i are 1152921504606846976, expected 1..")},
+    {WRONG(huge_cells, true, "lattice: cells along i are 1152921504606846976, expected 0..")},
     {WRONG(many_cells, true, "lattice: ")},
     {WRONG(another_cell, true, "lattice: 5 vertices along k with a stride of 49 do not fit into arrays of 210")},
     {WRONG(strides_of_one, true, "lattice: the stride of vertices along j is 1, at least 7 is needed")},

@@ -585,24 +585,20 @@ void ghost_flags_follow_cells_left_out(void **)
     for (int i = 0; i < 2; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
-/* The volume of a mesh of hexes only, whose types and offsets are not given. */
-double whole_volume(insitu_mesh mesh)
+/* A lattice's coordinate along an axis of vertex n along it, if coordinates are not given by vertex. */
+double place_along(const insitu_lattice &l, int axis, int64_t n)
 {
-    double sum = 0;
-    const std::vector<uint8_t> types(static_cast<size_t>(mesh.cell_count), INSITU_HEX);
-    std::vector<int64_t> offsets;
-    for (int64_t i = 0; i <= mesh.cell_count; i++) offsets.push_back(8 * i);
-    mesh.cell_types = {types.data(), INSITU_UINT8, 0};
-    mesh.offsets = {offsets.data(), INSITU_INT64, 0};
-    for (int64_t i = 0; i < mesh.cell_count; i++) sum += cell_volume(mesh, i);
-    return sum;
+    const insitu_array &a = l.axes[axis];
+    if (!a.data) return l.origin[axis] + l.spacing[axis] * static_cast<double>(l.first[axis] + n);
+    return a.type == INSITU_FLOAT32 ? static_cast<double>(static_cast<const float *>(a.data)[n])
+                                    : static_cast<const double *>(a.data)[n];
 }
 
 /* 3 x 4 x 5 points. */
 void structured_grids_are_hexahedra(void **)
 {
     vtkNew<vtkImageData> image;
-    image->SetDimensions(3, 4, 5);
+    image->SetExtent(2, 4, -1, 2, 3, 7); // a piece of a whole
     image->SetOrigin(1, 2, 3);
     image->SetSpacing(0.5, 1, 2);
     vtkNew<vtkRectilinearGrid> rectilinear;
@@ -633,15 +629,57 @@ void structured_grids_are_hexahedra(void **)
         fixture f;
         assert_int_equal(f.set(data), INSITU_OK);
         const insitu_mesh &mesh = f.mesh().mesh;
-        assert_true(mesh.cell_count == 24 && mesh.vertex_count == 60 && mesh.cell_type == INSITU_HEX);
-        assert_true(std::fabs(whole_volume(mesh) - 1 * 3 * 8) < 24 * rounding);
+        const insitu_lattice *lattice = mesh.lattice;
+        assert_non_null(lattice);
+        assert_true(mesh.cell_count == 24 && mesh.vertex_count == 60);
+        assert_true(lattice->cells[0] == 2 && lattice->cells[1] == 3 && lattice->cells[2] == 4);
+        for (vtkIdType i = 0; i < 60; i++) {
+            double at[3];
+            const int64_t index[3] = {i % 3, i / 3 % 4, i / 12};
+            data->GetPoint(i, at);
+            for (int a = 0; a < 3 && data != curvilinear.Get(); a++)
+                assert_true(place_along(*lattice, a, index[a]) == at[a]); // to the bit
+        }
         assert_ptr_equal(f.mesh().fields.at("f").values.data, values->GetPointer(0));
-        const int64_t cells = 24 * 8 * 4 + 25 * 4 + 24, listed = 60 * 3 * 8; // corners, offsets, types; points
-        const bool has_points = data == curvilinear.Get();
-        assert_int_equal(f.report.bytes_copied, has_points ? cells : cells + listed);
-        assert_non_null(strstr(f.report.copied_why, data->GetClassName()));
-        assert_true(has_points == !strstr(f.report.copied_why, " points: those of a "));
-        if (has_points) assert_ptr_equal(mesh.coordinates[0].data, points->GetVoidPointer(0));
+        assert_int_equal(f.report.bytes_copied, 0);
+        if (data == curvilinear.Get()) assert_ptr_equal(mesh.coordinates[0].data, points->GetVoidPointer(0));
+    }
+}
+
+/* Flat along any axis, hidden by a point, and turned: the points of a turned image alone are listed. */
+void flat_hidden_and_turned_images_are_lattices(void **)
+{
+    for (int flat = 0; flat < 3; flat++) {
+        int d[3] = {3, 3, 3};
+        d[flat] = 1;
+        vtkNew<vtkImageData> image;
+        image->SetDimensions(d);
+        fixture f;
+        assert_int_equal(f.set(image), INSITU_OK);
+        const insitu_lattice *lattice = f.mesh().mesh.lattice;
+        for (int a = 0; a < 3; a++) assert_int_equal(lattice->cells[a], a == flat ? 0 : 2);
+        assert_int_equal(f.report.bytes_copied, 0);
+        assert_int_equal(f.mesh().mesh.cell_count, 4);
+    }
+    vtkNew<vtkImageData> image;
+    image->SetDimensions(3, 3, 3);
+    vtkNew<vtkUnsignedCharArray> flags;
+    flags->SetName(vtkDataSetAttributes::GhostArrayName());
+    flags->SetNumberOfValues(27);
+    for (vtkIdType i = 0; i < 27; i++) flags->SetValue(i, i == 14 ? vtkDataSetAttributes::HIDDENPOINT : 0);
+    image->GetPointData()->AddArray(flags); // point 2, 1, 1: of the four cells beyond i = 1
+    fixture f;
+    assert_int_equal(f.set(image), INSITU_OK);
+    for (int i = 0; i < 8; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i) != 0, i % 2);
+    assert_int_equal(f.report.bytes_copied, 8);
+    image->GetPointData()->Initialize();
+    image->SetDirectionMatrix(0, 1, 0, -1, 0, 0, 0, 0, 1);
+    assert_int_equal(f.set(image), INSITU_OK);
+    assert_int_equal(f.report.bytes_copied, 27 * 24);
+    for (vtkIdType i = 0; i < 27; i++) {
+        double at[3];
+        image->GetPoint(i, at);
+        assert_true(vertex(f.mesh().mesh, i) == (point{at[0], at[1], at[2]}));
     }
 }
 
@@ -842,6 +880,7 @@ int main()
         cmocka_unit_test(ghost_flags_that_hide_are_handed_over),
         cmocka_unit_test(ghost_flags_of_other_types_and_names_hide_cells_too),
         cmocka_unit_test(ghost_flags_follow_cells_left_out),
+        cmocka_unit_test(flat_hidden_and_turned_images_are_lattices),
         cmocka_unit_test(structured_grids_are_hexahedra),
         cmocka_unit_test(polygons_are_shells),
         cmocka_unit_test(leaves_of_composites_are_meshes_and_go_when_they_are_gone),

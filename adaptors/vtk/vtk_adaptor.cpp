@@ -6,6 +6,7 @@
 
 #include <exception>
 #include <map>
+#include <memory>
 #include <new>
 #include <set>
 #include <string>
@@ -29,6 +30,7 @@
 #include "vtk_amr.h"
 #include "vtk_arrays.h"
 #include "vtk_cells.h"
+#include "vtk_lattices.h"
 
 using namespace insitu_vtk;
 
@@ -39,6 +41,7 @@ namespace
 struct part {
     hold held;
     insitu_mesh mesh;
+    std::unique_ptr<insitu_lattice> lattice; // what mesh.lattice points to, if the data set is structured
     std::vector<insitu_field> fields;
 };
 
@@ -74,10 +77,9 @@ constexpr unsigned char ghosts_not_drawn =
 
 /* Ghost flags: VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array serves where it
  * holds only the former, and none is needed where nothing is hidden. */
-void set_ghosts(vtkUnstructuredGrid *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
+void set_ghosts(vtkDataSet *grid, const vtkSmartPointer<vtkUnsignedCharArray> &ghosts, const cell_list &cells,
+                const std::string &what, tally &count, part &p)
 {
-    const auto ghosts = vtkSmartPointer<vtkUnsignedCharArray>::Take(
-        insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells()));
     if (!ghosts) return;
     const unsigned char *flags = ghosts->GetPointer(0);
     const vtkIdType flag_count = ghosts->GetNumberOfValues();
@@ -134,7 +136,7 @@ bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, 
     return false;
 }
 
-void add_point_fields(vtkUnstructuredGrid *grid, const std::string &what, tally &count, part &p)
+void add_point_fields(vtkDataSet *grid, const std::string &what, tally &count, part &p)
 {
     vtkPointData *data = grid->GetPointData();
     for (int i = 0; i < data->GetNumberOfArrays(); i++) {
@@ -146,7 +148,7 @@ void add_point_fields(vtkUnstructuredGrid *grid, const std::string &what, tally 
     }
 }
 
-void add_cell_fields(vtkUnstructuredGrid *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
+void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
 {
     vtkCellData *data = grid->GetCellData();
     for (int i = 0; i < data->GetNumberOfArrays(); i++) {
@@ -192,7 +194,10 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     if (!points || points->GetNumberOfPoints() == 0) throw failure{INSITU_ERROR_MESH, what + ": cells without points"};
     p.mesh.vertex_count = points->GetNumberOfPoints();
     view_points(points->GetData(), what + " points", p.held, count, p.mesh.coordinates);
-    set_ghosts(grid, cells, what, count, p);
+    set_ghosts(grid,
+               vtkSmartPointer<vtkUnsignedCharArray>::Take(
+                   insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells())),
+               cells, what, count, p);
     add_point_fields(grid, what, count, p);
     add_cell_fields(grid, cells, what, count, p);
 
@@ -200,16 +205,32 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     out.cells_set += cells.count;
 }
 
+/* Fill p from a structured data set. False, with p as it was, where it is none. */
+bool make_lattice_part(vtkDataSet *data, const std::string &name, outcome &out, part &p)
+{
+    const std::string what = "mesh '" + name + "'";
+    tally count;
+    cell_list cells;
+    insitu_mesh_defaults(&p.mesh);
+    p.lattice = std::make_unique<insitu_lattice>();
+    if (!view_lattice(data, what, p.held, count, p.mesh, *p.lattice)) return false;
+    cells.count = p.mesh.cell_count;
+    set_ghosts(data, lattice_flags(data, *p.lattice), cells, what, count, p);
+    add_point_fields(data, what, count, p);
+    add_cell_fields(data, cells, what, count, p);
+    out.count.add(count);
+    out.cells_set += cells.count;
+    return true;
+}
+
 void check(insitu_vtk_adaptor *adaptor, insitu_status status)
 {
     if (status != INSITU_OK) throw failure{status, insitu_error(adaptor->session)};
 }
 
-void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-              vtkUnstructuredGrid *grid, outcome &out)
+void set_part(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name, part &&fresh,
+              outcome &out)
 {
-    part fresh;
-    make_part(grid, name, out, fresh);
     if (fresh.mesh.cell_count == 0) return;
     out.names.insert(name);
     part &kept = parts[name];
@@ -220,6 +241,14 @@ void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
         check(adaptor, insitu_set_field(adaptor->session, name.c_str(), &field));
         out.fields++;
     }
+}
+
+void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
+              vtkUnstructuredGrid *grid, outcome &out)
+{
+    part fresh;
+    make_part(grid, name, out, fresh);
+    set_part(adaptor, parts, name, std::move(fresh), out);
 }
 
 /* Count in bytes what insitu_vtk_make_grid() made for data: the lists that are not data's own. */
@@ -252,6 +281,14 @@ void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, 
         flagged = vtkSmartPointer<vtkDataSet>::Take(data->NewInstance());
         flagged->ShallowCopy(data);
         flagged->GetCellData()->AddArray(flags);
+    }
+    part fresh;
+    if (make_lattice_part(flagged, name, out, fresh)) {
+        if (flags)
+            out.count.copied("mesh '" + name + "' ghosts", "cells that are hidden or refined, flagged",
+                             fresh.mesh.cell_count);
+        set_part(adaptor, parts, name, std::move(fresh), out);
+        return;
     }
     const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(flagged));
     tell_what_was_made(grid, data, "mesh '" + name + "'", out.count);

@@ -62,7 +62,7 @@ typedef struct grid_array {
 
 /* Cells by three indices instead of connectivity. */
 typedef struct grid_lattice {
-    int64_t cells[3]; /* along each axis; 0 along the third: quads */
+    int64_t cells[3]; /* along each axis; 0 along one: quads */
     grid_numbering by_vertex, by_cell;
     int64_t corner[8];                    /* from the number of a cell's first vertex to that of each, in VTK's order */
     int64_t drawn_first[3], drawn_end[3]; /* the indices of the cells that are no ghost layers */

@@ -95,11 +95,11 @@ enum {
 };
 
 /* A structured block: its cells are found by three indices i, j, k instead of connectivity. Vertex and cell arrays are
- * read as they are, in C's or Fortran's order, padded or with ghost layers. Cells are hexes, or quads where cells[2] is
- * 0. The coordinates are either uniform (spacing), rectilinear (axes) or given for each vertex in the mesh's
+ * read as they are, in C's or Fortran's order, padded or with ghost layers. Cells are hexes, or quads where one of
+ * cells is 0. The coordinates are either uniform (spacing), rectilinear (axes) or given for each vertex in the mesh's
  * coordinates, which are not given otherwise. docs/structured.md has examples. */
 typedef struct insitu_lattice {
-    int64_t cells[3]; /* along i, j and k, at least 1 each; the third 0: quads. All 0 on a rank that has no cells. */
+    int64_t cells[3]; /* along i, j and k, at least 1 each; one of them 0: quads. All 0 on a rank without cells. */
     /* How far, in vertices, the vertices' arrays are from one vertex to the next along i, j and k, at least 1 each: the
      * vertex i, j, k has the number i * vertex_strides[0] + j * vertex_strides[1] + k * vertex_strides[2]. Each larger
      * stride spans all that the smaller ones reach, so that no two vertices have one number. All 0: packed with i
@@ -112,11 +112,12 @@ typedef struct insitu_lattice {
     /* Uniform: vertex n along an axis is at origin + spacing * (first + n), in double. first is the place of the
      * block's first vertex in the whole lattice, so that blocks of one lattice have the same origin and spacing and
      * their common vertices the same coordinates, to the bit. That is how vertices of several blocks and ranks are
-     * found to be one. spacing is not 0 along the axes that have cells; all 0: the lattice is not uniform. */
+     * found to be one. spacing is not 0 along the axes that have cells; all 0: the lattice is not uniform. first is at
+     * most 2^53 in size. */
     double origin[3], spacing[3];
     int64_t first[3];
     /* Rectilinear: cells[a] + 1 coordinates along each axis, float32 or float64; not given where the lattice is
-     * uniform. A lattice of quads may lack the third, whose coordinate is 0 then. */
+     * uniform. A lattice of quads may lack those of the axis without cells; its coordinate is 0 then. */
     insitu_array axes[3];
 } insitu_lattice;
 

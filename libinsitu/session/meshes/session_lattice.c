@@ -28,6 +28,12 @@ static bool are_zero(const int64_t values[3])
     return !values[0] && !values[1] && !values[2];
 }
 
+/* Tells whether the cells are quads: one axis has none. */
+static bool is_plane(const insitu_lattice *l)
+{
+    return !l->cells[0] || !l->cells[1] || !l->cells[2];
+}
+
 static bool is_uniform(const insitu_lattice *l)
 {
     return l->spacing[0] != 0 || l->spacing[1] != 0 || l->spacing[2] != 0;
@@ -46,13 +52,17 @@ bool session_has_axes(const insitu_mesh *mesh)
 static insitu_status check_cells(const insitu_lattice *l, base_error *error)
 {
     const int64_t most = 4294967294;
+    int without = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t least = axis == 2 || are_zero(l->cells) ? 0 : 1;
-        if (l->cells[axis] >= least && l->cells[axis] <= most) continue;
-        return base_fail(error, INSITU_ERROR_MESH, "lattice: cells along %c are %lld, expected %lld..%lld",
-                         axis_name[axis], (long long)l->cells[axis], (long long)least, (long long)most);
+        without += l->cells[axis] == 0;
+        if (l->cells[axis] < 0 || l->cells[axis] > most)
+            return base_fail(error, INSITU_ERROR_MESH, "lattice: cells along %c are %lld, expected 0..%lld",
+                             axis_name[axis], (long long)l->cells[axis], (long long)most);
     }
-    return INSITU_OK;
+    if (without != 2) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MESH,
+                     "lattice: cells are %lld, %lld and %lld along i, j and k, expected 0 along at most one of them",
+                     (long long)l->cells[0], (long long)l->cells[1], (long long)l->cells[2]);
 }
 
 /* The axes in the order of their strides; an axis with a single index comes first, as its stride is never used. */
@@ -160,7 +170,7 @@ static insitu_status check_axes(const insitu_lattice *l, base_error *error)
 {
     static const char *const names[3] = {"coordinates along i", "coordinates along j", "coordinates along k"};
     for (int axis = 0; axis < 3; axis++) {
-        const int optional = axis == 2 && !l->cells[2] ? SESSION_IS_OPTIONAL : 0;
+        const int optional = l->cells[axis] ? 0 : SESSION_IS_OPTIONAL;
         const session_array_rule rule = {names[axis], vertices_along(l, axis), SESSION_ALLOW_FLOATS | optional, 1};
         const insitu_status status = session_check_array(&l->axes[axis], &rule, INSITU_ERROR_MESH, error);
         if (status) return status;
@@ -275,9 +285,11 @@ void session_take_lattice(session_mesh *mesh)
     }
     packed_strides(vertices, packed);
     out->by_vertex = number(are_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
+    /* The axis without cells comes last, so that the first four corners are a quad's. */
+    const int last = l->cells[0] ? l->cells[1] ? 2 : 1 : 0, axes[3] = {last == 0, last == 2 ? 1 : 2, last};
     for (int i = 0; i < 8; i++) {
         out->corner[i] = 0;
-        for (int axis = 0; axis < 3; axis++) out->corner[i] += hex[i][axis] * out->by_vertex.stride[axis];
+        for (int n = 0; n < 3; n++) out->corner[i] += hex[i][n] * out->by_vertex.stride[axes[n]];
     }
     packed_strides(cells, packed);
     out->by_cell = number(are_zero(l->cell_strides) ? packed : l->cell_strides, cells);
@@ -290,7 +302,7 @@ void session_read_lattice(session_mesh *mesh, grid *g)
     const insitu_lattice *l = mesh->given.lattice;
     if (!l || are_zero(l->cells)) return;
     g->lattice = &mesh->lattice.cells;
-    g->cell_type = l->cells[2] ? GRID_HEX : GRID_QUAD;
+    g->cell_type = is_plane(l) ? GRID_QUAD : GRID_HEX;
     for (int axis = 0; axis < 3 && session_has_axes(&mesh->given); axis++)
         g->coordinates[axis] = (grid_array){.is_wide = true, .axis = &mesh->lattice.cells.axes[axis]};
 }

@@ -14,21 +14,28 @@
  * "name/0", "name/1", ..., numbered in the order of VTK's iterator, empty leaves counted. All numeric point and cell
  * arrays become fields.
  *
- * - Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double. -
- * Cells 10, 12, 13, 14, and the shells 5, 7, 9: borrowed, with 32- or 64-bit storage. - Points of curvilinear grids and
- * of polygonal data: borrowed; so are polygons where there are no lines, points and strips beside them. The library
- * reads coordinates from arrays only, so the points of images and rectilinear grids are listed anew in each call; so
- * are the cells of images, rectilinear and curvilinear grids (insitu/vtk_grids.h). The report has the bytes of both. -
- * Voxels (11) and pixels (8): drawn as hexahedra and quads; a copy of the connectivity. - Polyhedra (42): their face
- * streams become faces shared between cells; a copy. Pentagonal and hexagonal prisms (15, 16) come as polyhedra too. -
- * Quadratic and higher-order cells: drawn by their corners as linear cells, and reported; copied. - What else is left,
- * polyhedra without their faces too: not drawn, and reported; so are lines and points. - Fields: float, double and 32-
- * or 64-bit signed integers borrowed; other types copied. - vtkGhostType of the cells: duplicate, hidden and refined
- * cells are not drawn, nor cells of structured grids with a hidden point; nor those whose avtGhostZones, of VisIt, is
- * not 0. Bytes are borrowed, flags of other types copied. - Overlapping AMR: cells within a box of the
- * next level are not drawn, whether or not vtkAMRUtilities::BlankCells() has flagged them, and whichever rank holds the
- * finer grid. Boxes, and spacings or ratios, are to be set for all levels on every rank, as VTK wants them; a warning
- * says where they do not fit the grids.
+ * Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double.
+ *
+ * Images, rectilinear and curvilinear grids, flat ones too: lattices (insitu_lattice), so that no cells are listed. Of
+ * images nothing is copied, unless their axes are turned or have no spacing: then their points are listed. Axes of
+ * rectilinear grids and points of curvilinear grids are borrowed if they are float or double.
+ *
+ * Cells 10, 12, 13, 14, and the shells 5, 7, 9: borrowed, with 32- or 64-bit storage. Voxels (11) and pixels (8): drawn
+ * as hexahedra and quads; a copy of the connectivity. Polyhedra (42): their face streams become faces shared between
+ * cells; a copy. Pentagonal and hexagonal prisms (15, 16) come as polyhedra too. Quadratic and higher-order cells:
+ * drawn by their corners as linear cells, and reported; copied. What else is left, polyhedra without their faces too:
+ * not drawn, and reported; so are lines and points.
+ *
+ * Polygonal data: points are borrowed, and polygons where there are no lines, points and strips beside them.
+ *
+ * Fields: float, double and 32- or 64-bit signed integers borrowed; other types copied.
+ *
+ * vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn, nor cells of structured grids with a
+ * hidden point; nor those whose avtGhostZones, of VisIt, is not 0. Bytes are borrowed, flags of other types copied.
+ *
+ * Overlapping AMR: cells within a box of the next level are not drawn, whether or not vtkAMRUtilities::BlankCells() has
+ * flagged them, and whichever rank holds the finer grid. Boxes, and spacings or ratios, are to be set for all levels on
+ * every rank, as VTK wants them; a warning says where they do not fit the grids.
  *
  * No function throws, and none changes a data set. */
 #ifndef INSITU_VTK_H

@@ -1,4 +1,5 @@
-/* Makes of any VTK data set the unstructured grid as which insitu_vtk_set() takes it, and reads ghost flags. */
+/* Makes an unstructured grid of any VTK data set, as insitu-render needs it to deal cells out, and reads ghost flags.
+ * insitu_vtk_set() takes structured data sets as they are. */
 #ifndef INSITU_VTK_GRIDS_H
 #define INSITU_VTK_GRIDS_H
 
