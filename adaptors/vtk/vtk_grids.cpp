@@ -3,7 +3,6 @@
  * rectilinear grids a list of points, 24 bytes each. */
 #include "insitu/vtk_grids.h"
 
-#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -13,18 +12,18 @@
 #include <vtkDataSet.h>
 #include <vtkFieldData.h>
 #include <vtkIdList.h>
-#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkRectilinearGrid.h>
 #include <vtkSmartPointer.h>
-#include <vtkStructuredGrid.h>
 #include <vtkTypeInt32Array.h>
 #include <vtkTypeInt64Array.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
+
+#include "vtk_lattices.h"
 
 namespace
 {
@@ -42,21 +41,13 @@ struct lattice {
 /* False for data without such axes, or with fewer than two of them. */
 bool get_lattice(vtkDataSet *data, lattice &l)
 {
-    std::array<int, 3> d{};
-    if (auto *image = vtkImageData::SafeDownCast(data))
-        image->GetDimensions(d.data());
-    else if (auto *rectilinear = vtkRectilinearGrid::SafeDownCast(data))
-        rectilinear->GetDimensions(d.data());
-    else if (auto *curvilinear = vtkStructuredGrid::SafeDownCast(data))
-        curvilinear->GetDimensions(d.data());
-    std::array<int64_t, 3> axes = {1, 1, 1};
+    int64_t cells[3], axes[3] = {1, 1, 1};
+    if (!insitu_vtk::cells_of_lattice(data, cells)) return false;
     size_t count = 0;
-    for (const int size : d) {
-        if (size < 1) return false;
-        if (size > 1) axes[count++] = size;
-    }
+    for (const int64_t along : cells)
+        if (along > 0) axes[count++] = along + 1;
     l = {axes[0], axes[1], axes[2]};
-    return count > 1;
+    return true;
 }
 
 /* Lists the cells in VTK's order, hidden ones too. */
@@ -142,26 +133,15 @@ void set_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 }
 
 /* A structured grid may hide cells by their points; a flag of the cell then says the same. */
-void hide_cells_of_hidden_points(vtkUnstructuredGrid *grid)
+void hide_cells_of_hidden_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
-    using flag_list = vtkSmartPointer<vtkUnsignedCharArray>;
-    const auto points = flag_list::Take(insitu_vtk_ghost_flags(grid->GetPointData(), grid->GetNumberOfPoints()));
-    const auto cells = flag_list::Take(insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells()));
-    if (!points) return;
-    vtkNew<vtkUnsignedCharArray> flags;
-    flags->SetName(vtkDataSetAttributes::GhostArrayName());
-    flags->SetNumberOfValues(grid->GetNumberOfCells());
+    insitu_lattice lattice = {};
+    insitu_vtk::cells_of_lattice(data, lattice.cells);
+    const auto flags = insitu_vtk::lattice_flags(data, lattice);
+    if (!flags || flags->GetName()) return;
     bool is_any_hidden = false;
-    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
-        unsigned flag = cells ? cells->GetValue(i) : 0;
-        vtkIdType count = 0;
-        const vtkIdType *ids = nullptr;
-        grid->GetCellPoints(i, count, ids);
-        for (vtkIdType k = 0; k < count; k++)
-            if (points->GetValue(ids[k]) & vtkDataSetAttributes::HIDDENPOINT) flag |= vtkDataSetAttributes::HIDDENCELL;
-        is_any_hidden = is_any_hidden || flag;
-        flags->SetValue(i, static_cast<unsigned char>(flag));
-    }
+    for (vtkIdType i = 0; i < flags->GetNumberOfValues(); i++) is_any_hidden = is_any_hidden || flags->GetValue(i);
+    flags->SetName(vtkDataSetAttributes::GhostArrayName());
     if (is_any_hidden) grid->GetCellData()->AddArray(flags);
 }
 
@@ -202,7 +182,7 @@ vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data)
     lattice l;
     if (get_lattice(data, l)) {
         set_lattice(l, grid);
-        hide_cells_of_hidden_points(grid);
+        hide_cells_of_hidden_points(data, grid);
     } else if (!borrow_polygons(vtkPolyData::SafeDownCast(data), grid)) {
         set_cells(data, grid);
     }

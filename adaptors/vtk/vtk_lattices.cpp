@@ -20,25 +20,6 @@ namespace insitu_vtk
 namespace
 {
 
-/* Cells along the axes. False where data has no such axes, or fewer than two with cells. */
-bool get_cells(vtkDataSet *data, int64_t cells[3])
-{
-    std::array<int, 3> d{};
-    if (auto *image = vtkImageData::SafeDownCast(data))
-        image->GetDimensions(d.data());
-    else if (auto *rectilinear = vtkRectilinearGrid::SafeDownCast(data))
-        rectilinear->GetDimensions(d.data());
-    else if (auto *curvilinear = vtkStructuredGrid::SafeDownCast(data))
-        curvilinear->GetDimensions(d.data());
-    int count = 0;
-    for (size_t a = 0; a < 3; a++) {
-        if (d[a] < 1) return false;
-        cells[a] = d[a] - 1;
-        count += d[a] > 1;
-    }
-    return count > 1;
-}
-
 /* VTK's point along an axis is spacing * i + origin, with i counted in the whole extent, if the axes are not turned. */
 bool set_uniform(vtkImageData *image, insitu_lattice &lattice)
 {
@@ -85,11 +66,29 @@ void list_points(vtkDataSet *data, const std::string &what, hold &held, tally &c
 
 } // namespace
 
+bool cells_of_lattice(vtkDataSet *data, int64_t cells[3])
+{
+    std::array<int, 3> d{};
+    if (auto *image = vtkImageData::SafeDownCast(data))
+        image->GetDimensions(d.data());
+    else if (auto *rectilinear = vtkRectilinearGrid::SafeDownCast(data))
+        rectilinear->GetDimensions(d.data());
+    else if (auto *curvilinear = vtkStructuredGrid::SafeDownCast(data))
+        curvilinear->GetDimensions(d.data());
+    int count = 0;
+    for (size_t a = 0; a < 3; a++) {
+        if (d[a] < 1) return false;
+        cells[a] = d[a] - 1;
+        count += d[a] > 1;
+    }
+    return count > 1;
+}
+
 bool view_lattice(vtkDataSet *data, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
                   insitu_lattice &lattice)
 {
     lattice = {};
-    if (!get_cells(data, lattice.cells)) return false;
+    if (!cells_of_lattice(data, lattice.cells)) return false;
     mesh.vertex_count = data->GetNumberOfPoints();
     mesh.cell_count = data->GetNumberOfCells();
     mesh.lattice = &lattice;
