@@ -124,7 +124,9 @@ std::vector<std::string> wrap(const sheet &s, const std::string &text, int size,
         const std::size_t end = std::min(text.find(' ', at), text.size());
         std::string word = text.substr(at, end - at);
         at = end + 1;
-        const std::string longer = line.empty() ? word : line + " " + word;
+        std::string longer = line;
+        if (!line.empty()) longer += ' ';
+        longer += word;
         if (s.measure(longer, size) <= room) {
             line = longer;
             continue;

@@ -11,8 +11,9 @@ static int quads[CELLS][4];
 static void make_mesh(int rank)
 {
     for (int v = 0; v < VERTICES; v++) {
-        xy[v][0] = rank + v % (N + 1) / (double)N;
-        xy[v][1] = v / (N + 1) / (double)N;
+        const int column = v % (N + 1), row = v / (N + 1);
+        xy[v][0] = rank + column / (double)N;
+        xy[v][1] = row / (double)N;
     }
     for (int c = 0; c < CELLS; c++) {
         const int first = c % N + c / N * (N + 1), around[4] = {0, 1, N + 2, N + 1};

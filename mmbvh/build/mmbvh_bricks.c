@@ -70,11 +70,10 @@ static void measure_edges(const grid *g, double out[3])
 /* Halves a brick of two cells or more. */
 static void halve(const bricks *s, const brick *b, brick halves[2])
 {
-    int along = -1;
-    for (int axis = 0; axis < 3; axis++)
-        if (b->count[axis] > 1 &&
-            (along < 0 || (double)b->count[axis] * s->edge[axis] > (double)b->count[along] * s->edge[along]))
-            along = axis;
+    double reach[3];
+    for (int axis = 0; axis < 3; axis++) reach[axis] = b->count[axis] > 1 ? (double)b->count[axis] * s->edge[axis] : -1;
+    int along = reach[1] > reach[0];
+    along = reach[2] > reach[along] ? 2 : along;
     halves[0] = halves[1] = *b;
     halves[0].count[along] = b->count[along] / 2;
     halves[1].first[along] += halves[0].count[along];

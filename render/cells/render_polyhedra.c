@@ -249,6 +249,7 @@ static void keep_vertices(const work *w, int64_t cell, polyhedron *c)
 static bool collapses(const work *w, const int *around)
 {
     const double *corners[4];
+    /* cppcheck-suppress objectIndex ; around is four entries of a face, not one */
     for (int i = 0; i < 4; i++) corners[i] = w->positions[around[i]];
     return quad_collapses(corners);
 }

@@ -72,7 +72,7 @@ class vtk_file : public data_file
             times_.assign(first, first + info->Length(pipeline::TIME_STEPS()));
         }
 #ifdef INSITU_VTK_EXODUS
-        if (!times_.empty()) warnings_ = warn_of_exodus(path, reader_);
+        if (!times_.empty()) warnings() = warn_of_exodus(path, reader_);
 #endif
         if (kind.piece_tag) pieces_ = count_tags(path, kind.piece_tag);
     }

@@ -52,6 +52,9 @@ class data_file
     std::string take_warnings() { return std::exchange(warnings_, ""); }
 
   protected:
+    std::string &warnings() { return warnings_; }
+
+  private:
     std::string warnings_;
 };
 

@@ -281,7 +281,10 @@ std::string warn_of_exodus(const std::string &path, vtkAlgorithm *algorithm)
         if (upper(name.substr(0, 3)) != "DIS" ||
             r->GetNumberOfObjectArrayComponents(vtkExodusIIReader::NODAL, i) != r->GetDimensionality())
             continue;
-        return path + ": points are moved by the displacement \"" + name + "\" of the file\n";
+        return std::string(path)
+            .append(": points are moved by the displacement \"")
+            .append(name)
+            .append("\" of the file\n");
     }
     return "";
 }

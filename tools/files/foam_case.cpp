@@ -82,9 +82,15 @@ void check_processors(const std::string &path, const fs::path &folder, const std
     for (size_t i = 0; i < numbers.size(); i++) {
         const std::string name = folder_of(i);
         if (numbers[i] != static_cast<int>(i))
-            throw std::runtime_error(path + ": " + name + "/ is missing, as there is processor" +
-                                     std::to_string(numbers.back()) + "/");
-        if (!has_mesh(folder / name)) throw std::runtime_error(path + ": " + name + "/constant/polyMesh/ is missing");
+            throw std::runtime_error(std::string(path)
+                                         .append(": ")
+                                         .append(name)
+                                         .append("/ is missing, as there is processor")
+                                         .append(std::to_string(numbers.back()))
+                                         .append("/"));
+        if (!has_mesh(folder / name))
+            throw std::runtime_error(
+                std::string(path).append(": ").append(name).append("/constant/polyMesh/ is missing"));
     }
 }
 
@@ -93,8 +99,8 @@ void check_collated(const std::string &path, const fs::path &folder)
 {
     for (const std::string &name : folders_in(folder))
         if (name.compare(0, 10, "processors") == 0 && std::isdigit(static_cast<unsigned char>(name[10])))
-            throw std::runtime_error(path + ": " + name +
-                                     "/ is of OpenFOAM's collated format, which is not read: run reconstructPar first");
+            throw std::runtime_error(std::string(path).append(": ").append(name).append(
+                "/ is of OpenFOAM's collated format, which is not read: run reconstructPar first"));
 }
 
 /* Opens the case with the steps that all processors have. */
@@ -113,6 +119,7 @@ std::unique_ptr<parts_file> open_processors(const fs::path &path, size_t count)
         }
     }
     std::vector<double> times;
+    times.reserve(common.size());
     for (const auto &step : common) times.push_back(step.first);
     auto file = std::make_unique<parts_file>(path.string(), parts, times);
     for (const std::string &warning : warnings) file->warn(warning);

@@ -130,7 +130,7 @@ class hdf
         if (H5Tis_variable_str(kind) > 0) {
             char *text = nullptr;
             if (H5Aread(attribute, kind, static_cast<void *>(&text)) < 0 || !text) refuse("its Type is unreadable");
-            const std::string copy = text;
+            std::string copy = text;
             H5free_memory(text);
             return copy;
         }
@@ -244,7 +244,7 @@ class hdf_grids : public data_file
             set_counts(at);
             const bool is_mine = i * pieces / count == piece;
             if (is_mine) {
-                const auto grid = read_part(at, first, step);
+                auto grid = read_part(at, first, step);
                 if (count == 1) return grid;
                 all->SetBlock(static_cast<unsigned>(i), grid);
             }
@@ -339,7 +339,7 @@ class hdf_grids : public data_file
     void set_cells(const part_place &at, vtkUnstructuredGrid *grid) const
     {
         const auto list = [&](const char *name, int64_t first, int64_t count, int type) {
-            const array_pointer array = in_.rows(std::string("/VTKHDF/") + name, first, count, type);
+            array_pointer array = in_.rows(std::string("/VTKHDF/") + name, first, count, type);
             if (!array || array->GetNumberOfComponents() != 1) in_.refuse(std::string(name) + " is no list of numbers");
             return array;
         };

@@ -39,7 +39,7 @@ vtkSmartPointer<vtkDataObject> parts_file::read(size_t step, int piece, int piec
     for (size_t p = 0; p < count; p++) {
         if (static_cast<int>(p * static_cast<size_t>(pieces) / count) != piece) continue;
         const auto part = read_part(p, step);
-        warnings_ += files_[p]->take_warnings();
+        warnings() += files_[p]->take_warnings();
         all->SetBlock(static_cast<unsigned>(p), part);
         if (!first) first = vtkMultiBlockDataSet::SafeDownCast(part);
     }
@@ -92,7 +92,11 @@ std::unique_ptr<data_file> open_nemesis(const std::string &path, const nemesis_n
         parts.push_back(name.start + std::string(zeros, '0') + number);
         const std::string why_not = why_not_data(parts.back());
         if (!why_not.empty())
-            throw std::runtime_error(why_not + ", one of the " + std::to_string(name.count) + " pieces of " + path);
+            throw std::runtime_error(std::string(why_not)
+                                         .append(", one of the ")
+                                         .append(std::to_string(name.count))
+                                         .append(" pieces of ")
+                                         .append(path));
     }
     const std::vector<double> times = open_by_vtk(parts[0])->times();
     return std::make_unique<parts_file>(path, parts, times);

@@ -18,7 +18,7 @@ class parts_file : public data_file
   public:
     parts_file(std::string path, std::vector<std::string> parts, std::vector<double> times);
 
-    void warn(const std::string &what) { warnings_ += path_ + ": " + what + '\n'; }
+    void warn(const std::string &what) { warnings() += path_ + ": " + what + '\n'; }
 
     const std::vector<double> &times() const override { return times_; }
     std::string step_path(size_t) const override { return path_; }

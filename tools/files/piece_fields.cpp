@@ -60,9 +60,12 @@ void leave_out_others(vtkDataSetAttributes *data, bool is_at_points, const std::
         const std::string name = text ? text : "";
         const auto is_same = [&](const declared_field &f) { return f.is_at_points == is_at_points && f.name == name; };
         if (is_ghost_array(name) || std::any_of(fields.begin(), fields.end(), is_same)) continue;
-        warnings += piece + ": has a field \"" + name +
-                    "\", which the file that names the piece does not declare for " +
-                    (is_at_points ? "points" : "cells") + ": left out\n";
+        warnings.append(piece)
+            .append(": has a field \"")
+            .append(name)
+            .append("\", which the file that names the piece does not declare for ")
+            .append(is_at_points ? "points" : "cells")
+            .append(": left out\n");
         data->RemoveArray(i);
     }
 }

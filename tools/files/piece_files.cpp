@@ -57,7 +57,7 @@ vtkSmartPointer<vtkXMLDataElement> read_xml(const std::string &path)
 
 vtkSmartPointer<vtkXMLDataElement> read_list(const std::string &path, const char *list)
 {
-    const vtkSmartPointer<vtkXMLDataElement> found = read_xml(path)->FindNestedElementWithName(list);
+    vtkSmartPointer<vtkXMLDataElement> found = read_xml(path)->FindNestedElementWithName(list);
     if (!found) refuse(path, "cannot be read: has no element " + std::string(list));
     return found;
 }
@@ -148,7 +148,7 @@ class pvtu_file : public data_file
             auto *grid = vtkUnstructuredGrid::SafeDownCast(data);
             if (!grid) refuse(path_, pieces_[i] + " is no unstructured grid");
             if (grid->GetNumberOfCells() == 0) continue;
-            make_fields_as_declared(grid, fields_, pieces_[i], warnings_);
+            make_fields_as_declared(grid, fields_, pieces_[i], warnings());
             grids.emplace_back(grid);
         }
         vtkSmartPointer<vtkDataObject> all = append(grids);
@@ -211,7 +211,7 @@ class series_file : public data_file
     {
         data_file &file = open(path);
         auto data = file.read(0, piece, pieces);
-        warnings_ += file.take_warnings();
+        warnings() += file.take_warnings();
         return data;
     }
     data_file &open(const std::string &path)

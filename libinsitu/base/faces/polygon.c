@@ -172,7 +172,8 @@ static double area_of(const polygon_work *w, int a, int b, int c)
 
 static bool are_together(const polygon_work *w, int a, int b)
 {
-    return memcmp(w->places[a], w->places[b], sizeof w->places[a]) == 0;
+    const double *p = w->places[a], *q = w->places[b];
+    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
 /* Tells whether the polygon, where it passes the tip's place once more, comes from or goes into the tip's corner. */

@@ -226,12 +226,12 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
 {
     unsigned changes = 0;
     if (!a || !b) return a == b ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_ALL;
-    if (memcmp(a->cells, b->cells, sizeof a->cells) ||
-        memcmp(a->vertex_strides, b->vertex_strides, sizeof a->vertex_strides) ||
-        memcmp(a->cell_strides, b->cell_strides, sizeof a->cell_strides))
+    if (memcmp(a->cells, b->cells, sizeof a->cells) != 0 ||
+        memcmp(a->vertex_strides, b->vertex_strides, sizeof a->vertex_strides) != 0 ||
+        memcmp(a->cell_strides, b->cell_strides, sizeof a->cell_strides) != 0)
         return INSITU_CHANGED_ALL;
-    if (memcmp(a->interior_first, b->interior_first, sizeof a->interior_first) ||
-        memcmp(a->interior_end, b->interior_end, sizeof a->interior_end))
+    if (memcmp(a->interior_first, b->interior_first, sizeof a->interior_first) != 0 ||
+        memcmp(a->interior_end, b->interior_end, sizeof a->interior_end) != 0)
         changes |= INSITU_CHANGED_TOPOLOGY;
     for (int axis = 0; axis < 3; axis++)
         if (a->origin[axis] != b->origin[axis] || a->spacing[axis] != b->spacing[axis] ||

@@ -139,7 +139,7 @@ static int64_t count_listed(const session_mesh *mesh, base_error *error)
         total += row.size;
         if (total <= INT64_MAX / 64) continue;
         base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld, too many with those before",
-                  mesh->name, (long long)(face + mesh->given.index_base), (long long)row.size);
+                  mesh->name, (long long)face + mesh->given.index_base, (long long)row.size);
         return -1;
     }
     return total;

@@ -260,7 +260,7 @@ static void respell(char *text, size_t size, const char *from, const char *to)
     const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* colors */
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
-    memcpy(at, to, strlen(to));
+    for (size_t i = 0; to[i]; i++) at[i] = to[i]; /* what is behind has its end already */
 }
 
 /* American spellings: color is colour, and center is centre. */

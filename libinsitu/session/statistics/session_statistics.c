@@ -119,8 +119,7 @@ enum { ENDS = 3, KINDS = 2 };
 
 static void find_ends(const statistics_pass *p, double ends[KINDS * ENDS])
 {
-    const int threads = p->team->threads;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(p->team->threads)
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
