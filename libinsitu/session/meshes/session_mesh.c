@@ -136,6 +136,20 @@ void session_drop_copy(session_field *field)
     field->made_of = 0;
 }
 
+session_field *session_add_field(session_mesh *mesh, const char *name)
+{
+    char *copy = base_strdup(name);
+    session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
+    if (fields) mesh->fields = fields;
+    if (!copy || !fields) {
+        base_free(copy);
+        return NULL;
+    }
+    session_field *field = &fields[mesh->field_count++];
+    *field = (session_field){.given = {.name = copy}};
+    return field;
+}
+
 void session_drop_fields(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++) {

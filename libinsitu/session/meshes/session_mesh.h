@@ -256,6 +256,9 @@ void session_drop_array(grid_array *array);
 session_mesh *session_find_mesh(const session_meshes *meshes, const char *name);
 int session_find_field(const session_mesh *mesh, const char *name); /* -1: there is none */
 
+/* Adds a field without values, whose name is new and is copied. NULL where memory runs out. */
+session_field *session_add_field(session_mesh *mesh, const char *name);
+
 /* Add an empty mesh, whose name is new. NULL where memory runs out. */
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error);
 /* Nothing happens where there is none of this name. */

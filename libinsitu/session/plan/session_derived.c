@@ -37,13 +37,9 @@ static uint64_t with_sources(const scene *scene, uint64_t needed)
 
 static uint64_t bits_of_image(const scene *scene, const scene_image *image)
 {
+    scene_field_walk walk = {.image = image};
     uint64_t bits = 0;
-    for (int i = 0; i < image->isosurface_count; i++)
-        bits |= bit_of(scene, &image->isosurfaces[i].field) | bit_of(scene, &image->isosurfaces[i].colour_by);
-    for (int i = 0; i < image->volume_count; i++) bits |= bit_of(scene, &image->volumes[i].field);
-    for (int i = 0; i < image->slice_count; i++) bits |= bit_of(scene, &image->slices[i].field);
-    for (int i = 0; i < image->surface_count; i++)
-        bits |= bit_of(scene, &image->surfaces[i].colour_by) | bit_of(scene, &image->surfaces[i].threshold.field);
+    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) bits |= bit_of(scene, field);
     return bits;
 }
 
@@ -237,13 +233,11 @@ static bool name_on_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
     for (int f = 0; f < all->field_count; f++) {
         const session_catalogue_field *field = &all->fields[f];
         if (!is_sound(field)) continue;
-        session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
-        char *name = fields ? base_strdup(field->name) : NULL;
-        if (fields) mesh->fields = fields;
-        if (!name) return false;
-        fields[mesh->field_count++] = (session_field){
-            .given = {.name = name, .component_count = field->component_count, .centring = field->centring},
-            .is_derived = true};
+        session_field *own = session_add_field(mesh, field->name);
+        if (!own) return false;
+        own->given.component_count = field->component_count;
+        own->given.centring = field->centring;
+        own->is_derived = true;
     }
     return true;
 }

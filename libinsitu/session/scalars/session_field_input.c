@@ -9,16 +9,8 @@
 
 static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
 {
-    char *copy = base_strdup(name);
-    session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
-    if (fields) mesh->fields = fields;
-    if (!copy || !fields) {
-        base_free(copy);
-        session_no_memory(error, (int64_t)sizeof *fields, "a field's description");
-        return NULL;
-    }
-    session_field *field = &fields[mesh->field_count++];
-    *field = (session_field){.given = {.name = copy}};
+    session_field *field = session_add_field(mesh, name);
+    if (!field) session_no_memory(error, (int64_t)sizeof *field, "a field's description");
     return field;
 }
 
