@@ -390,14 +390,6 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-static bool writes_words(const scene_image *image)
-{
-    bool is_decorated = false;
-    for (int i = 0; i < image->output_count; i++)
-        is_decorated = is_decorated || (image->outputs[i].has_decorations && !image->outputs[i].is_deep);
-    return is_decorated && scene_has_words(image);
-}
-
 /* On rank 0. The words are laid out here, before the writing thread does it again, so that the warnings come with the
  * step that draws them. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
@@ -424,7 +416,7 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
         out->decorations = session_make_decorations(
             image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline, d->catalogue});
         if (!out->decorations) session_no_memory(error, (int64_t)sizeof *out->decorations, "decorations");
-        if (out->decorations && writes_words(image)) warn_of_words(d, image, out->decorations);
+        if (out->decorations && scene_has_words(image)) warn_of_words(d, image, out->decorations);
     }
     session_free_outline(&outline);
     return INSITU_OK;
@@ -489,7 +481,7 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
     bool has_lines = !d->writes_behind; /* rank 0 may have warnings for all */
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
-        has_lines = has_lines || writes_words(plan->images[i]);
+        has_lines = has_lines || scene_has_words(plan->images[i]);
         scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {

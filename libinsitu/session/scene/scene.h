@@ -442,7 +442,8 @@ static inline bool scene_has_words(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
     bool is_decorated = false;
-    for (int i = 0; i < image->output_count; i++) is_decorated = is_decorated || image->outputs[i].has_decorations;
+    for (int i = 0; i < image->output_count; i++)
+        is_decorated = is_decorated || (image->outputs[i].has_decorations && !image->outputs[i].is_deep);
     return is_decorated && d->is_given &&
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }

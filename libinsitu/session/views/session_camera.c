@@ -20,8 +20,8 @@ static const double filled = 0.95;
 /* Chooses up, or, where that is along the view, an axis that is not. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
-    const double cross[3] = {direction[1] * up[2] - direction[2] * up[1], direction[2] * up[0] - direction[0] * up[2],
-                             direction[0] * up[1] - direction[1] * up[0]};
+    double cross[3];
+    vector3_cross(direction, up, cross);
     for (int axis = 0; axis < 3; axis++) out[axis] = up[axis];
     if (vector3_length(cross) > 1e-6 * vector3_length(direction) * vector3_length(up)) return;
     int least = 0;
