@@ -16,18 +16,10 @@ typedef struct row_floats {
     float low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], poison[ROWS_CELLS + 1];
 } row_floats;
 
-/* The axis along which cells have successive numbers, or -1. */
-static int row_axis(const grid_lattice *l)
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (l->by_cell.stride[axis] == 1) return axis;
-    return -1;
-}
-
 bool rows_fit(const grid *g, const grid_field *field)
 {
     return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !field->own &&
-           row_axis(g->lattice) >= 0;
+           grid_lattice_row_axis(g->lattice) >= 0;
 }
 
 /* The least and greatest of two. */
@@ -98,7 +90,7 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
 bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out)
 {
     const grid_lattice *l = g->lattice;
-    const int along = row_axis(l);
+    const int along = grid_lattice_row_axis(l);
     if (!next_cells(l, along, from, end, out)) return false;
     const char *rows[4];
     const char *data = field->values.data + field->component * field->component_stride;

@@ -147,6 +147,14 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
+/* Returns the axis along which cells have successive numbers, or -1. */
+static inline int grid_lattice_row_axis(const grid_lattice *l)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (l->by_cell.stride[axis] == 1) return axis;
+    return -1;
+}
+
 /* Returns the number of a cell's first vertex. */
 static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
 {

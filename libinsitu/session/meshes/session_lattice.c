@@ -28,8 +28,7 @@ static bool are_zero(const int64_t values[3])
     return !values[0] && !values[1] && !values[2];
 }
 
-/* Tells whether the cells are quads: one axis has none. */
-static bool is_plane(const insitu_lattice *l)
+bool session_is_plane(const insitu_lattice *l)
 {
     return !l->cells[0] || !l->cells[1] || !l->cells[2];
 }
@@ -302,7 +301,7 @@ void session_read_lattice(session_mesh *mesh, grid *g)
     const insitu_lattice *l = mesh->given.lattice;
     if (!l || are_zero(l->cells)) return;
     g->lattice = &mesh->lattice.cells;
-    g->cell_type = is_plane(l) ? GRID_QUAD : GRID_HEX;
+    g->cell_type = session_is_plane(l) ? GRID_QUAD : GRID_HEX;
     for (int axis = 0; axis < 3 && session_has_axes(&mesh->given); axis++)
         g->coordinates[axis] = (grid_array){.is_wide = true, .axis = &mesh->lattice.cells.axes[axis]};
 }

@@ -7,6 +7,9 @@
 /* Checks the description of mesh->lattice, which is given. Local. */
 insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error);
 
+/* Tells whether the cells are quads: one axis has none. */
+bool session_is_plane(const insitu_lattice *lattice);
+
 /* Tells whether the coordinates are a lattice's own, not given by vertex. */
 bool session_has_axes(const insitu_mesh *mesh);
 

@@ -68,7 +68,7 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
 /* Tells whether cells without z coordinates may be seen: shells in the plane z = 0. */
 static bool may_be_plane(const insitu_mesh *mesh)
 {
-    if (mesh->lattice) return mesh->lattice->cells[2] == 0;
+    if (mesh->lattice) return session_is_plane(mesh->lattice);
     return mesh->cell_types.data || mesh->cell_count == 0 || grid_is_shell_type((int)mesh->cell_type);
 }
 

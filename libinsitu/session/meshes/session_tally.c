@@ -287,9 +287,8 @@ static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, 
     const grid *g = &mesh->cells;
     const grid_lattice *l = g->lattice;
     lane_cells alike = {.g = g, .type = g->cell_type, .first = cell, .count = 1};
-    int along = 0;
-    while (along < 3 && l->by_cell.stride[along] != 1) along++;
-    if (along == 3 || g->vertex_count > INT32_MAX || !grid_lattice_draws(l, cell)) return alike;
+    const int along = grid_lattice_row_axis(l);
+    if (along < 0 || g->vertex_count > INT32_MAX || !grid_lattice_draws(l, cell)) return alike;
     const int64_t left = l->drawn_end[along] - grid_index_along(&l->by_cell, along, cell);
     const int64_t count = left < end - cell ? left : end - cell, step = l->by_vertex.stride[along];
     int64_t first = grid_lattice_first(l, cell);
