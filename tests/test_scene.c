@@ -174,6 +174,7 @@ static const char every_key[] =
     "  q: {q_criterion: u}\n"
     "  l: {lambda2: u}\n"
     "  s: {strain_rate: u}\n"
+    "  slice: {field: u, component: x}\n"
     "writing: step\n"
     "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
@@ -1301,7 +1302,7 @@ static void derived_fields_are_sorted_and_read(void **state)
     scene s;
     int late, speed, last, late_w, at;
     parse_good(every_key, &s);
-    assert_int_equal(s.derived_count, 10);
+    assert_int_equal(s.derived_count, 11);
     const scene_derived *of = find_derived(&s, "late", &late);
     find_derived(&s, "speed", &speed);
     const scene_derived *curl = find_derived(&s, "last", &last);
@@ -1318,6 +1319,7 @@ static void derived_fields_are_sorted_and_read(void **state)
     assert_string_equal(s.derived[late_w].inputs[1].name, "a b");
     assert_true(s.derived[speed].inputs[0].component == SCENE_COMPONENT_MAGNITUDE);
     assert_true(find_derived(&s, "y", &at)->inputs[0].component == 1);
+    assert_true(find_derived(&s, "slice", &at)->inputs[0].component == 0);
     assert_true(find_derived(&s, "g", &at)->component == SCENE_COMPONENT_MAGNITUDE);
     assert_true(find_derived(&s, "d", &at)->kind == SCENE_DIVERGENCE &&
                 find_derived(&s, "q", &at)->kind == SCENE_Q_CRITERION);

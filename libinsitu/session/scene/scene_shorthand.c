@@ -299,14 +299,14 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) node_of(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* The node of the scene's parameters, whose keys are names of its own: they have no short forms. 0: there is none. */
-static int find_parameters(const rewrite *r)
+/* The node of one of the scene's own mappings. 0: there is none. */
+static int find_own(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = node_of(r, 1);
     if (!root || root->type != YAML_MAPPING_NODE) return 0;
     for (const yaml_node_pair_t *p = root->data.mapping.pairs.start; p < root->data.mapping.pairs.top; p++) {
         const char *key = text_of(r, p->key);
-        if (key && strcmp(key, "parameters") == 0) return p->value;
+        if (key && strcmp(key, name) == 0) return p->value;
     }
     return 0;
 }
@@ -314,9 +314,12 @@ static int find_parameters(const rewrite *r)
 bool scene_expand_shorthand(yaml_document_t *document)
 {
     rewrite r = {.document = document, .has_memory = true};
-    const int count = (int)(document->nodes.top - document->nodes.start), parameters = find_parameters(&r);
+    const int count = (int)(document->nodes.top - document->nodes.start);
+    /* Their keys are names that the scene gives, which have no short forms. */
+    const int parameters = find_own(&r, "parameters"), fields = find_own(&r, "fields");
     for (int number = 1; number <= count && r.has_memory; number++)
-        if (number != parameters && node_of(&r, number)->type == YAML_MAPPING_NODE) expand_mapping(&r, number);
+        if (number != parameters && number != fields && node_of(&r, number)->type == YAML_MAPPING_NODE)
+            expand_mapping(&r, number);
     return r.has_memory;
 }
 
