@@ -63,7 +63,7 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, 
     }
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
-    t->curved->is_set_up = false;
+    t->curved->bounds = NULL;
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
@@ -305,6 +305,7 @@ typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
     kernel_cell tile_cell;
     kernel_curved tile_curved;
+    kernel_curved_room tile_curved_room;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
@@ -435,6 +436,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.curved = &m->tile_curved;
+    m->tile_curved.room = &m->tile_curved_room;
     m->tile.search = &m->search.nodes;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;

@@ -54,36 +54,26 @@ static inline void bundle_place(bundle *b)
 /* All of the packet's directions. */
 static inline kernel_beam bundle_beam(const kernel_packet *p)
 {
-    kernel_beam beam = {.spread = 0};
-    float *const middle[2] = {&beam.x, &beam.y};
-    const vf slopes[2] = {p->slope_x, p->slope_y};
-    for (int a = 0; a < 2; a++) {
-        const float low = vf_reduce_min(slopes[a]), high = vf_reduce_max(slopes[a]);
-        *middle[a] = 0.5f * (low + high);
-        beam.spread = fmaxf(beam.spread, fmaxf(high - *middle[a], *middle[a] - low) * 1.000001f);
-    }
-    return beam;
+    const vf most = vf_max(vf_abs(p->slope_x), vf_abs(p->slope_y));
+    return (kernel_beam){.spread = vf_reduce_max(most)};
 }
 
-/* The packet's intervals in the cell, with its map and bounds; returns how many they are. */
-static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS], kernel_map *map,
-                                   kernel_bounds *bounds)
+/* The packet's intervals in the cell, with its bounds; returns how many they are. */
+static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS], kernel_curved *curved)
 {
     const kernel_beam beam = bundle_beam(&b->packet);
-    kernel_map_setup(map, &b->cell);
-    kernel_bounds_setup(bounds, map, b->cell.type, &beam);
+    kernel_curved_alone(&b->cell, &beam, curved);
     return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, false, list);
 }
 
 /* First hits on all rays, and how many hits there are. */
-static inline vm bundle_hits(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i,
-                             vf *t, vf *hits)
+static inline vm bundle_hits(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf *t, vf *hits)
 {
-    kernel_search_cell cell;
+    const kernel_rays rays = kernel_packet_rays(&b->packet);
     kernel_search s;
     vm hit = vm_none();
     *t = *hits = vf_set(0);
-    if (!kernel_search_in(&s, &cell, &b->packet, map, bounds, i, i->mask)) return hit;
+    if (!kernel_search_in(&s, curved, &rays, vi_set(0), i, i->mask, &b->thread.map_failures)) return hit;
     do {
         kernel_point place;
         if (!vm_any(s.found)) continue;

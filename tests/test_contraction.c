@@ -14,7 +14,7 @@
  * And quads that are taken to look convex along all rays of a box (kernel_curved_dents()), of the same cells: as each
  * of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of the
  * quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
-#include "kernel_bounds_curved.h"
+#include "kernel_bounds.h"
 #include "kernel_contraction.h"
 #include "kernel_quad.h"
 #include "kernel_roots.h"
@@ -156,67 +156,22 @@ static void make_batch(batch *b, int type, shape s)
 
 /* ---- contraction ---- */
 
-static void sight_of(const batch *b, const kernel_curved_batch_bounds *bounds, kernel_sight *out)
+static void contract(const batch *b, kernel_contracted *out, kernel_bounds *bounds)
 {
-    vf origin[3], normal[3][3], gradient[3];
-    for (int a = 0; a < 3; a++) {
-        origin[a] = vf_load(b->at[a][0]);
-        gradient[a] = vf_load(bounds->gradient[a]);
-        for (int i = 0; i < 3; i++) normal[i][a] = vf_load(bounds->normal[i][a]);
-    }
-    kernel_sight_of(&b->rays, origin, (const vf(*)[3])normal, gradient, vf_load(bounds->level), out);
-}
-
-static void contraction_of(const kernel_contractions *c, kernel_contraction *out)
-{
-    for (int i = 0; i < 3; i++) out->offset[i] = vf_load(c->offset[i]);
-    for (int k = 0; k < 4; k++) {
-        for (int i = 0; i < 3; i++) out->bent[k][i] = vf_load(c->bent[k][i]);
-        out->field[k] = vf_load(c->field[k]);
-    }
-    out->middle = vf_load(c->middle);
-    out->grow = vf_load(c->grow);
-    out->blur = vf_load(c->blur);
-    out->rim = vf_load(c->rim);
-}
-
-/* The batch's map, fitted a lane at a time. */
-static void map_of(const batch *b, kernel_map_lanes *out)
-{
-    const int count = grid_type_vertices(b->type);
-    out->is_pyramid = b->type == GRID_PYRAMID;
-    out->tolerance = KERNEL_MAP_TOLERANCE;
-    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-        kernel_cell cell = {.type = b->type, .count = count};
-        kernel_map map;
-        for (int i = 0; i < count; i++) {
-            cell.x[i] = b->at[0][i][lane];
-            cell.y[i] = b->at[1][i][lane];
-            cell.z[i] = b->at[2][i][lane];
-            cell.f[i] = b->at[3][i][lane];
-        }
-        kernel_map_setup(&map, &cell);
-        for (int n = 0; n < 4; n++)
-            for (int i = 0; i < 8; i++) {
-                vf *const c = n < 3 ? out->position[n] : out->field;
-                c[i][lane] = n < 3 ? map.position[n].c[i] : map.field.c[i];
-                out->exact[lane / KERNEL_HALF][n][i][lane % KERNEL_HALF] = map.exact[n][i];
-            }
-        for (int a = 0; a < 3; a++) out->origin[a][lane] = map.origin[a];
-    }
-}
-
-static void contract(const batch *b, kernel_contracted *out, kernel_curved_batch_bounds *bounds)
-{
+    const kernel_curved cells = {.type = b->type, .at = b->at, .bounds = bounds};
+    int32_t own[SIMD_WIDTH];
+    vi lanes;
     kernel_contraction c;
     kernel_sight ray;
     kernel_map_lanes map;
     kernel_point at;
-    kernel_curved_batch_bound(b->type, b->at, &b->beam, bounds);
-    sight_of(b, bounds, &ray);
-    contraction_of(&bounds->contractions, &c);
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
+    memcpy(&lanes, own, sizeof lanes);
+    kernel_bounds_of(b->type, b->at, &b->beam, bounds);
+    kernel_sight_of(&cells, &b->rays, lanes, &ray);
+    kernel_contraction_of(bounds, lanes, b->type, &c);
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
-    map_of(b, &map);
+    kernel_maps_of_type(b->at, lanes, b->type, &map);
     at.t = out->t + vf_load(b->at[2][0]);
     memcpy(at.r, out->r, sizeof at.r);
     kernel_polish_near(&b->rays, &map, out->one, KERNEL_CONTRACTION_END, &at);
@@ -337,7 +292,7 @@ static void decided_crossings_are_right(void **state)
             count n = {.rays = 0};
             while (n.rays < rays_wanted / (3 * SHAPE_COUNT)) {
                 batch b;
-                kernel_curved_batch_bounds bounds;
+                kernel_bounds bounds;
                 kernel_contracted at;
                 make_batch(&b, types[k], s);
                 contract(&b, &at, &bounds);

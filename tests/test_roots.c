@@ -238,14 +238,14 @@ typedef struct rates {
 static void judge_bundle(bundle *b, rates *r)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_map map;
-    kernel_bounds bounds;
-    const int intervals = bundle_intervals(b, list, &map, &bounds);
-    r->monotone += bounds.is_monotone;
+    kernel_curved_room room;
+    kernel_curved curved = {.room = &room};
+    const int intervals = bundle_intervals(b, list, &curved);
+    r->monotone += room.bounds.jump[0] >= 0;
     for (int n = 0; n < intervals; n++) {
         vf t, hits;
         const vm change = vm_xor(vf_lt(list[n].v_in, vf_set(0)), vf_lt(list[n].v_out, vf_set(0)));
-        const unsigned hit = vm_bits(bundle_hits(b, &map, &bounds, &list[n], &t, &hits));
+        const unsigned hit = vm_bits(bundle_hits(b, &curved, &list[n], &t, &hits));
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[n].mask) >> lane & 1)) continue;
             const cubic g = exact_cubic(b, lane);

@@ -383,8 +383,7 @@ static void judge_ray(count *n, const kernel_map *map, course *c, double low, do
 
 /* Counts rays whose first crossing, or number of crossings, differs when they are traced alone: a ray's result must not
  * depend on the others of its packet. */
-static int64_t differ_alone(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i,
-                            vf t, vf hits)
+static int64_t differ_alone(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf t, vf hits)
 {
     int64_t differing = 0;
     for (unsigned rays = vm_bits(i->mask); rays; rays &= rays - 1) {
@@ -392,7 +391,7 @@ static int64_t differ_alone(bundle *b, const kernel_map *map, const kernel_bound
         kernel_interval alone = *i;
         vf own_t, own_hits;
         alone.mask = vm_from_bits(1u << lane);
-        bundle_hits(b, map, bounds, &alone, &own_t, &own_hits);
+        bundle_hits(b, curved, &alone, &own_t, &own_hits);
         differing += own_t[lane] != t[lane] || own_hits[lane] != hits[lane];
     }
     return differing;
@@ -402,12 +401,14 @@ static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
-    kernel_bounds bounds;
-    const int intervals = bundle_intervals(b, list, &map, &bounds);
+    kernel_curved_room room;
+    kernel_curved curved = {.room = &room};
+    const int intervals = bundle_intervals(b, list, &curved);
+    kernel_map_setup(&map, &b->cell);
     for (int i = 0; i < intervals; i++) {
         vf t, hits;
-        const unsigned hit = vm_bits(bundle_hits(b, &map, &bounds, &list[i], &t, &hits));
-        n->differing += differ_alone(b, &map, &bounds, &list[i], t, hits);
+        const unsigned hit = vm_bits(bundle_hits(b, &curved, &list[i], &t, &hits));
+        n->differing += differ_alone(b, &curved, &list[i], t, hits);
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
             *c = (course){.cell = cell, .values = b->values, .line = line_of(b, lane)};

@@ -1,4 +1,6 @@
-/* Bounds of a cell's map and field, for all rays that meet it (kernel_roots.h has what they are bounds of).
+/* Bounds of the maps and fields of hexes, wedges or pyramids, for all rays of a tile that meet them, a cell a lane
+ * (kernel_roots.h has what they are bounds of). A slope that does not depend on all three of a corner's coordinates is
+ * computed once for the corners that share it.
  *
  * Let L be linear in the point, with the field's gradient at the cell's centre, and E = F - L(X), polynomial as F is
  * and small where the field is smooth. Along a ray of direction d L(X) is linear, and r* has the slope J^-1 d: where
@@ -10,262 +12,505 @@
 #include <math.h>
 #include <string.h>
 
-#include "grid.h"
 #include "kernel_cell.h"
+#include "kernel_local.h"
 #include "kernel_map.h"
+#include "kernel_shapes.h"
 #include "kernel_types.h"
-#include "render.h"
+#include "kernel_wide.h"
 #include "simd.h"
 
-/* A number at each corner of a cell's domain. */
-typedef double kernel_corners __attribute__((vector_size(64)));
+/* What a ray's one crossing is found by (surface/kernel_contraction.h): Y = inverse (X - vertex 0) + offset is r +
+ * N(r), with r from the domain's middle, of a pyramid from the apex, and N's terms bent; the field is L + middle and
+ * terms field of the same products. */
+typedef struct kernel_contractions {
+    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
+    float grow[SIMD_WIDTH]; /* K / (1 - K) of the contraction's constant K; infinite where there is none */
+    float blur[SIMD_WIDTH], rim[SIMD_WIDTH];
+} kernel_contractions;
 
-static inline double kernel_corners_most(kernel_corners v)
+/* Bounds for cells and their isovalues, lane by lane. */
+typedef struct kernel_bounds {
+    /* A face's value and the field on the ray beside it are never farther apart; less than nothing where the field is
+     * not known to be monotone along the rays. */
+    float jump[SIMD_WIDTH];
+    /* L at vertex 0 and along tile space; and for |E|, with what rounding adds to it, or infinite where that is of no
+     * use, as nothing is proved of the cell. */
+    float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
+    /* J0^-1. The cell lies between pairs of planes: low <= normal . (X - vertex 0) <= high. */
+    float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
+    float bent[3][4][SIMD_WIDTH];                 /* N's coefficients 4 to 7 */
+    float stretch[SIMD_WIDTH], slope[SIMD_WIDTH]; /* L and G of kernel_roots.h */
+    float curve[SIMD_WIDTH], twist[SIMD_WIDTH];   /* H and K; of a pyramid: times k */
+    kernel_contractions contractions;
+} kernel_bounds;
+
+/* Half of the lanes. */
+typedef struct kernel_bounds_lanes {
+    kernel_half exact[4][8], apart[3][8]; /* coefficients, and places from vertex 0 on */
+    kernel_half bent[3][4], inverse[3][3], reach[3];
+    kernel_half_mask is_solid;
+} kernel_bounds_lanes;
+
+/* Which slopes there are at the corners of a domain (kernel_domain_of()), along each axis: slope_count of them, each
+ * first met at a corner, and which one a corner has. Of a hex a slope depends on the two other coordinates; of a wedge
+ * on the last alone, and along the last on the two others; of a pyramid on the same coordinate alone. */
+typedef struct kernel_slope_table {
+    int corner_count, slope_count[3];
+    signed char first[3][4], at[3][8];
+} kernel_slope_table;
+
+static const kernel_slope_table kernel_slope_tables[3] = {
+    {8,
+     {4, 4, 4},
+     {{0, 2, 4, 6}, {0, 4, 1, 5}, {0, 1, 2, 3}},
+     {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}}},
+    {6, {2, 2, 3}, {{0, 3}, {0, 3}, {0, 1, 2}}, {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
+    {8,
+     {2, 2, 2},
+     {{0, 1}, {0, 2}, {0, 4}},
+     {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}}},
+};
+
+/* At corners, by the number of the slope. */
+typedef struct kernel_lanes_slopes {
+    kernel_half bend[3][3][4], df[3][4], de[3][4];
+} kernel_lanes_slopes;
+
+SIMD_INLINE kernel_half kernel_half_all(double x)
 {
-    double most = v[0];
-    for (int n = 1; n < 8; n++) most = v[n] > most ? v[n] : most;
-    return most;
+    return (kernel_half){0} + x;
 }
 
-static inline void kernel_domain_corners(int type, kernel_corners r[3])
+/* Rounds to float32. */
+SIMD_INLINE kernel_half kernel_half_rounded(kernel_half v)
 {
-    const kernel_domain *domain = kernel_domain_of(type);
-    for (int n = 0; n < 8; n++)
-        for (int a = 0; a < 3; a++) r[a][n] = domain->corners[n][a];
+    return kernel_half_widen(kernel_half_narrow(v));
 }
 
-/* Derivatives of the products r s, r q, s q, r s q at the centre and the corners, there the extreme ones. */
-typedef struct kernel_slopes {
-    double centre[4][3];
-    kernel_corners corners[4][3];
-} kernel_slopes;
-
-static inline void kernel_domain_slopes(int type, kernel_slopes *out)
+SIMD_INLINE kernel_half kernel_half_more(kernel_half v, kernel_half most)
 {
-    const double *c = kernel_domain_of(type)->centre;
-    kernel_corners r[3];
-    memset(out, 0, sizeof *out);
-    kernel_domain_corners(type, r);
-    if (kernel_has_apex(type)) {
-        for (int a = 0; a < 3; a++) {
-            out->centre[0][a] = a == 2 ? -c[a] : c[a];
-            out->corners[0][a] = a == 2 ? -r[a] : r[a];
+    return kernel_half_select((kernel_half_mask)(v > most), v, most);
+}
+
+/* A number's slope along axis a, of coefficients 1 to 7, at r of the domain. */
+SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int a, const double r[3])
+{
+    if (kernel_has_apex(type)) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
+    kernel_half out = c[1 + a];
+    for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
+        if (a != 2 - j) out += c[4 + j] * r[3 - a - (2 - j)];
+    return kernel_is_box(type) ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
+}
+
+/* Returns how far the slope along axis a, of a polynomial with these coefficients 4 to 7, is at r from that at the
+ * centre. */
+SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
+{
+    const double *centre = kernel_domain_of(type)->centre;
+    const int next = (a + 1) % 3, last = (a + 2) % 3;
+    kernel_half out = {0};
+    if (kernel_has_apex(type)) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
+    for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
+        if (a != 2 - j) out += bent[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
+    return kernel_is_box(type) ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
+}
+
+/* Finds the coefficients of the map and of the field. */
+SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const float at[4][8][SIMD_WIDTH], int half)
+{
+    const int count = grid_type_vertices(type);
+    for (int n = 0; n < 4; n++) {
+        kernel_half d[8];
+        vf v[8];
+        for (int i = 0; i < count; i++) {
+            v[i] = vf_load(at[n][i]);
+            d[i] = kernel_half_of(&v[i], half);
         }
-        return;
-    }
-    for (int j = 0; j < 4; j++)
-        for (int a = 0; a < 3; a++) {
-            const bool has = j == 3 || a != 2 - j;
-            const int k = j == 3 ? (a + 1) % 3 : 3 - a - (2 - j), l = (a + 2) % 3;
-            if (!has) continue;
-            out->centre[j][a] = j == 3 ? c[k] * c[l] : c[k];
-            out->corners[j][a] = j == 3 ? r[k] * r[l] : r[k];
+        if (n < 3) {
+            b->reach[n] = kernel_half_abs(d[0]);
+            for (int i = 1; i < count; i++) b->reach[n] = kernel_half_more(kernel_half_abs(d[i]), b->reach[n]);
+            for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
+            for (int i = 0; i < count; i++) b->apart[n][i] = d[i];
         }
-}
-
-/* Frobenius norm of a polynomial's Hessian over the widened domain; of a pyramid's times k: those of a b / k with a / k
- * and b / k in [-1/32, 33/32] are at most 1, 33/32, 33/32 and 2.13 over k, their norm 3.29. */
-static inline double kernel_hessian_norm(int type, const double c[4])
-{
-    if (kernel_has_apex(type)) return fabs(c[0]) * 3.29;
-    double sum = 0;
-    for (int j = 0; j < 3; j++) {
-        const double largest =
-            fmax(fabs(c[j] - KERNEL_DOMAIN_RIM * c[3]), fabs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
-        sum += 2 * largest * largest;
+        kernel_half_fit(type, b->exact[n], d);
     }
-    return sqrt(sum);
 }
 
-static inline bool kernel_invert_matrix(const double m[3][3], double out[3][3])
+/* Multiplies the map's bent coefficients by the inverse of its Jacobian at the centre, which makes those of N
+ * (kernel_roots.h). */
+SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
-    double cofactor[3][3];
+    const double *centre = kernel_domain_of(type)->centre;
+    const kernel_half zero = {0};
+    kernel_half m[3][3], cofactor[3][3], position[3][8];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 8; j++) position[i][j] = kernel_half_rounded(b->exact[i][j]);
+        for (int a = 0; a < 3; a++) m[i][a] = kernel_half_slope(type, position[i], a, centre);
+    }
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
             const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
             cofactor[i][k] = m[i1][k1] * m[i2][k2] - m[i1][k2] * m[i2][k1];
         }
-    const double det = m[0][0] * cofactor[0][0] + m[0][1] * cofactor[0][1] + m[0][2] * cofactor[0][2];
-    const double inverse = det != 0 ? 1 / det : 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) out[i][k] = cofactor[k][i] * inverse;
-    return det != 0 && isfinite(inverse);
-}
-
-static inline void kernel_bounds_bend(kernel_bounds *b, const kernel_map *map, const double slopes[4][3],
-                                      double bent[3][4])
-{
-    double jacobian[3][3], inverse[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) {
-            jacobian[i][a] = (double)map->position[i].c[1 + a];
-            for (int j = 0; j < 4; j++) jacobian[i][a] += (double)map->position[i].c[4 + j] * slopes[j][a];
-        }
-    const bool is_solid = kernel_invert_matrix(jacobian, inverse);
-    memset(b, 0, sizeof *b);
+    const kernel_half det = m[0][0] * cofactor[0][0] + m[0][1] * cofactor[0][1] + m[0][2] * cofactor[0][2];
+    const kernel_half_mask some = (kernel_half_mask)(det != 0);
+    const kernel_half over = kernel_half_select(some, 1 / kernel_half_select(some, det, zero + 1), zero);
+    b->is_solid = some & (kernel_half_mask)(kernel_half_abs(over) < kernel_half_all((double)INFINITY));
     for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) b->inverse[i][a] = is_solid ? (float)inverse[i][a] : 0;
+        kernel_half inverse[3];
+        for (int a = 0; a < 3; a++) {
+            inverse[a] = cofactor[a][i] * over;
+            b->inverse[i][a] = kernel_half_select(b->is_solid, kernel_half_rounded(inverse[a]), zero);
+        }
         for (int j = 0; j < 4; j++) {
-            bent[i][j] = 0;
-            for (int a = 0; a < 3; a++) bent[i][j] += is_solid ? inverse[i][a] * (double)map->position[a].c[4 + j] : 0;
-            b->bent[i].c[4 + j] = (float)bent[i][j];
+            b->bent[i][j] = zero;
+            for (int a = 0; a < 3; a++)
+                b->bent[i][j] += kernel_half_select(b->is_solid, inverse[a] * position[a][4 + j], zero);
         }
     }
-    b->coarsest = is_solid ? 1 : 0.125f;
 }
 
-/* A bound of how much m lengthens a vector, at most 1.15 times what it is: the norm of its singular values to the
- * eighth power, which is one, and so convex as they all are. */
-static inline double kernel_matrix_norm(const kernel_corners m[3][3])
+/* L's gradient, rounded, and E; *size is of the rounding of places. */
+SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_half gradient[3],
+                                            kernel_half e[8], kernel_half *size)
 {
-    kernel_corners square[3][3], sum = {0};
+    const double *centre = kernel_domain_of(type)->centre;
+    kernel_half df[3];
+    *size = (kernel_half){0};
+    for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(type, b->exact[3], a, centre);
+    for (int i = 0; i < 3; i++) {
+        kernel_half g = {0};
+        for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
+        gradient[i] = kernel_half_rounded(g);
+        *size += kernel_half_abs(g) * b->reach[i];
+    }
+    for (int j = 0; j < 8; j++) {
+        e[j] = b->exact[3][j];
+        for (int i = 0; i < 3; i++) e[j] -= gradient[i] * b->exact[i][j];
+    }
+}
+
+/* Bounds, over the corners of the domain, how far the field with these coefficients is off L. */
+SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
+{
+    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    kernel_half most = {0};
+    for (int n = 0; n < table->corner_count; n++) {
+        const double *corner = kernel_domain_of(type)->corners[n], k = kernel_has_apex(type) ? corner[2] : 1;
+        const double r[3] = {corner[0] * k, corner[1] * k, corner[2]}, m = r[0] * r[1] / k;
+        kernel_half at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
+        if (!kernel_is_prism(type)) at += m * e[4];
+        if (kernel_is_prism(type)) at += r[2] * (r[0] * e[5] + r[1] * e[6]);
+        if (kernel_is_box(type)) at += r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
+        most = n ? kernel_half_more(at * at, most) : at * at;
+    }
+    return kernel_half_sqrt(most);
+}
+
+/* The gradients of the field and of E at the corners, and the bend there. */
+SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_half e[8],
+                                            kernel_lanes_slopes *out)
+{
+    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    kernel_half field[8];
+    for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
+    for (int a = 0; a < 3; a++)
+        for (int n = 0; n < table->slope_count[a]; n++) {
+            const double *r = kernel_domain_of(type)->corners[(int)table->first[a][n]];
+            out->df[a][n] = kernel_half_slope(type, field, a, r);
+            out->de[a][n] = kernel_half_slope(type, e, a, r);
+            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_half_bend(type, b->bent[i], a, r);
+        }
+}
+
+/* The largest over the corners. */
+typedef struct kernel_lanes_most {
+    kernel_half bend;                   /* a bound of the matrix's norm, to its eighth power */
+    kernel_half df, along, steep, bent; /* squares: of F's gradient; as in kernel_half_bounds() */
+} kernel_lanes_most;
+
+SIMD_INLINE kernel_half kernel_half_length(const kernel_half v[3])
+{
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+/* A bound of how much m lengthens a vector, at most 1.15 times what it is, to its eighth power: the norm of its
+ * singular values to the eighth power, which is one, and so convex as they all are. */
+SIMD_INLINE kernel_half kernel_half_eighth(const kernel_half m[3][3])
+{
+    kernel_half square[3][3], fourth[3][3], sum = {0};
     for (int i = 0; i < 3; i++)
         for (int k = 0; k <= i; k++)
             square[i][k] = square[k][i] = m[0][i] * m[0][k] + m[1][i] * m[1][k] + m[2][i] * m[2][k];
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) {
-            const kernel_corners fourth =
+        for (int k = 0; k <= i; k++)
+            fourth[i][k] = fourth[k][i] =
                 square[i][0] * square[k][0] + square[i][1] * square[k][1] + square[i][2] * square[k][2];
-            sum += fourth * fourth;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) sum += fourth[i][k] * fourth[i][k];
+    return sum;
+}
+
+SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, const kernel_half w[3],
+                                      kernel_lanes_most *out)
+{
+    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    for (int n = 0; n < table->corner_count; n++) {
+        kernel_half bend[3][3], df[3], de[3], along = {0}, steep = {0}, bent = {0};
+        for (int a = 0; a < 3; a++) {
+            const int at = table->at[a][n];
+            df[a] = s->df[a][at];
+            de[a] = s->de[a][at];
+            for (int i = 0; i < 3; i++) bend[i][a] = s->bend[i][a][at];
         }
-    return sqrt(sqrt(sqrt(kernel_corners_most(sum))));
+        for (int i = 0; i < 3; i++) {
+            const kernel_half term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
+            along += de[i] * w[i];
+            steep += de[i] * de[i];
+            bent += term * term;
+        }
+        const kernel_half eighth = kernel_half_eighth((const kernel_half(*)[3])bend), slope = kernel_half_length(df);
+        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, bent};
+        out->bend = kernel_half_more(eighth, out->bend);
+        out->df = kernel_half_more(slope, out->df);
+        out->along = kernel_half_more(along * along, out->along);
+        out->steep = kernel_half_more(steep, out->steep);
+        out->bent = kernel_half_more(bent, out->bent);
+    }
 }
 
-/* The gradient of what has these coefficients, at the corners. */
-static inline void kernel_corner_gradient(const double c[8], const kernel_slopes *slopes, kernel_corners out[3])
+SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_half v)
 {
+    const kernel_half_floats floats = kernel_half_narrow(v);
+    memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
+}
+
+/* The planes across J0's columns that the vertices lie between, widened by what a ray's places may be off. */
+SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int i, kernel_half pad, int half,
+                                    kernel_bounds *out)
+{
+    kernel_half low = {0}, high = {0};
+    for (int n = 1; n < grid_type_vertices(type); n++) {
+        const kernel_half at =
+            b->inverse[i][0] * b->apart[0][n] + b->inverse[i][1] * b->apart[1][n] + b->inverse[i][2] * b->apart[2][n];
+        low = -kernel_half_more(-at, -low);
+        high = kernel_half_more(at, high);
+    }
+    for (int a = 0; a < 3; a++) kernel_half_store(out->normal[i][a], half, b->inverse[i][a]);
+    kernel_half_store(out->low[i], half, low - pad);
+    kernel_half_store(out->high[i], half, high + pad);
+}
+
+/* The terms of a number with these coefficients that are bent, about the middle of the domain: the products of two of
+ * its coordinates there, and of a hex of all three. */
+SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_half out[4])
+{
+    const int first = kernel_is_prism(type) ? 1 : 0;
+    for (int j = 0; j < 4; j++) out[j] = (kernel_half){0};
+    for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = bent[first + j];
+    if (kernel_has_triangles(type)) return;
+    for (int j = 0; j < 3; j++) out[j] += 0.5 * bent[3];
+}
+
+/* What kernel_half_bounds() knows when it comes to contractions. */
+typedef struct kernel_half_rates {
+    kernel_half across, gradient[3], e[8];         /* places' rounding across the beam; of L and E */
+    kernel_half gap, slope, theta, slant, rise, w; /* w: the most of |w| */
+    kernel_half_mask is_regular;
+} kernel_half_rates;
+
+/* The contraction's constant K, and the bounds of rounding, in the cell's own coordinates r. With u = 6e-8, e the
+ * vertices' extents from vertex 0 and wide the most of a ray's |x| and |y| and of the vertices':
+ * - y and w have some 4 u of |inverse| times wide across and times e, of inverse's own rounding among them: an eighth
+ * of the 2e-6 that kernel_half_bounds() takes for a face's places, and 3e-7 e.
+ * - L and E have 4 u of 2, which values are below (rim has a factor 2 for it), of the gradient times wide across and e
+ * along the ray, and as much for the gradient's own rounding: 5e-7. Over the field's slope, times |w|, that moves r.
+ * - An iteration adds some units of r, and near a pyramid's apex k is no less than 1e-6: 1e-6.
+ * Faces have their crossings within gap of the ray, and values within KERNEL_FACE_BAND of what the field is there
+ * (kernel_bounds). Either moves the root by itself over 1 - K. rim is twice the sum. */
+SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const kernel_half_rates *r, int half,
+                                  kernel_contractions *out)
+{
+    const kernel_half zero = {0}, one = zero + 1, speed = r->w / r->rise, wide = r->across * 5e5;
+    const kernel_half rate = r->theta + r->slant * speed * 1.0001, rest = one - rate;
+    kernel_half extent[3], own = zero,
+                           value = one + (kernel_half_abs(r->gradient[0]) + kernel_half_abs(r->gradient[1])) * wide;
     for (int a = 0; a < 3; a++) {
-        out[a] = (kernel_corners){0} + c[1 + a];
-        for (int j = 0; j < 4; j++) out[a] += c[4 + j] * slopes->corners[j][a];
+        extent[a] = kernel_half_abs(b->apart[a][1]);
+        for (int n = 2; n < grid_type_vertices(type); n++)
+            extent[a] = kernel_half_more(kernel_half_abs(b->apart[a][n]), extent[a]);
     }
-}
-
-/* E's largest value at the corners of the domain, and so in it. */
-static inline double kernel_bounds_error(const double e[8], int type)
-{
-    kernel_corners r[3];
-    kernel_domain_corners(type, r);
-    if (kernel_has_apex(type)) r[0] *= r[2], r[1] *= r[2];
-    const kernel_corners m = kernel_has_apex(type) ? r[0] * r[1] / r[2] : r[0] * r[1];
-    const kernel_corners at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + m * e[4] +
-                              r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
-    return sqrt(kernel_corners_most(at * at));
-}
-
-/* Bounds how far a face's value may be from the field on the ray. The value is that of the patch at the coordinates
- * found, and that point lies beside the ray by the rounding of places: by no more than this across and along. */
-static inline float kernel_bounds_jump(const kernel_bounds *b, const kernel_map *map, const kernel_beam *beam)
-{
-    const double across = 2e-6 * ((double)map->reach[0] + (double)map->reach[1] + (double)beam->offset +
-                                  (double)beam->spread * (double)map->reach[2]);
-    double gap = 0;
     for (int i = 0; i < 3; i++) {
-        const double term = across * (fabs((double)b->inverse[i][0]) + fabs((double)b->inverse[i][1])) +
-                            1e-6 * (double)map->reach[2] * fabs((double)b->inverse[i][2]);
-        gap += term * term;
+        kernel_half term = 0.125 * r->across * (kernel_half_abs(b->inverse[i][0]) + kernel_half_abs(b->inverse[i][1]));
+        for (int a = 0; a < 3; a++) term += 3e-7 * kernel_half_abs(b->inverse[i][a]) * extent[a];
+        own += term * term;
     }
-    return (float)((double)b->slope * (double)b->stretch * sqrt(gap)) + KERNEL_FACE_BAND;
+    value += kernel_half_abs(r->gradient[2]) * extent[2];
+    const kernel_half face = r->gap + speed * (r->slope * r->gap + 1e-6);
+    const kernel_half blur = kernel_half_sqrt(own) + speed * value * 5e-7 + 1e-6;
+    const kernel_half rim = 2 * ((face + blur) / rest) + 4e-6;
+    const kernel_half_mask contracts = r->is_regular & (kernel_half_mask)(r->rise > 0) &
+                                       (kernel_half_mask)(rate < 0.9) & (kernel_half_mask)(rim < 0.015625);
+    kernel_half_store(out->grow, half,
+                      kernel_half_select(contracts, 1.0001 * rate / rest, kernel_half_all((double)INFINITY)));
+    kernel_half_store(out->blur, half, blur);
+    kernel_half_store(out->rim, half, rim);
 }
 
-/* Is F monotone along the beam's rays? With M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, what E adds
- * to the slope of L is grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w); each is bounded alone, by its
- * largest at the corners, for the ray in the middle and by how far w may be from its. */
-static inline bool kernel_bounds_rise(const kernel_bounds *b, const double e[8], const kernel_slopes *slopes,
-                                      const kernel_corners bend[3][3], double theta, const kernel_beam *beam)
+SIMD_INLINE void kernel_half_contraction_of(const kernel_bounds_lanes *b, const kernel_half_rates *r, int half,
+                                            kernel_contractions *out, int type)
 {
-    const double x = (double)beam->x, y = (double)beam->y, spread = (double)beam->spread;
-    const double g[3] = {(double)b->gradient[0], (double)b->gradient[1], (double)b->gradient[2]};
-    kernel_corners de[3], along = {0}, steep = {0}, bent = {0};
-    double w[3], length = 0, off = 0;
-    kernel_corner_gradient(e, slopes, de);
+    const double *centre = kernel_domain_of(type)->centre;
+    kernel_half middle[4], terms[4];
+    for (int n = 0; n < 4; n++) {
+        const kernel_half *c = n < 3 ? b->exact[n] : r->e;
+        middle[n] = c[0];
+        if (kernel_has_apex(type)) continue;
+        middle[n] += (centre[0] * c[1] + centre[1] * c[2]) + centre[2] * c[3];
+        if (kernel_is_box(type)) middle[n] += 0.25 * ((c[4] + c[5]) + c[6]) + 0.125 * c[7];
+        if (kernel_is_prism(type)) middle[n] += (1.0 / 6) * (c[5] + c[6]);
+    }
     for (int i = 0; i < 3; i++) {
-        const double j0 = (double)b->inverse[i][0], j1 = (double)b->inverse[i][1];
-        const double term = spread * (fabs(j0) + fabs(j1));
-        w[i] = j0 * x + j1 * y + (double)b->inverse[i][2];
+        const kernel_half offset =
+            -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
+        kernel_half_store(out->offset[i], half, offset);
+        kernel_half_terms(type, b->bent[i], terms);
+        for (int j = 0; j < kernel_bent_terms(type); j++) kernel_half_store(out->bent[j][i], half, terms[j]);
+    }
+    kernel_half_store(out->middle, half, middle[3]);
+    kernel_half_terms(type, r->e + 4, terms);
+    for (int j = 0; j < kernel_bent_terms(type); j++) kernel_half_store(out->field[j], half, terms[j]);
+    kernel_half_rate(b, type, r, half, out);
+}
+
+/* Square of the Frobenius norm of a polynomial's Hessian over the widened domain; of a pyramid's times k: those of a b
+ * / k with a / k and b / k in [-1/32, 33/32] are at most 1, 33/32, 33/32 and 2.13 over k, their norm 3.29. */
+SIMD_INLINE kernel_half kernel_half_hessian(int type, const kernel_half c[4])
+{
+    kernel_half sum = {0};
+    if (kernel_has_apex(type)) return c[0] * c[0] * (3.29 * 3.29);
+    for (int j = 0; j < 3; j++) {
+        const kernel_half largest = kernel_half_more(kernel_half_abs(c[j] - KERNEL_DOMAIN_RIM * c[3]),
+                                                     kernel_half_abs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
+        sum += 2 * largest * largest;
+    }
+    return sum;
+}
+
+/* What the search for roots asks of the map and the field (kernel_roots.h). */
+SIMD_INLINE void kernel_half_limits(const kernel_bounds_lanes *b, int type, kernel_half stretch, kernel_half slope,
+                                    int half, kernel_bounds *out)
+{
+    kernel_half twist = {0}, field[4];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 4; j++) kernel_half_store(out->bent[i][j], half, b->bent[i][j]);
+        twist += kernel_half_hessian(type, b->bent[i]);
+    }
+    for (int j = 0; j < 4; j++) field[j] = kernel_half_rounded(b->exact[3][4 + j]);
+    kernel_half_store(out->stretch, half, stretch);
+    kernel_half_store(out->slope, half, slope);
+    kernel_half_store(out->curve, half, kernel_half_sqrt(kernel_half_hessian(type, field)));
+    kernel_half_store(out->twist, half, kernel_half_sqrt(twist));
+}
+
+static __attribute__((noinline)) void kernel_half_contraction(const kernel_bounds_lanes *b, const kernel_half_rates *r,
+                                                              int half, kernel_contractions *out, int type)
+{
+    KERNEL_OF_TYPE(type, kernel_half_contraction_of, b, r, half, out);
+}
+
+/* Bounds, for rays about (0, 0, 1), how far the field is off L, how it rises along the rays, and how far it may jump at
+ * a face: the face's value is that of the patch at the coordinates found, and that point lies beside the ray by the
+ * rounding of places.
+ *
+ * Is F monotone along the rays? With M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, what E adds to the
+ * slope of L is grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w); each is bounded alone, by its largest at
+ * the corners, for the ray in the middle and by how far w may be from its. */
+SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
+                                    kernel_bounds *out, int type)
+{
+    const kernel_half zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
+    kernel_bounds_lanes b;
+    kernel_lanes_slopes slopes;
+    kernel_lanes_most most;
+    kernel_half g[3], e[8], w[3], size, length = zero, off = zero, gap = zero;
+    kernel_bounds_lanes_fit(&b, type, at, half);
+    kernel_bounds_lanes_bend(&b, type);
+    kernel_bounds_lanes_linear(&b, type, g, e, &size);
+    kernel_bounds_lanes_slopes(&b, type, e, &slopes);
+    const kernel_half across =
+        2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
+    for (int i = 0; i < 3; i++) {
+        const kernel_half side = kernel_half_abs(b.inverse[i][0]) + kernel_half_abs(b.inverse[i][1]);
+        const kernel_half term = spread * side;
+        const kernel_half blur = across * side + 1e-6 * b.reach[2] * kernel_half_abs(b.inverse[i][2]);
+        w[i] = b.inverse[i][2];
         length += w[i] * w[i];
         off += term * term;
-        along += de[i] * w[i];
-        steep += de[i] * de[i];
+        gap += blur * blur;
+        kernel_half_planes(&b, type, i, blur + 1e-5, half, out);
     }
-    for (int i = 0; i < 3; i++) {
-        const kernel_corners term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
-        bent += term * term;
-    }
-    const double stretch = (double)b->stretch, slant = sqrt(kernel_corners_most(steep));
-    length = sqrt(length);
-    off = sqrt(off);
-    const double whole = slant * stretch * (length + off);
-    const double apart =
-        sqrt(kernel_corners_most(along * along)) +
-        slant * (sqrt(kernel_corners_most(bent)) + theta * theta * stretch * (length + off) + (1 + theta) * off);
-    const double rise = fabs(g[0] * x + g[1] * y + g[2]) - spread * (fabs(g[0]) + fabs(g[1]));
-    return rise * 0.9999 > (whole < apart ? whole : apart);
+    kernel_lanes_corners(&slopes, type, w, &most);
+    const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
+    const kernel_half_mask is_regular = b.is_solid & (kernel_half_mask)(theta < 0.9);
+    const kernel_half stretch =
+        kernel_half_select((kernel_half_mask)(theta < 0.9), kernel_half_rounded(1 / (1 - theta)), kernel_half_all(10));
+    const kernel_half slope = kernel_half_rounded(kernel_half_sqrt(most.df)), slant = kernel_half_sqrt(most.steep);
+    kernel_half_limits(&b, type, stretch, slope, half, out);
+    length = kernel_half_sqrt(length);
+    off = kernel_half_sqrt(off);
+    const kernel_half whole = slant * stretch * (length + off);
+    const kernel_half apart =
+        kernel_half_sqrt(most.along) +
+        slant * (kernel_half_sqrt(most.bent) + theta * theta * stretch * (length + off) + (one + theta) * off);
+    const kernel_half rise = kernel_half_abs(g[2]) - spread * (kernel_half_abs(g[0]) + kernel_half_abs(g[1]));
+    const kernel_half least = kernel_half_select((kernel_half_mask)(whole < apart), whole, apart);
+    const kernel_half_mask rises = is_regular & (kernel_half_mask)(rise * 0.9999 > least);
+    const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
+    kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
+    /* L, and its thickness. */
+    const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
+    e[0] -= level;
+    const kernel_half thickness = kernel_half_error(type, e) + 1e-5 + 16 * 6e-8 * size;
+    kernel_half_store(out->level, half, level);
+    for (int a = 0; a < 3; a++) kernel_half_store(out->gradient[a], half, g[a]);
+    kernel_half_store(out->thickness, half, kernel_half_select(is_regular, thickness, endless));
+    kernel_half_rates rates = {.across = across,
+                               .gap = kernel_half_sqrt(gap),
+                               .slope = slope,
+                               .theta = theta,
+                               .slant = slant,
+                               .rise = rise,
+                               .w = length + off,
+                               .is_regular = is_regular};
+    memcpy(rates.gradient, g, sizeof g);
+    memcpy(rates.e, e, sizeof e);
+    kernel_half_contraction(&b, &rates, half, &out->contractions, type);
 }
 
-/* L, E and what follows of them. */
-static inline void kernel_bounds_linear(kernel_bounds *b, const kernel_map *map, const kernel_slopes *slopes,
-                                        const kernel_corners bend[3][3], double theta, int type,
-                                        const kernel_beam *beam)
+/* Lane by lane, of places in tile space and values. */
+static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[4][8][SIMD_WIDTH],
+                                                       const kernel_beam *beam, kernel_bounds *out)
 {
-    double e[8], df[3], size = 0;
-    for (int a = 0; a < 3; a++) {
-        df[a] = map->exact[3][1 + a];
-        for (int j = 0; j < 4; j++) df[a] += map->exact[3][4 + j] * slopes->centre[j][a];
-    }
-    for (int i = 0; i < 3; i++) {
-        double g = 0;
-        for (int a = 0; a < 3; a++) g += df[a] * (double)b->inverse[a][i];
-        b->gradient[i] = (float)g;
-        size += fabs(g) * (double)map->reach[i];
-    }
-    for (int j = 0; j < 8; j++) {
-        e[j] = map->exact[3][j];
-        for (int i = 0; i < 3; i++) e[j] -= (double)b->gradient[i] * map->exact[i][j];
-    }
-    b->level = (float)e[0];
-    e[0] -= (double)b->level;
-    /* A hundred-thousandth for the rounding of what is near 1, and of places to some units of where they are. */
-    b->thickness = (float)(kernel_bounds_error(e, type) + 1e-5 + 16 * 6e-8 * size);
-    b->jump = kernel_bounds_jump(b, map, beam);
-    b->is_monotone = b->coarsest == 1 && kernel_bounds_rise(b, e, slopes, bend, theta, beam);
+    for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
 }
 
-static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, int type, const kernel_beam *beam)
-{
-    double bent[3][4], field[8], twist = 0;
-    kernel_slopes slopes;
-    kernel_corners df[3], bend[3][3];
-    kernel_domain_slopes(type, &slopes);
-    kernel_bounds_bend(b, map, (const double(*)[3])slopes.centre, bent);
-    for (int j = 0; j < 8; j++) field[j] = (double)map->field.c[j];
-    kernel_corner_gradient(field, &slopes, df);
-    for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) {
-            bend[i][a] = (kernel_corners){0};
-            for (int j = 0; j < 4; j++) bend[i][a] += bent[i][j] * (slopes.corners[j][a] - slopes.centre[j][a]);
-        }
-    const double theta = kernel_matrix_norm((const kernel_corners(*)[3])bend);
-    if (!(theta < 0.9)) b->coarsest = 0.125f;
-    b->stretch = theta < 0.9 ? (float)(1 / (1 - theta)) : 10;
-    b->slope = (float)sqrt(kernel_corners_most(df[0] * df[0] + df[1] * df[1] + df[2] * df[2]));
-    for (int i = 0; i < 3; i++) {
-        const double h = kernel_hessian_norm(type, bent[i]);
-        twist += h * h;
-    }
-    b->curve = (float)kernel_hessian_norm(type, field + 4);
-    b->twist = (float)sqrt(twist);
-    kernel_bounds_linear(b, map, &slopes, (const kernel_corners(*)[3])bend, theta, type, beam);
-}
-
-/* Set up once for a cell and isovalue and used by all packets of a tile. Each place of the cell cache has one beside
- * it. */
+/* Hexes, wedges or pyramids of one type as roots are looked for in them, a cell a lane. */
 typedef struct kernel_curved {
-    bool is_set_up, has_contraction;
-    int value;
-    kernel_map map;
-    kernel_bounds bounds; /* robust roots alone */
-    kernel_cell_contraction contraction;
+    int type;
+    int lane;                           /* the cell that all rays of a packet are in */
+    const float (*at)[8][SIMD_WIDTH];   /* places in tile space, and the field less the isovalue, scaled */
+    const float (*colours)[SIMD_WIDTH]; /* kernel_cell.g, where the layer has a field for colours */
+    const kernel_bounds *bounds;        /* NULL: they are still to be found, of a cell alone */
+    struct kernel_curved_room *room;    /* for that */
 } kernel_curved;
+
+/* Room for a cell alone, which all lanes have. */
+typedef struct kernel_curved_room {
+    float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
+    kernel_bounds bounds;
+} kernel_curved_room;
 
 /* The tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
@@ -275,17 +520,25 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
     return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
 }
 
-SIMD_INLINE void kernel_curved_setup(const kernel_frame *f, const kernel_tile *tile, kernel_curved *curved,
-                                     const render_surface_layer *layer, const kernel_cell *c, int value)
+SIMD_INLINE void kernel_curved_spread(const float *of, int count, float out[8][SIMD_WIDTH])
 {
-    if (curved->is_set_up) return;
-    curved->is_set_up = true;
-    curved->has_contraction = false;
-    curved->value = value;
-    kernel_map_setup(&curved->map, c);
-    if (layer->colour_map) kernel_map_colour(&curved->map, c);
-    const kernel_beam beam = kernel_tile_beam(f, tile);
-    kernel_bounds_setup(&curved->bounds, &curved->map, c->type, &beam);
+    for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? of[i] : 0));
+}
+
+/* Finds the bounds of a cell alone. */
+static __attribute__((noinline)) void kernel_curved_alone(const kernel_cell *c, const kernel_beam *beam,
+                                                          kernel_curved *out)
+{
+    kernel_curved_room *room = out->room;
+    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
+    for (int n = 0; n < 4; n++) kernel_curved_spread(numbers[n], c->count, room->at[n]);
+    kernel_curved_spread(c->g, c->count, room->colours);
+    kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])room->at, beam, &room->bounds);
+    out->type = c->type;
+    out->lane = 0;
+    out->at = (const float(*)[8][SIMD_WIDTH])room->at;
+    out->colours = (const float(*)[SIMD_WIDTH])room->colours;
+    out->bounds = &room->bounds;
 }
 
 #endif

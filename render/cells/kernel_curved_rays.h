@@ -30,9 +30,8 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
 SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_lane_rays *p, int n,
                                     kernel_curved_sides *s)
 {
-    const vf e =
-        vf_muladd(kernel_curved_take(h->cv[n], p->lane), p->v,
-                  vf_muladd(kernel_curved_take(h->cu[n], p->lane), p->u, kernel_curved_take(h->c[n], p->lane)));
+    const vf e = vf_muladd(kernel_take(h->cv[n], p->lane), p->v,
+                           vf_muladd(kernel_take(h->cu[n], p->lane), p->u, kernel_take(h->c[n], p->lane)));
     s->least = vf_min(vf_abs(e), s->least);
     s->side[n] = vi_from_bits(e);
 }
@@ -61,9 +60,9 @@ SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kern
                                        vf y[8])
 {
     for (int i = 0; i < count; i++) {
-        const vf z = kernel_curved_take(h->at[2][i], p->lane);
-        x[i] = (kernel_curved_take(h->at[0][i], p->lane) - p->rays.origin_x) - p->rays.slope_x * z;
-        y[i] = (kernel_curved_take(h->at[1][i], p->lane) - p->rays.origin_y) - p->rays.slope_y * z;
+        const vf z = kernel_take(h->at[2][i], p->lane);
+        x[i] = (kernel_take(h->at[0][i], p->lane) - p->rays.origin_x) - p->rays.slope_x * z;
+        y[i] = (kernel_take(h->at[1][i], p->lane) - p->rays.origin_y) - p->rays.slope_y * z;
     }
 }
 
@@ -75,9 +74,9 @@ SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel
     vf x[8], y[8];
     vi faces = vi_set(0);
     kernel_curved_sides_of(h, p, type, &sides);
-    vm alone = vm_not(vf_lt(kernel_curved_take(h->doubt, p->lane), sides.least));
+    vm alone = vm_not(vf_lt(kernel_take(h->doubt, p->lane), sides.least));
     kernel_curved_project(h, p, grid_type_vertices(type), x, y);
-    const vi turned = vi_from_bits(kernel_curved_take((const float *)(const void *)h->turned, p->lane));
+    const vi turned = vi_from_bits(kernel_take((const float *)(const void *)h->turned, p->lane));
     for (int face = 0; face < shape->face_count; face++) {
         vi once;
         if (shape->faces[face].count == 3) {
@@ -95,11 +94,6 @@ SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel
     }
     kernel_curved_count(faces, p->active, alone, out);
 }
-
-/* The place where rays cross a face, as kernel_quad_crossings() or kernel_triangle_crossing() finds it. */
-typedef struct kernel_curved_place {
-    vf t, v, r[3];
-} kernel_curved_place;
 
 /* A quad's corners as rays see them, each ray's of its own face: as vertices of the cell, and their values. */
 typedef struct kernel_curved_quad {
@@ -128,10 +122,10 @@ SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const ke
 }
 
 SIMD_INLINE void kernel_curved_quad_place(int type, const kernel_curved_quad *own, const kernel_quad_place *place,
-                                          kernel_curved_place *out)
+                                          kernel_point *out)
 {
     out->t = place->t;
-    out->v = kernel_bilinear(own->f, place->s, place->r);
+    out->value = kernel_bilinear(own->f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
@@ -188,7 +182,7 @@ SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v
 }
 
 SIMD_INLINE void kernel_curved_triangle_place(const kernel_placed_curved *h, int type, vi lane,
-                                              const kernel_curved_triangle *own, kernel_curved_place *out)
+                                              const kernel_curved_triangle *own, kernel_point *out)
 {
     const int count = grid_type_vertices(type);
     const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
@@ -196,23 +190,15 @@ SIMD_INLINE void kernel_curved_triangle_place(const kernel_placed_curved *h, int
     for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[2], count, lane, own->corner[i]);
     out->t = kernel_curved_weigh(own, v, inverse);
     for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[3], count, lane, own->corner[i]);
-    out->v = kernel_curved_weigh(own, v, inverse);
+    out->value = kernel_curved_weigh(own, v, inverse);
     for (int a = 0; a < 3; a++) {
         for (int i = 0; i < 3; i++) v[i] = kernel_curved_own(kernel_cell_shape(type), count, a, own->corner[i]);
         out->r[a] = kernel_curved_weigh(own, v, inverse);
     }
 }
 
-SIMD_INLINE void kernel_curved_place_select(vm m, const kernel_curved_place *a, const kernel_curved_place *b,
-                                            kernel_curved_place *out)
-{
-    out->t = vf_select(m, a->t, b->t);
-    out->v = vf_select(m, a->v, b->v);
-    for (int i = 0; i < 3; i++) out->r[i] = vf_select(m, a->r[i], b->r[i]);
-}
-
 SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi faces,
-                                     kernel_curved_place out[2])
+                                     kernel_point out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};
     const vm on_quad[2] = {kernel_curved_on_quad(type, 0, face[0]), kernel_curved_on_quad(type, 1, face[1])};
@@ -230,22 +216,23 @@ SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel
     for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(p->active, on_quad[n]);
         kernel_curved_triangle own;
-        kernel_curved_place place;
+        kernel_point place;
         if (!vm_any(on_triangle)) continue;
         kernel_curved_triangle_take(h, p, type, on_triangle, face[n], &own);
         kernel_curved_triangle_place(h, type, p->lane, &own, &place);
-        kernel_curved_place_select(on_triangle, &place, &out[n], &out[n]);
+        kernel_point_move(on_triangle, &place, &out[n]);
     }
+    kernel_points_order(out);
 }
 
-SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_curved_place ends[2],
-                                        unsigned bits, kernel_pixel_list *rays, kernel_curved_ends *out)
+SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point ends[2], unsigned bits,
+                                        kernel_pixel_list *rays, kernel_curved_ends *out)
 {
     if (!bits) return;
     float lanes[2][5][SIMD_WIDTH];
     for (int e = 0; e < 2; e++) {
         vf_store(lanes[e][0], ends[e].t);
-        vf_store(lanes[e][1], ends[e].v);
+        vf_store(lanes[e][1], ends[e].value);
         for (int a = 0; a < 3; a++) vf_store(lanes[e][2 + a], ends[e].r[a]);
     }
     for (; bits; bits &= bits - 1) {

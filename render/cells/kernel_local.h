@@ -26,6 +26,7 @@
 
 #include "grid.h"
 #include "kernel_cell_types.h"
+#include "kernel_wide.h"
 #include "simd.h"
 
 enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
@@ -44,11 +45,6 @@ typedef struct kernel_local_cells {
     float bend[SIMD_WIDTH];                        /* the derivative of n is no more than its root by Frobenius' norm */
     float blur[SIMD_WIDTH]; /* a point nearer than that to the border may be on either side of it */
 } kernel_local_cells;
-
-/* An end of a ray's stretch in its cell. r is counted from the middle. */
-typedef struct kernel_local_crossing {
-    vf t, v, r[3];
-} kernel_local_crossing;
 
 SIMD_INLINE int kernel_bent_terms(int type)
 {
@@ -386,11 +382,6 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 
 /* ---- points ---- */
 
-SIMD_INLINE vf kernel_local_take(const float *of, vi lane)
-{
-    return vf_permute(vf_load(of), lane);
-}
-
 /* Points, one a lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
@@ -450,15 +441,15 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
                                  kernel_local_points *p)
 {
     vf d[3];
-    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_local_take(cells->origin[a], lane);
+    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_take(cells->origin[a], lane);
     for (int i = 0; i < 3; i++) {
-        p->y[i] = kernel_local_take(cells->offset[i], lane);
-        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_local_take(cells->inverse[i][a], lane), d[a], p->y[i]);
+        p->y[i] = kernel_take(cells->offset[i], lane);
+        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_take(cells->inverse[i][a], lane), d[a], p->y[i]);
         p->r[i] = p->y[i];
     }
     if (kernel_is_linear(type)) return vm_all_lanes();
     for (int k = 0; k < kernel_bent_terms(type); k++)
-        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
+        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_take(cells->bent[k][a], lane);
     vf left[3];
     kernel_bend_at(type, p->r, &p->bend);
     kernel_local_left(type, p, left);
@@ -477,10 +468,10 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
 /* The field at r. */
 SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
 {
-    vf v = kernel_local_take(cells->field[0], lane);
-    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_local_take(cells->field[1 + i], lane), p->r[i], v);
+    vf v = kernel_take(cells->field[0], lane);
+    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_take(cells->field[1 + i], lane), p->r[i], v);
     for (int k = 0; k < kernel_bent_terms(type); k++)
-        v = vf_muladd(kernel_local_take(cells->field[4 + k], lane), p->bend.term[k], v);
+        v = vf_muladd(kernel_take(cells->field[4 + k], lane), p->bend.term[k], v);
     return v;
 }
 

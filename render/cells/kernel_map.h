@@ -33,9 +33,8 @@ typedef struct kernel_polynomial {
 typedef struct kernel_map {
     bool is_pyramid;
     float origin[3]; /* vertex 0 */
-    float reach[3];  /* |X|, |Y|, |Z| of no vertex are more */
     float tolerance; /* a Newton step below it is the last */
-    kernel_polynomial position[3], field, colour;
+    kernel_polynomial position[3], field;
     double exact[4][8]; /* the positions' coefficients and the field's, not rounded */
 } kernel_map;
 
@@ -109,23 +108,11 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     m->origin[0] = c->x[0];
     m->origin[1] = c->y[0];
     m->origin[2] = c->z[0];
-    memset(m->reach, 0, sizeof m->reach);
-    for (int i = 0; i < c->count; i++) {
-        m->reach[0] = simd_max(fabsf(c->x[i]), m->reach[0]);
-        m->reach[1] = simd_max(fabsf(c->y[i]), m->reach[1]);
-        m->reach[2] = simd_max(fabsf(c->z[i]), m->reach[2]);
-    }
     kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0], m->exact[0]);
     kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0], m->exact[1]);
     kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0], m->exact[2]);
     kernel_polynomial_of_floats(&m->field, c->type, c->f, 0, m->exact[3]);
     m->tolerance = KERNEL_MAP_TOLERANCE;
-}
-
-SIMD_INLINE void kernel_map_colour(kernel_map *m, const kernel_cell *c)
-{
-    double unused[8];
-    kernel_polynomial_of_floats(&m->colour, c->type, c->g, 0, unused);
 }
 
 /* m and its derivatives. */
@@ -145,11 +132,6 @@ SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
         out.dq = -(out.ds * out.dr);
     }
     return out;
-}
-
-SIMD_INLINE kernel_product kernel_map_product(const kernel_map *map, const vf r[3])
-{
-    return kernel_product_at(map->is_pyramid, r);
 }
 
 /* Each lane with coefficients of its own. */
@@ -175,14 +157,6 @@ SIMD_INLINE void kernel_gradient_of(const vf c[8], bool is_pyramid, const kernel
 SIMD_INLINE void kernel_polynomial_spread(const kernel_polynomial *p, vf out[8])
 {
     for (int i = 0; i < 8; i++) out[i] = vf_set(p->c[i]);
-}
-
-SIMD_INLINE vf kernel_polynomial_value(const kernel_map *map, const kernel_polynomial *p, const kernel_product *m,
-                                       const vf r[3])
-{
-    vf c[8];
-    kernel_polynomial_spread(p, c);
-    return kernel_value_of(c, map->is_pyramid, m, r);
 }
 
 SIMD_INLINE void kernel_cross(const vf a[3], const vf b[3], vf out[3])
@@ -234,6 +208,55 @@ SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
     kernel_polynomial_spread(&map->field, out->field);
     for (int n = 0; n < 4; n++)
         for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
+}
+
+/* The maps of the rays' own cells; at: places and the field by vertex, a cell a lane. */
+SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map_lanes *out, int type)
+{
+    const int count = grid_type_vertices(type);
+    out->is_pyramid = kernel_has_apex(type);
+    out->tolerance = KERNEL_MAP_TOLERANCE;
+    for (int n = 0; n < 4; n++) {
+        vf v[8], *const c = n < 3 ? out->position[n] : out->field;
+        for (int i = 0; i < count; i++) v[i] = kernel_take(at[n][i], lane);
+        if (n < 3) out->origin[n] = v[0];
+        for (int half = 0; half < 2; half++) {
+            kernel_half d[8], *const e = out->exact[half][n];
+            for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
+            if (n < 3)
+                for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
+            kernel_half_fit(type, e, d);
+            for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
+        }
+    }
+}
+
+static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][SIMD_WIDTH], vi lane, int type,
+                                                          kernel_map_lanes *out)
+{
+    KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
+}
+
+/* Returns the field with these values at the vertices at r in each ray's own cell. */
+SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
+{
+    const int count = grid_type_vertices(type);
+    vf v[8], c[8];
+    for (int i = 0; i < count; i++) v[i] = kernel_take(values[i], lane);
+    for (int half = 0; half < 2; half++) {
+        kernel_half d[8], e[8];
+        for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
+        kernel_half_fit(type, e, d);
+        for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
+    }
+    const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
+    return kernel_value_of(c, kernel_has_apex(type), &m, r);
+}
+
+static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
+                                                              int type)
+{
+    return KERNEL_OF_TYPE(type, kernel_maps_value, values, lane, r);
 }
 
 /* Relative to the map's origin. */
@@ -299,12 +322,6 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map_lanes
     return vm_andnot(again, better);
 }
 
-SIMD_INLINE vf kernel_map_value(const kernel_map *map, const kernel_polynomial *field, const vf r[3])
-{
-    const kernel_product m = kernel_map_product(map, r);
-    return kernel_polynomial_value(map, field, &m, r);
-}
-
 /* The direction of the field's gradient at r, in tile space. */
 SIMD_INLINE void kernel_lanes_normal(const kernel_map_lanes *map, const vf r[3], vf out[3])
 {
@@ -316,13 +333,6 @@ SIMD_INLINE void kernel_lanes_normal(const kernel_map_lanes *map, const vf r[3],
     /* grad = J^-T g: the columns of J^-1 are cross / det, and the sign of det is settled by whoever turns the normal.
      */
     for (int a = 0; a < 3; a++) out[a] = kernel_dot(j.cross[a], g);
-}
-
-SIMD_INLINE void kernel_map_normal(const kernel_map *map, const vf r[3], vf out[3])
-{
-    kernel_map_lanes lanes;
-    kernel_map_spread(map, &lanes);
-    kernel_lanes_normal(&lanes, r, out);
 }
 
 /* The field along a ray through a cell: on the line between the values at its faces, and by the inverse map. */
@@ -386,11 +396,6 @@ SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const ke
     return kernel_solve(p, map, i, rays, t, r);
 }
 
-/* A point of a ray in a cell. */
-typedef struct kernel_point {
-    vf t, value, r[3];
-} kernel_point;
-
 SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, kernel_point *out)
 {
     in->t = i->t_in;
@@ -399,13 +404,6 @@ SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, k
     out->value = i->v_out;
     memcpy(in->r, i->r_in, sizeof in->r);
     memcpy(out->r, i->r_out, sizeof out->r);
-}
-
-SIMD_INLINE void kernel_place_move(vm mask, const kernel_point *from, kernel_point *to)
-{
-    to->t = vf_select(mask, from->t, to->t);
-    to->value = vf_select(mask, from->value, to->value);
-    for (int a = 0; a < 3; a++) to->r[a] = vf_select(mask, from->r[a], to->r[a]);
 }
 
 /* Interpolates between the two places, at t. */
@@ -418,25 +416,6 @@ SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_poin
 
 #define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
 #define KERNEL_DOMAIN_RIM 0.03125
-
-/* Bounds for one cell and isovalue. */
-typedef struct kernel_bounds {
-    kernel_polynomial bent[3]; /* N */
-    float inverse[3][3];       /* J0^-1 */
-    float stretch;             /* L */
-    float slope;               /* G */
-    float curve, twist;        /* H, K; of a pyramid: times k */
-    float coarsest;            /* longer pieces are halved in any case */
-    bool is_monotone;          /* the field along any ray of the beam */
-    float level, gradient[3];  /* for L: at vertex 0, and along tile space */
-    float thickness;           /* for |E|, and what rounding adds to it */
-    float jump;                /* a face's value and the field on the ray beside it are never farther apart */
-} kernel_bounds;
-
-/* What one cell's rays are contracted by (surface/kernel_contraction.h, kernel_bounds_curved.h). */
-typedef struct kernel_cell_contraction {
-    float normal[3][3], gradient[3], level, offset[3], middle, bent[4][3], field[4], grow, blur, rim;
-} kernel_cell_contraction;
 
 /* The domain's corners, widened by KERNEL_DOMAIN_RIM on all sides for what rounding takes out of it, a wedge's last two
  * again; of a pyramid a / k, b / k and k. And the centre. */
@@ -473,9 +452,10 @@ SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
 {
     return kernel_is_prism(type) ? &kernel_wedge_domain : &kernel_box_domain;
 }
-/* Rays' directions: (x, y, 1), and up to spread off that in both. */
+
+/* Rays' directions: (0, 0, 1), and up to spread off that in x and y. */
 typedef struct kernel_beam {
-    float x, y, spread;
+    float spread;
     float offset; /* |origin_x|, |origin_y| of no ray are more */
 } kernel_beam;
 

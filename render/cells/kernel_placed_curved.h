@@ -54,12 +54,6 @@ SIMD_INLINE int kernel_first_triangle(int type)
 
 /* ---- a cell's numbers, for rays ---- */
 
-/* A number of each ray's own cell. */
-SIMD_INLINE vf kernel_curved_take(const float *of, vi lane)
-{
-    return vf_permute(vf_load(of), lane);
-}
-
 /* A number of each ray's own vertex of its cell, which has count; or of its own face. Of 16 lanes, permutations of all
  * vertices' are faster than a gather, of 8 they are slower. */
 SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
@@ -70,7 +64,7 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
     vf four[4], two[2];
     for (int i = 0; 2 * i < count; i++)
         four[i] = 2 * i + 1 < count ? vf_permute_pair(vf_load(of[2 * i]), vf_load(of[2 * i + 1]), in_two)
-                                    : kernel_curved_take(of[2 * i], lane);
+                                    : kernel_take(of[2 * i], lane);
     for (int i = 0; 4 * i < count; i++)
         two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];

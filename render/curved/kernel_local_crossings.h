@@ -137,9 +137,9 @@ SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_loca
                                   kernel_local_seen *out)
 {
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        const vf z = kernel_local_take(f->at[2][i], rays->lane);
-        out->x[i] = (kernel_local_take(f->at[0][i], rays->lane) - rays->origin[0]) - rays->slope[0] * z;
-        out->y[i] = (kernel_local_take(f->at[1][i], rays->lane) - rays->origin[1]) - rays->slope[1] * z;
+        const vf z = kernel_take(f->at[2][i], rays->lane);
+        out->x[i] = (kernel_take(f->at[0][i], rays->lane) - rays->origin[0]) - rays->slope[0] * z;
+        out->y[i] = (kernel_take(f->at[1][i], rays->lane) - rays->origin[1]) - rays->slope[1] * z;
     }
 }
 
@@ -217,7 +217,7 @@ static __attribute__((noinline)) void kernel_local_find_dented(const kernel_loca
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_local_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
-    const vi dents = vi_from_bits(kernel_local_take(f->dents, own->lane));
+    const vi dents = vi_from_bits(kernel_take(f->dents, own->lane));
     if (vm_any(vm_and(rays, vm_sign(-dents))))
         kernel_local_find_dented(f, own, &dents, rays, type, out);
     else
@@ -317,11 +317,11 @@ SIMD_INLINE void kernel_local_quad_of(const kernel_local_corners *c, kernel_quad
 }
 
 SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, const kernel_quad_place *place,
-                                       kernel_local_crossing *out)
+                                       kernel_point *out)
 {
     const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
-    out->v = kernel_bilinear(f, place->s, place->r);
+    out->value = kernel_bilinear(f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
         const vf base = kernel_local_own(type, a, c->vertex[0]);
         const vf along = kernel_local_own(type, a, c->vertex[1]) - base;
@@ -336,31 +336,23 @@ SIMD_INLINE vf kernel_local_weigh(const vf e[3], vf inverse, vf i, vf j, vf k)
 }
 
 /* Finds the rays' crossings of triangles, whose corners are in the order of coordinates. */
-SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int type, kernel_local_crossing *out)
+SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int type, kernel_point *out)
 {
     const vf *i = c->at[0], *j = c->at[1], *k = c->at[2];
     const vf e[3] = {vf_diff_of_products(i[0], j[1], j[0], i[1]), vf_diff_of_products(j[0], k[1], k[0], j[1]),
                      vf_diff_of_products(i[0], k[1], k[0], i[1])};
     const vf inverse = 1.0f / kernel_weight(e[0], e[1], e[2]);
     out->t = kernel_local_weigh(e, inverse, i[2], j[2], k[2]);
-    out->v = kernel_local_weigh(e, inverse, i[3], j[3], k[3]);
+    out->value = kernel_local_weigh(e, inverse, i[3], j[3], k[3]);
     for (int a = 0; a < 3; a++)
         out->r[a] =
             kernel_local_weigh(e, inverse, kernel_local_own(type, a, c->vertex[0]),
                                kernel_local_own(type, a, c->vertex[1]), kernel_local_own(type, a, c->vertex[2]));
 }
 
-SIMD_INLINE void kernel_local_crossing_select(vm m, const kernel_local_crossing *a, const kernel_local_crossing *b,
-                                              kernel_local_crossing *out)
-{
-    out->t = vf_select(m, a->t, b->t);
-    out->v = vf_select(m, a->v, b->v);
-    for (int i = 0; i < 3; i++) out->r[i] = vf_select(m, a->r[i], b->r[i]);
-}
-
 /* Where rays cross quads, and whatever elsewhere. */
 SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2], int type, const vm on_quad[2],
-                                          kernel_local_crossing ends[2])
+                                          kernel_point ends[2])
 {
     const int count = kernel_has_apex(type) ? 1 : 2;
     kernel_quad quads[2];
@@ -372,27 +364,24 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2],
 
 /* Where rays that cross two faces come in and go out. */
 SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_rays *rays,
-                                    const kernel_curved_crossed *crossed, int type, kernel_local_crossing out[2])
+                                    const kernel_curved_crossed *crossed, int type, kernel_point out[2])
 {
     const vi face[2] = {crossed->first, crossed->last};
     vm on_quad[2];
     kernel_local_corners corners[2];
-    kernel_local_crossing ends[2];
     kernel_local_corners_of(f, rays, crossed->two, type, face, corners);
     for (int n = 0; n < 2; n++) on_quad[n] = vm_and(crossed->two, kernel_curved_on_quad(type, n, face[n]));
-    if (kernel_has_triangles(type)) memset(ends, 0, sizeof ends);
+    if (kernel_has_triangles(type)) memset(out, 0, 2 * sizeof *out);
     if (kernel_is_box(type) || vm_any(vm_or(on_quad[0], on_quad[1])))
-        kernel_local_cross_quads(corners, type, on_quad, ends);
+        kernel_local_cross_quads(corners, type, on_quad, out);
     for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(crossed->two, on_quad[n]);
-        kernel_local_crossing end;
+        kernel_point end;
         if (!vm_any(on_triangle)) continue;
         kernel_local_triangle_end(&corners[n], type, &end);
-        kernel_local_crossing_select(on_triangle, &end, &ends[n], &ends[n]);
+        kernel_point_move(on_triangle, &end, &out[n]);
     }
-    const vm swap = vf_lt(ends[1].t, ends[0].t);
-    kernel_local_crossing_select(swap, &ends[1], &ends[0], &out[0]);
-    kernel_local_crossing_select(swap, &ends[0], &ends[1], &out[1]);
+    kernel_points_order(out);
 }
 
 #endif

@@ -32,6 +32,7 @@
 
 #include "grid.h"
 #include "kernel_local.h"
+#include "kernel_packet.h"
 #include "simd.h"
 
 enum { KERNEL_DEVIATION_STEPS = 8 };
@@ -117,7 +118,7 @@ SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 }
 
 SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
-                                       vi lane, const kernel_local_crossing ends[2], int type, kernel_local_chord *out)
+                                       vi lane, const kernel_point ends[2], int type, kernel_local_chord *out)
 {
     vf first[KERNEL_BENT_TERMS], last[KERNEL_BENT_TERMS];
     kernel_local_bent_at(type, ends[0].r, first);
@@ -129,11 +130,11 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     for (int k = 0; k < kernel_bent_terms(type); k++) {
         out->mean[k] = 0.5f * (first[k] + last[k]);
         out->rise[k] = last[k] - first[k];
-        out->own[k] = kernel_local_take(nonlinear->terms[k], lane);
-        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
+        out->own[k] = kernel_take(nonlinear->terms[k], lane);
+        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_take(cells->bent[k][a], lane);
     }
-    out->tolerance = kernel_local_take(nonlinear->tolerance, lane);
-    out->residual_limit = kernel_local_take(nonlinear->residual_limit, lane);
+    out->tolerance = kernel_take(nonlinear->tolerance, lane);
+    out->residual_limit = kernel_take(nonlinear->residual_limit, lane);
 }
 
 /* Finds the residual at the place u, and how far the field is off its chord. */
@@ -177,7 +178,7 @@ SIMD_INLINE vm kernel_local_settle(const kernel_local_chord *c, const float *pla
 }
 
 SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
-                                            vi lane, vm rays, const kernel_local_crossing ends[2], int type,
+                                            vi lane, vm rays, const kernel_point ends[2], int type,
                                             kernel_local_deviations *out)
 {
     static const float places[3] = {-0.25f, 0, 0.25f};
@@ -207,7 +208,7 @@ typedef struct kernel_local_part {
     vf residual;        /* the most so far */
 } kernel_local_part;
 
-SIMD_INLINE void kernel_local_part_begin(const kernel_local_crossing *first, kernel_local_part *out)
+SIMD_INLINE void kernel_local_part_begin(const kernel_point *first, kernel_local_part *out)
 {
     *out = (kernel_local_part){.u = -0.5f, .deviation = vf_set(0), .residual = vf_set(0)};
     memcpy(out->r, first->r, sizeof out->r);

@@ -230,15 +230,15 @@ SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const ker
     *near = vf_set(-INFINITY);
     *far = vf_set(INFINITY);
     for (int a = 0; a < 2; a++)
-        d[a] = (rays->origin[a] + rays->slope[a] * depth) - kernel_local_take(cells->origin[a], rays->lane);
+        d[a] = (rays->origin[a] + rays->slope[a] * depth) - kernel_take(cells->origin[a], rays->lane);
     for (int i = 0; i < 3; i++) {
         vf row[3];
-        for (int a = 0; a < 3; a++) row[a] = kernel_local_take(cells->inverse[i][a], rays->lane);
-        const vf offset = kernel_local_take(cells->offset[i], rays->lane);
+        for (int a = 0; a < 3; a++) row[a] = kernel_take(cells->inverse[i][a], rays->lane);
+        const vf offset = kernel_take(cells->offset[i], rays->lane);
         const vf at = vf_muladd(row[0], d[0], vf_muladd(row[1], d[1], offset));
         const vf inverse = 1.0f / vf_muladd(row[0], rays->slope[0], vf_muladd(row[1], rays->slope[1], row[2]));
-        const vf low = (kernel_local_take(cells->low[i], rays->lane) - at) * inverse;
-        const vf high = (kernel_local_take(cells->high[i], rays->lane) - at) * inverse;
+        const vf low = (kernel_take(cells->low[i], rays->lane) - at) * inverse;
+        const vf high = (kernel_take(cells->high[i], rays->lane) - at) * inverse;
         /* A product that is not a number is of a ray along a plane: the others tell. */
         *near = vf_max(vf_min(low, high), *near);
         *far = vf_min(vf_max(low, high), *far);

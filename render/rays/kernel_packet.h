@@ -300,6 +300,28 @@ typedef struct kernel_rays {
     vf origin_x, origin_y, slope_x, slope_y;
 } kernel_rays;
 
+/* A point of each ray in a cell: its depth, the field there, and the cell's own coordinates. */
+typedef struct kernel_point {
+    vf t, value, r[3];
+} kernel_point;
+
+/* Copies the points of the rays in the mask. */
+SIMD_INLINE void kernel_point_move(vm mask, const kernel_point *from, kernel_point *to)
+{
+    to->t = vf_select(mask, from->t, to->t);
+    to->value = vf_select(mask, from->value, to->value);
+    for (int a = 0; a < 3; a++) to->r[a] = vf_select(mask, from->r[a], to->r[a]);
+}
+
+/* Puts the nearer point of each ray first. */
+SIMD_INLINE void kernel_points_order(kernel_point ends[2])
+{
+    const vm swap = vf_lt(ends[1].t, ends[0].t);
+    const kernel_point first = ends[0];
+    kernel_point_move(swap, &ends[1], &ends[0]);
+    kernel_point_move(swap, &first, &ends[1]);
+}
+
 SIMD_INLINE kernel_rays kernel_packet_rays(const kernel_packet *p)
 {
     return (kernel_rays){p->origin_x, p->origin_y, p->slope_x, p->slope_y};

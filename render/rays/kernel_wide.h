@@ -1,5 +1,5 @@
-/* Vectors of doubles, a lane for each of a vf's half: they fill a register. Vectors of more are taken apart by
- * compilers, and their comparisons lane by lane. */
+/* Numbers of cells in lanes, as rays take them; and vectors of doubles, a lane for each of a vf's half: they fill a
+ * register. Vectors of more are taken apart by compilers, and their comparisons lane by lane. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 
@@ -12,6 +12,12 @@ enum { KERNEL_HALF = SIMD_WIDTH / 2 };
 typedef vd kernel_half;
 typedef int64_t kernel_half_mask __attribute__((vector_size(8 * KERNEL_HALF)));
 typedef float kernel_half_floats __attribute__((vector_size(4 * KERNEL_HALF)));
+
+/* Takes each ray's number, that of its cell's lane. */
+SIMD_INLINE vf kernel_take(const float *of, vi lane)
+{
+    return vf_permute(vf_load(of), lane);
+}
 
 SIMD_INLINE kernel_half kernel_half_widen(kernel_half_floats v)
 {

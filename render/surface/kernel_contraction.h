@@ -30,6 +30,7 @@
 #include <math.h>
 
 #include "grid.h"
+#include "kernel_bounds.h"
 #include "kernel_cell.h"
 #include "kernel_local.h"
 #include "kernel_map.h"
@@ -61,19 +62,37 @@ typedef struct kernel_contracted {
     vf t, r[3];
 } kernel_contracted;
 
-/* origin: vertex 0; normal: J0^-1; gradient and level: L's, at vertex 0. */
-SIMD_INLINE void kernel_sight_of(const kernel_rays *rays, const vf origin[3], const vf normal[3][3],
-                                 const vf gradient[3], vf level, kernel_sight *out)
+/* The rays as their cells have them. */
+SIMD_INLINE void kernel_sight_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_sight *out)
 {
-    const vf *g = gradient;
+    vf origin[3], normal[3], g[3];
+    for (int a = 0; a < 3; a++) {
+        origin[a] = kernel_take(c->at[a][0], lane);
+        g[a] = kernel_take(c->bounds->gradient[a], lane);
+    }
     const vf x = (rays->origin_x + rays->slope_x * origin[2]) - origin[0];
     const vf y = (rays->origin_y + rays->slope_y * origin[2]) - origin[1];
     for (int i = 0; i < 3; i++) {
-        out->y[i] = normal[i][0] * x + normal[i][1] * y;
-        out->w[i] = (normal[i][0] * rays->slope_x + normal[i][1] * rays->slope_y) + normal[i][2];
+        for (int a = 0; a < 3; a++) normal[a] = kernel_take(c->bounds->normal[i][a], lane);
+        out->y[i] = normal[0] * x + normal[1] * y;
+        out->w[i] = (normal[0] * rays->slope_x + normal[1] * rays->slope_y) + normal[2];
     }
-    out->level = level + (g[0] * x + g[1] * y);
+    out->level = kernel_take(c->bounds->level, lane) + (g[0] * x + g[1] * y);
     out->rise = (g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2];
+}
+
+SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
+{
+    const kernel_contractions *c = &b->contractions;
+    for (int i = 0; i < 3; i++) out->offset[i] = kernel_take(c->offset[i], lane);
+    for (int k = 0; k < kernel_bent_terms(type); k++) {
+        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_take(c->bent[k][i], lane);
+        out->field[k] = kernel_take(c->field[k], lane);
+    }
+    out->middle = kernel_take(c->middle, lane);
+    out->grow = kernel_take(c->grow, lane);
+    out->blur = kernel_take(c->blur, lane);
+    out->rim = kernel_take(c->rim, lane);
 }
 
 /* The places of D: the domain, of hexes and wedges wider by rim. Takes r to the nearest, of a pyramid to one that is
@@ -182,39 +201,6 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
     out->t = -(e * over);
     if (kernel_has_apex(type)) return;
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];
-}
-
-/* ---- a cell alone ---- */
-
-/* The cell's numbers in all lanes, and its rays. */
-SIMD_INLINE void kernel_contraction_spread(const kernel_cell_contraction *c, int type, kernel_contraction *out)
-{
-    for (int i = 0; i < 3; i++) out->offset[i] = vf_set(c->offset[i]);
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
-        for (int i = 0; i < 3; i++) out->bent[k][i] = vf_set(c->bent[k][i]);
-        out->field[k] = vf_set(c->field[k]);
-    }
-    out->middle = vf_set(c->middle);
-    out->grow = vf_set(c->grow);
-    out->blur = vf_set(c->blur);
-    out->rim = vf_set(c->rim);
-}
-
-SIMD_INLINE void kernel_contract_cell_of(const kernel_cell_contraction *c, const float vertex[3],
-                                         const kernel_rays *rays, vm wanted, kernel_contracted *out, int type)
-{
-    vf origin[3], normal[3][3], gradient[3];
-    kernel_contraction contraction;
-    kernel_sight ray;
-    for (int a = 0; a < 3; a++) {
-        origin[a] = vf_set(vertex[a]);
-        gradient[a] = vf_set(c->gradient[a]);
-        for (int i = 0; i < 3; i++) normal[i][a] = vf_set(c->normal[i][a]);
-    }
-    kernel_sight_of(rays, origin, (const vf(*)[3])normal, gradient, vf_set(c->level), &ray);
-    kernel_contraction_spread(c, type, &contraction);
-    kernel_contract(&contraction, &ray, wanted, out, type);
-    out->t += origin[2];
 }
 
 #endif

@@ -25,7 +25,6 @@
 #include "kernel_accept.h"
 #include "kernel_arrays.h"
 #include "kernel_bounds.h"
-#include "kernel_bounds_curved.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
 #include "kernel_contraction.h"
@@ -62,10 +61,9 @@ typedef struct kernel_curved_batch {
     kernel_curved_batch_pending *own;       /* those that are traced */
     kernel_placed_curved placed;
     float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
-    kernel_curved_batch_bounds bounds;
+    kernel_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
-    kernel_curved curved[SIMD_WIDTH];
     kernel_pixel_list rays, met, found, others;
     uint8_t faces[KERNEL_LIST_ROOM]; /* which those met cross: the first, and 8 times the second */
     kernel_curved_ends found_ends, other_ends;
@@ -82,9 +80,17 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
     memset(h->colours, 0, sizeof h->colours);
 }
 
+SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
+{
+    return (kernel_curved){.type = h->own->type,
+                           .at = (const float(*)[8][SIMD_WIDTH])h->placed.at,
+                           .colours = (const float(*)[SIMD_WIDTH])h->colours,
+                           .bounds = &h->bounds};
+}
+
 /* ---- cells alone ---- */
 
-/* The lane as a cell, whose map is not set up yet. */
+/* The lane as a cell. */
 SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
 {
     if (h->ready >> n & 1) return;
@@ -93,7 +99,6 @@ SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
     h->cells[n].part = h->part;
     h->cells[n].index = h->own->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
-    h->curved[n].is_set_up = false;
 }
 
 /* Rays that are for the cell alone. */
@@ -101,6 +106,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
                                                                     const kernel_pixel_list *rays, int first,
                                                                     vi at_lanes, unsigned wanted)
 {
+    kernel_curved curved = kernel_curved_batch_cells(h);
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     memcpy(at, &at_lanes, sizeof at);
@@ -122,8 +128,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
                                       .is_contracted = true};
         p->is_nearer = false;
         kernel_curved_ready(h, n);
-        kernel_cell_surface(p, &state, &h->cells[n], &h->curved[n], h->own->value[n],
-                            vm_and(p->active, vm_from_bits(same)));
+        curved.lane = n;
+        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->own->value[n], vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;
@@ -131,69 +137,21 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
 
 /* ---- rays ---- */
 
-/* Returns L (kernel_bounds.h) of each ray's cell, on the ray at depth t. */
-SIMD_INLINE vf kernel_curved_batch_linear_at(const kernel_curved_batch *h, const kernel_lane_rays *p, vf t)
-{
-    vf g[3], at[3];
-    for (int a = 0; a < 3; a++) {
-        g[a] = kernel_curved_take(h->bounds.gradient[a], p->lane);
-        at[a] = kernel_curved_take(h->placed.at[a][0], p->lane);
-    }
-    const vf x = (p->rays.origin_x + p->rays.slope_x * t) - at[0], y = (p->rays.origin_y + p->rays.slope_y * t) - at[1];
-    return (kernel_curved_take(h->bounds.level, p->lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
-}
-
-/* Rays on which L leaves the cell's slab out on one side from depth to depth. */
-SIMD_INLINE vm kernel_curved_batch_far(const kernel_curved_batch *h, const kernel_lane_rays *p, vf side, vf from, vf to)
-{
-    const vf thick = kernel_curved_take(h->bounds.thickness, p->lane);
-    return vm_and(vf_lt(thick, side * kernel_curved_batch_linear_at(h, p, from)),
-                  vf_lt(thick, side * kernel_curved_batch_linear_at(h, p, to)));
-}
-
-/* The rays as their cells have them. */
-SIMD_INLINE void kernel_curved_batch_sight(const kernel_curved_batch *h, const kernel_lane_rays *p, kernel_sight *out)
-{
-    vf origin[3], normal[3][3], gradient[3];
-    for (int a = 0; a < 3; a++) {
-        origin[a] = kernel_curved_take(h->placed.at[a][0], p->lane);
-        gradient[a] = kernel_curved_take(h->bounds.gradient[a], p->lane);
-        for (int i = 0; i < 3; i++) normal[i][a] = kernel_curved_take(h->bounds.normal[i][a], p->lane);
-    }
-    kernel_sight_of(&p->rays, origin, (const vf(*)[3])normal, gradient, kernel_curved_take(h->bounds.level, p->lane),
-                    out);
-}
-
 /* Rays that are far from the slab between the planes that their cells lie between: a face's value has L's sign on
  * these, and there is no root. Depths are from vertex 0's on. */
 SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_sight *ray)
 {
-    const vf thick = kernel_curved_take(h->bounds.thickness, lane);
+    const vf thick = kernel_take(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
         const vf inverse = 1.0f / ray->w[i];
-        const vf low = (kernel_curved_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
-        const vf high = (kernel_curved_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
+        const vf low = (kernel_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
+        const vf high = (kernel_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
         from = vf_max(vf_min(low, high), from);
         to = vf_min(vf_max(low, high), to);
     }
     const vf begin = ray->level + ray->rise * from, end = ray->level + ray->rise * to;
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
-}
-
-SIMD_INLINE void kernel_curved_batch_contraction(const kernel_curved_batch *h, vi lane, int type,
-                                                 kernel_contraction *out)
-{
-    const kernel_contractions *c = &h->bounds.contractions;
-    for (int i = 0; i < 3; i++) out->offset[i] = kernel_curved_take(c->offset[i], lane);
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
-        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_curved_take(c->bent[k][i], lane);
-        out->field[k] = kernel_curved_take(c->field[k], lane);
-    }
-    out->middle = kernel_curved_take(c->middle, lane);
-    out->grow = kernel_curved_take(c->grow, lane);
-    out->blur = kernel_curved_take(c->blur, lane);
-    out->rim = kernel_curved_take(c->rim, lane);
 }
 
 /* Crossings that are known, at these depths, are found, as places in found_ends[0]; of the others only those that are
@@ -219,6 +177,7 @@ SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const ke
 /* What is known of rays without faces. */
 SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
+    const kernel_curved cells = kernel_curved_batch_cells(h);
     int kept = 0;
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
@@ -228,13 +187,13 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_contracted at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_curved_take(h->own->near, p.lane), p.far));
-        kernel_curved_batch_sight(h, &p, &ray);
+        p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
+        kernel_sight_of(&cells, &p.rays, p.lane, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
-        kernel_curved_batch_contraction(h, p.lane, type, &c);
+        kernel_contraction_of(&h->bounds, p.lane, type, &c);
         kernel_contract(&c, &ray, p.active, &at, type);
-        const vf depth = at.t + kernel_curved_take(h->placed.at[2][0], p.lane);
+        const vf depth = at.t + kernel_take(h->placed.at[2][0], p.lane);
         kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
     }
     h->rays.count = kept;
@@ -258,7 +217,7 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
         uint8_t faces[SIMD_WIDTH];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_curved_take(h->own->near, p.lane), p.far));
+        p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
         kernel_curved_faces(&h->placed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
@@ -285,75 +244,30 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_meet(kernel_tile_t
  * must be searched for roots to the others. */
 SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
+    const kernel_curved cells = kernel_curved_batch_cells(h);
     h->found.count = h->others.count = 0;
     for (int n = 0; n < h->met.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_curved_place face[2], ends[2];
+        kernel_point ends[2];
+        vm found;
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
         const vi faces = kernel_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
         p.far = kernel_batch_far(t, p.at);
-        kernel_curved_cross(&h->placed, &p, type, faces, face);
-        const vm swap = vf_lt(face[1].t, face[0].t);
-        kernel_curved_place_select(swap, &face[1], &face[0], &ends[0]);
-        kernel_curved_place_select(swap, &face[0], &face[1], &ends[1]);
+        kernel_curved_cross(&h->placed, &p, type, faces, ends);
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
-        const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
-        const vf jump = kernel_curved_take(h->bounds.jump, p.lane);
-        const vm far = vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))), other = vf_lt(jump, zero);
+        const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
         const vm room = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
-        const vm close = vm_andnot(room, vm_or(change, far)), found = vm_andnot(vm_and(near, change), other);
+        const vm left = kernel_ends_decide(&cells, &p.rays, p.lane, room, &ends[0], &ends[1], &found);
         kernel_curved_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
-        vm searched = vm_and(room, other);
-        if (vm_any(searched))
-            searched = vm_andnot(
-                searched,
-                vm_andnot(kernel_curved_batch_far(h, &p, kernel_side(ends[0].v), ends[0].t, ends[1].t), change));
-        kernel_curved_ends_add(&h->met, n, ends, vm_bits(vm_or(close, searched)), &h->others, &h->other_ends);
+        kernel_curved_ends_add(&h->met, n, ends, vm_bits(left), &h->others, &h->other_ends);
     }
 }
 
 static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
     KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
-}
-
-/* Sets up each ray's map, of its own cell. */
-SIMD_INLINE void kernel_curved_maps(const kernel_curved_batch *h, int type, vi lane, kernel_map_lanes *out)
-{
-    const int count = grid_type_vertices(type);
-    out->is_pyramid = kernel_has_apex(type);
-    out->tolerance = KERNEL_MAP_TOLERANCE;
-    for (int n = 0; n < 4; n++) {
-        vf v[8], *const c = n < 3 ? out->position[n] : out->field;
-        for (int i = 0; i < count; i++) v[i] = kernel_curved_take(h->placed.at[n][i], lane);
-        if (n < 3) out->origin[n] = v[0];
-        for (int half = 0; half < 2; half++) {
-            kernel_half d[8], *const e = out->exact[half][n];
-            for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
-            if (n < 3)
-                for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
-            kernel_half_fit(type, e, d);
-            for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
-        }
-    }
-}
-
-/* Returns the colours' field at r in each ray's own cell. */
-SIMD_INLINE vf kernel_curved_batch_colour_value(const kernel_curved_batch *h, vi lane, const vf r[3], int type)
-{
-    const int count = grid_type_vertices(type);
-    vf v[8], c[8];
-    for (int i = 0; i < count; i++) v[i] = kernel_curved_take(h->colours[i], lane);
-    for (int half = 0; half < 2; half++) {
-        kernel_half d[8], e[8];
-        for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
-        kernel_half_fit(type, e, d);
-        for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
-    }
-    const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
-    return kernel_value_of(c, kernel_has_apex(type), &m, r);
 }
 
 /* The colours' field of the lanes' cells, in the order of their vertices. */
@@ -387,7 +301,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     int32_t at[SIMD_WIDTH];
     vf colours[3];
     if (layer->colour_map) {
-        const vf place = KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_colour_value, h, p->lane, places->r);
+        const vf place =
+            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->own->type);
         kernel_base_colour(t->surface, 0, place, colours);
     }
     memcpy(at, &p->at, sizeof at);
@@ -446,7 +361,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
             ends[e].value = vf_load(h->found_ends.v[e] + n);
             for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(h->found_ends.r[e][a] + n);
         }
-        kernel_curved_maps(h, type, p.lane, &map);
+        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, p.lane, &map, type);
         const vm open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
@@ -473,7 +388,7 @@ SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_c
         p.far = kernel_batch_far(t, p.at);
         at.t = vf_load(h->found_ends.t[0] + n);
         for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
-        kernel_curved_maps(h, type, p.lane, &map);
+        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, p.lane, &map, type);
         kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
         const vm hit = vm_and(p.active, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (vm_any(hit)) nearer |= kernel_curved_batch_take(t, h, n, &p, &map, &at, hit);
@@ -486,40 +401,15 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_known_of, t, h);
 }
 
-_Static_assert(offsetof(kernel_bounds, coarsest) == offsetof(kernel_bounds, inverse) + 13 * sizeof(float) &&
-                   offsetof(kernel_bounds, inverse) + 16 * sizeof(float) <= sizeof(kernel_bounds),
-               "the inverse and what follows it are read as rows of four");
-
-/* Gathers the limits of each ray's own cell. */
-SIMD_INLINE void kernel_curved_batch_limits(const kernel_curved_batch *h, vi lane, kernel_limits *out)
-{
-    const kernel_bounds *b = &h->curved[0].bounds;
-    int32_t at[SIMD_WIDTH];
-    vf row[4][4]; /* the inverse and what follows it */
-    vi_store(at, lane * (int)(sizeof(kernel_curved) / sizeof(float)));
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 4; j++) out->bent[i][j] = vf_set(0);
-        vf_gather_rows(&b->bent[i].c[4], at, out->bent[i] + 4);
-    }
-    for (int i = 0; i < 4; i++) vf_gather_rows(&b->inverse[0][0] + 4 * i, at, row[i]);
-    for (int i = 0; i < 9; i++) out->inverse[i / 3][i % 3] = row[i / 4][i % 4];
-    out->stretch = row[2][1];
-    out->slope = row[2][2];
-    out->curve = row[2][3];
-    out->twist = row[3][0];
-    out->coarsest = row[3][1];
-    out->is_monotone = vf_le(vf_set(0), kernel_curved_take(h->bounds.jump, lane));
-}
-
 /* Searches the other rays from n on, whose ends kernel_curved_batch_cross() has looked at, for their first root. */
-SIMD_INLINE unsigned kernel_curved_batch_search_of(kernel_tile_trace *t, kernel_curved_batch *h, int n, int type)
+static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                     int n)
 {
     const kernel_curved_ends *ends = &h->other_ends;
     kernel_lane_rays p;
-    kernel_map_lanes map;
-    kernel_limits limits;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
     kernel_curved_batch_places places = {.t = vf_set(0)};
+    kernel_search s;
     vm hits = vm_none();
     kernel_lane_rays_begin(&p, t, &h->others, n);
     p.far = kernel_batch_far(t, p.at);
@@ -532,25 +422,15 @@ SIMD_INLINE unsigned kernel_curved_batch_search_of(kernel_tile_trace *t, kernel_
         i.r_in[a] = vf_load(ends->r[0][a] + n);
         i.r_out[a] = vf_load(ends->r[1][a] + n);
     }
-    for (int k = n; k < n + SIMD_WIDTH && k < h->others.count; k++) {
-        const int lane = h->others.lane[k];
-        kernel_curved_ready(h, lane);
-        kernel_curved_setup(t->frame, &t->tile, &h->curved[lane], t->surface->layer, &h->cells[lane],
-                            h->own->value[lane]);
-    }
-    kernel_curved_maps(h, type, p.lane, &map);
-    kernel_curved_batch_limits(h, p.lane, &limits);
-    kernel_search s = {
-        .rays = p.rays, .map = &map, .limits = &limits, .interval = &i, .failures = &t->thread->map_failures};
-    kernel_search_begin(&s);
-    kernel_search_whole(&s, p.active);
+    const kernel_curved cells = kernel_curved_batch_cells(h);
+    if (!kernel_search_in(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;
     do {
         kernel_point at;
         vf normal[3];
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
         const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        kernel_curved_batch_normal(t, &map, at.r, normal);
+        kernel_curved_batch_normal(t, &s.map, at.r, normal);
         for (int a = 0; a < 3; a++) {
             places.normal[a] = vf_select(hit, normal[a], places.normal[a]);
             places.r[a] = vf_select(hit, at.r[a], places.r[a]);
@@ -560,12 +440,6 @@ SIMD_INLINE unsigned kernel_curved_batch_search_of(kernel_tile_trace *t, kernel_
         kernel_search_close(&s, hit);
     } while (kernel_search_on(&s));
     return vm_any(hits) ? kernel_curved_batch_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
-}
-
-static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                     int n)
-{
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_search_of, t, h, n);
 }
 
 /* ---- batches ---- */
@@ -606,9 +480,12 @@ static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trac
     }
     const vm collapsed =
         kernel_place_curved(&h->placed, &h->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
-    kernel_curved_batch_bound(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
+    kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     h->ready = 0;
+    kernel_curved *const alone = t->curved;
+    kernel_curved cells = kernel_curved_batch_cells(h);
+    t->curved = &cells;
     for (int n = 0; n < own->count; n++) {
         const unsigned blocks = own->blocks[n] & t->wanted & kernel_blocks_beyond(t, own->near[n]);
         if (!blocks) continue;
@@ -617,9 +494,10 @@ static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trac
             continue;
         }
         kernel_curved_ready(h, n);
-        t->curved->is_set_up = false;
+        cells.lane = n;
         kernel_blocks_meet(t, blocks, h->part, own->cell[n], &h->cells[n], own->value[n]);
     }
+    t->curved = alone;
 }
 
 static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,

@@ -81,11 +81,11 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
 
 /* Takes the roots of the interval in turn, until one counts on each ray. */
 SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
-                                        const kernel_interval *i, vm rays)
+                                        const kernel_interval *i, vm wanted)
 {
-    kernel_search_cell cell;
+    const kernel_rays rays = kernel_packet_rays(p);
     kernel_search s;
-    if (!kernel_search_in(&s, &cell, p, &curved->map, &curved->bounds, i, rays)) return;
+    if (!kernel_search_in(&s, curved, &rays, vi_set(0), i, wanted, &p->thread->map_failures)) return;
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
@@ -99,19 +99,15 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-    kernel_curved curved;
-    bool is_set_up = false;
+    kernel_curved_room room;
+    kernel_curved curved = {.room = &room};
     const int count = kernel_curved_intervals(p, c, rays, false, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
-        const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        const vm wanted = vm_and(kernel_is_near(p, i), room);
+        const vm room_left = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm wanted = vm_and(kernel_is_near(p, i), room_left);
         if (!vm_any(wanted)) continue;
-        if (!is_set_up) {
-            kernel_map_setup(&curved.map, c);
-            kernel_bounds_setup(&curved.bounds, &curved.map, c->type, &beam);
-            is_set_up = true;
-        }
+        if (!curved.bounds) kernel_curved_alone(c, &beam, &curved);
         kernel_occlusion_roots(p, o, &curved, i, wanted);
     }
 }

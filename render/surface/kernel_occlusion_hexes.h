@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "kernel_bounds_curved.h"
+#include "kernel_bounds.h"
 #include "kernel_curved_rays.h"
 #include "kernel_map.h"
 #include "kernel_occluders.h"
@@ -136,14 +136,13 @@ SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf 
 }
 
 /* The field is monotone along the ray, and at neither end so near 0 that what it jumps by at faces may matter. */
-static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pairs *pairs,
-                                                          const kernel_curved_place ends[2])
+static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pairs *pairs, const kernel_point ends[2])
 {
     static const kernel_beam beam = {.spread = 0};
-    kernel_curved_batch_bounds bounds;
-    kernel_curved_batch_bound(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
+    kernel_bounds bounds;
+    kernel_bounds_of(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
     const vf jump = vf_load(bounds.jump);
-    return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))));
+    return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
 
 SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pairs, vm active, vf far)
@@ -151,7 +150,7 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     const vf zero = vf_set(0), reach = vf_load(pairs->reach);
     kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
     kernel_curved_crossed crossed;
-    kernel_curved_place face[2], ends[2];
+    kernel_point ends[2];
     int32_t lanes[SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
@@ -159,13 +158,10 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     kernel_pair_verdict out = {vm_none(), crossed.alone};
     if (!vm_any(crossed.two)) return out;
     p.active = crossed.two;
-    kernel_curved_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, face);
-    const vm swap = vf_lt(face[1].t, face[0].t);
-    kernel_curved_place_select(swap, &face[1], &face[0], &ends[0]);
-    kernel_curved_place_select(swap, &face[0], &face[1], &ends[1]);
+    kernel_curved_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
-    const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
+    const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
     /* Where the sign changes the root lies where the counted part is left out, if at all there. */
     const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
     const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));

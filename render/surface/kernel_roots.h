@@ -33,6 +33,7 @@
 
 #include <math.h>
 
+#include "kernel_bounds.h"
 #include "kernel_cell.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -50,24 +51,29 @@ typedef struct kernel_verdict {
     vm tiny;     /* all of it rounding */
 } kernel_verdict;
 
-/* kernel_bounds, each lane's own. */
+/* What kernel_bounds has of each ray's own cell. */
 typedef struct kernel_limits {
-    vf bent[3][8], inverse[3][3], stretch, slope, curve, twist, coarsest;
+    vf bent[3][8], inverse[3][3], stretch, slope, curve, twist;
+    vf coarsest; /* longer pieces are halved in any case */
     vm is_monotone;
 } kernel_limits;
 
-SIMD_INLINE void kernel_limits_spread(const kernel_bounds *b, kernel_limits *out)
+SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits *out)
 {
-    for (int i = 0; i < 3; i++) {
-        kernel_polynomial_spread(&b->bent[i], out->bent[i]);
-        for (int a = 0; a < 3; a++) out->inverse[i][a] = vf_set(b->inverse[i][a]);
-    }
-    out->stretch = vf_set(b->stretch);
-    out->slope = vf_set(b->slope);
-    out->curve = vf_set(b->curve);
-    out->twist = vf_set(b->twist);
-    out->coarsest = vf_set(b->coarsest);
-    out->is_monotone = b->is_monotone ? vm_all_lanes() : vm_none();
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++) {
+            out->bent[i][j] = vf_set(0);
+            out->bent[i][4 + j] = kernel_take(b->bent[i][j], lane);
+        }
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_take(b->normal[i][a], lane);
+    out->stretch = kernel_take(b->stretch, lane);
+    out->slope = kernel_take(b->slope, lane);
+    out->curve = kernel_take(b->curve, lane);
+    out->twist = kernel_take(b->twist, lane);
+    const vm is_proved = vf_lt(kernel_take(b->thickness, lane), vf_set(INFINITY));
+    out->coarsest = vf_select(is_proved, vf_set(1), vf_set(0.125f));
+    out->is_monotone = vf_le(vf_set(0), kernel_take(b->jump, lane));
 }
 
 /* The straight way between two points of the map, and the product of the map at each. */
@@ -139,8 +145,8 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
 /* A search under way: pieces [number, number + 1] * size of the interval, in order. */
 typedef struct kernel_search {
     kernel_rays rays;
-    const kernel_map_lanes *map; /* set up where more is asked than the interval's ends tell, as the limits are */
-    const kernel_limits *limits;
+    kernel_map_lanes map; /* set up where more is asked than the interval's ends tell, as the limits are */
+    kernel_limits limits;
     const kernel_interval *interval;
     int64_t *failures; /* the map's */
     vm open;           /* rays that have pieces left */
@@ -160,32 +166,24 @@ SIMD_INLINE vf kernel_side(vf v)
 /* The interpolant at a face, or the face's value where that is the same but for rounding. */
 SIMD_INLINE void kernel_search_face(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
-    const vf inside = kernel_solve_lanes(&s->rays, s->map, s->interval, rays, at->t, at->r, s->failures);
+    const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
 /* How far Y at the coordinates that a face gave is from the ray. */
 SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
 {
-    const kernel_map_lanes *map = s->map;
+    const kernel_map_lanes *map = &s->map;
     const kernel_product m = kernel_product_at(map->is_pyramid, at->r);
     vf target[3], off[3], sum = vf_set(0);
     kernel_rays_at(&s->rays, map, at->t, target);
     for (int a = 0; a < 3; a++) off[a] = kernel_value_of(map->position[a], map->is_pyramid, &m, at->r) - target[a];
     for (int i = 0; i < 3; i++) {
-        const vf *row = s->limits->inverse[i];
+        const vf *row = s->limits.inverse[i];
         const vf y = (off[0] * row[0] + off[1] * row[1]) + off[2] * row[2];
         sum += y * y;
     }
     return vf_sqrt(sum);
-}
-
-/* L on rays at depth t. */
-SIMD_INLINE vf kernel_linear_at(const kernel_rays *rays, const kernel_map *map, const kernel_bounds *b, vf t)
-{
-    const float *g = b->gradient, *origin = map->origin;
-    const vf x = (rays->origin_x + rays->slope_x * t) - origin[0], y = (rays->origin_y + rays->slope_y * t) - origin[1];
-    return (b->level + g[0] * x) + (g[1] * y + g[2] * (t - origin[2]));
 }
 
 /* Begins a search of which only the interval's ends are known. */
@@ -205,25 +203,34 @@ SIMD_INLINE vm kernel_search_changes(const kernel_search *s)
     return vm_xor(vf_lt(s->interval->v_in, vf_set(0)), vf_lt(s->interval->v_out, vf_set(0)));
 }
 
-/* Decides rays by the ends and the bounds of the whole cell, which all rays are in. Returns the rays that are left
- * undecided. */
-SIMD_INLINE vm kernel_search_ends(kernel_search *s, const kernel_map *map, const kernel_bounds *b, vm rays)
+/* Returns L (kernel_bounds.h) of each ray's cell, on the ray at depth t. */
+SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
 {
-    const kernel_interval *i = s->interval;
-    const vm change = kernel_search_changes(s);
-    vm far;
-    if (b->coarsest < 1) return rays;
-    if (b->is_monotone) {
-        s->found = vm_and(rays, change);
-        rays = vm_andnot(rays, change);
-        far = vf_lt(vf_set(b->jump), vf_min(vf_abs(i->v_in), vf_abs(i->v_out)));
-    } else {
-        const vf thick = vf_set(b->thickness);
-        far = vm_and(vf_lt(thick, s->side * kernel_linear_at(&s->rays, map, b, i->t_in)),
-                     vf_lt(thick, s->side * kernel_linear_at(&s->rays, map, b, i->t_out)));
-        far = vm_andnot(far, change);
+    vf g[3], at[3];
+    for (int a = 0; a < 3; a++) {
+        g[a] = kernel_take(c->bounds->gradient[a], lane);
+        at[a] = kernel_take(c->at[a][0], lane);
     }
-    return vm_andnot(rays, far);
+    const vf x = (rays->origin_x + rays->slope_x * t) - at[0], y = (rays->origin_y + rays->slope_y * t) - at[1];
+    return (kernel_take(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
+}
+
+/* Decides rays by the ends of their intervals and the bounds of their cells: *found gets those with just one root.
+ * Returns those that are left undecided. */
+SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
+                                  const kernel_point *in, const kernel_point *out, vm *found)
+{
+    const vf zero = vf_set(0), jump = kernel_take(c->bounds->jump, lane), side = kernel_side(in->value);
+    const vm change = vm_xor(vf_lt(in->value, zero), vf_lt(out->value, zero)), monotone = vf_le(zero, jump);
+    *found = vm_and(wanted, vm_and(monotone, change));
+    vm left = vm_andnot(wanted, *found);
+    left = vm_andnot(left, vm_and(monotone, vf_lt(jump, vf_min(vf_abs(in->value), vf_abs(out->value)))));
+    const vm searched = vm_andnot(vm_andnot(left, monotone), change);
+    if (!vm_any(searched)) return left;
+    const vf thick = kernel_take(c->bounds->thickness, lane);
+    const vm far = vm_and(vf_lt(thick, side * kernel_linear_at(c, rays, lane, in->t)),
+                          vf_lt(thick, side * kernel_linear_at(c, rays, lane, out->t)));
+    return vm_andnot(left, vm_and(searched, far));
 }
 
 /* The whole interval first, by the faces' coordinates and values: most rays are done with it. */
@@ -232,10 +239,10 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     const kernel_interval *i = s->interval;
     const vm change = kernel_search_changes(s);
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
-    const kernel_verdict v = kernel_judge(s->map, s->limits, &s->low, &s->high, gap, s->side);
-    const vf jump = s->limits->slope * s->limits->stretch * gap + KERNEL_ROOT_BAND;
+    const kernel_verdict v = kernel_judge(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
+    const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;
     const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
-    const vm monotone = vm_or(s->limits->is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits->coarsest);
+    const vm monotone = vm_or(s->limits.is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits.coarsest);
     const vm none = vm_and(sure, vm_or(v.clear, vm_and(monotone, faced))), one = vm_and(sure, vm_and(monotone, change));
     s->found = vm_or(s->found, vm_and(rays, one));
     s->open = vm_andnot(vm_andnot(rays, none), one);
@@ -244,34 +251,27 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     kernel_search_face(s, s->open, i->v_out, &s->end);
     /* Just inside a warped face the other sign: a root in no room. */
     const vm jumps = vm_andnot(s->open, vf_eq(kernel_side(s->from.value), s->side));
-    kernel_place_move(jumps, &s->from, &s->low);
-    kernel_place_move(jumps, &s->from, &s->high);
+    kernel_point_move(jumps, &s->from, &s->low);
+    kernel_point_move(jumps, &s->from, &s->high);
     s->side = vf_select(s->open, kernel_side(s->from.value), s->side);
     s->found = vm_or(s->found, jumps);
 }
 
-/* The numbers that a search in one cell reads, the same in each lane. */
-typedef struct kernel_search_cell {
-    kernel_map_lanes map;
-    kernel_limits limits;
-} kernel_search_cell;
-
-/* Begin it on the packet's rays, all in the cell. False where there is nothing to find. */
-SIMD_INLINE bool kernel_search_in(kernel_search *s, kernel_search_cell *cell, kernel_packet *p, const kernel_map *map,
-                                  const kernel_bounds *b, const kernel_interval *i, vm rays)
+/* Begins it on rays in the cells of their lanes. False where there is nothing to find. */
+static __attribute__((noinline)) bool kernel_search_in(kernel_search *s, const kernel_curved *c,
+                                                       const kernel_rays *rays, vi lane, const kernel_interval *i,
+                                                       vm wanted, int64_t *failures)
 {
-    s->rays = kernel_packet_rays(p);
-    s->map = &cell->map;
-    s->limits = &cell->limits;
+    s->rays = *rays;
     s->interval = i;
-    s->failures = &p->thread->map_failures;
+    s->failures = failures;
     kernel_search_begin(s);
-    rays = kernel_search_ends(s, map, b, rays);
-    if (!vm_any(vm_or(rays, s->found))) return false;
-    kernel_map_spread(map, &cell->map);
-    if (vm_any(rays)) {
-        kernel_limits_spread(b, &cell->limits);
-        kernel_search_whole(s, rays);
+    wanted = kernel_ends_decide(c, rays, lane, wanted, &s->low, &s->high, &s->found);
+    if (!vm_any(vm_or(wanted, s->found))) return false;
+    kernel_maps_of_type(c->at, lane, c->type, &s->map);
+    if (vm_any(wanted)) {
+        kernel_limits_of(c->bounds, lane, &s->limits);
+        kernel_search_whole(s, wanted);
     }
     return true;
 }
@@ -286,14 +286,14 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     if (!vm_any(inner)) return;
     kernel_point at = {.t = vf_select(inner, i->t_in + (i->t_out - i->t_in) * u, i->t_out)};
     kernel_place_between(&s->from, &s->end, at.t, at.r);
-    at.value = kernel_solve_lanes(&s->rays, s->map, i, inner, at.t, at.r, s->failures);
-    kernel_place_move(inner, &at, to);
+    at.value = kernel_solve_lanes(&s->rays, &s->map, i, inner, at.t, at.r, s->failures);
+    kernel_point_move(inner, &at, to);
 }
 
 /* Goes on to the next piece, the longest that starts there. */
 SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_point *to)
 {
-    kernel_place_move(rays, to, &s->from);
+    kernel_point_move(rays, to, &s->from);
     const vf next = s->number + 1.0f, half = next * 0.5f;
     const vm up = vm_and(vf_eq(vf_floor(half), half), vf_lt(s->size, vf_set(0.5f)));
     s->number = vf_select(rays, vf_select(up, half, next), s->number);
@@ -311,16 +311,16 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     while (vm_any(going)) {
         kernel_point to;
         kernel_search_piece(s, going, &to);
-        const kernel_verdict v = kernel_judge(s->map, s->limits, &s->from, &to, vf_set(0), s->side);
+        const kernel_verdict v = kernel_judge(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
-        const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits->coarsest));
+        const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits.coarsest));
         const vm decided = vm_and(going, vm_or(vm_or(certain, v.tiny), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
         s->pieces += vf_select(going, vf_set(1), vf_set(0)); /* each ray's own: it is searched as alone */
-        kernel_place_move(roots, &s->from, &s->low);
-        kernel_place_move(roots, &to, &s->high);
+        kernel_point_move(roots, &s->from, &s->low);
+        kernel_point_move(roots, &to, &s->high);
         s->found = vm_or(s->found, roots);
         s->side = vf_select(roots, -s->side, s->side);
         s->number = vf_select(halve, s->number * 2.0f, s->number);
@@ -335,12 +335,12 @@ SIMD_INLINE void kernel_search_end(kernel_search *s)
 {
     s->found = vm_andnot(s->ended, vf_eq(kernel_side(s->interval->v_out), s->side));
     s->ended = vm_none();
-    kernel_place_move(s->found, &s->end, &s->low);
-    kernel_place_move(s->found, &s->end, &s->high);
+    kernel_point_move(s->found, &s->end, &s->low);
+    kernel_point_move(s->found, &s->end, &s->high);
 }
 
 /* Goes on to further roots. Returns false where there can be none. */
-SIMD_INLINE bool kernel_search_on(kernel_search *s)
+static __attribute__((noinline)) bool kernel_search_on(kernel_search *s)
 {
     if (vm_any(s->open))
         kernel_search_next(s);
@@ -366,13 +366,13 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
         kernel_point at = {.t = kernel_secant(low.t, low.value, high.t, high.value)};
         if (n % 3 == 2) at.t = low.t + (high.t - low.t) * 0.5f;
         kernel_place_between(&low, &high, at.t, at.r);
-        at.value = kernel_solve_lanes(&s->rays, s->map, s->interval, rays, at.t, at.r, s->failures);
+        at.value = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at.t, at.r, s->failures);
         const vm same = vf_eq(kernel_side(at.value), kernel_side(low.value));
-        kernel_place_move(rays, &at, out);
+        kernel_point_move(rays, &at, out);
         high.value = vf_select(same, high.value * 0.5f, high.value);
         low.value = vf_select(same, low.value, low.value * 0.5f);
-        kernel_place_move(vm_and(rays, same), &at, &low);
-        kernel_place_move(vm_andnot(rays, same), &at, &high);
+        kernel_point_move(vm_and(rays, same), &at, &low);
+        kernel_point_move(vm_andnot(rays, same), &at, &high);
         rays = vm_andnot(rays, vf_le(vf_abs(at.value), vf_set(1e-7f)));
     }
 }
@@ -457,7 +457,7 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_la
     kernel_residuals(rays, map, out, residual.off, &residual.value);
     /* At a double root the field's slope is rounding, and a step by it leads away. */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
-    kernel_place_move(vm_andnot(wanted, away), &last, out);
+    kernel_point_move(vm_andnot(wanted, away), &last, out);
 }
 
 /* The last step to roots from places that are off by no more than end. Changes the map's tolerance. */
@@ -498,9 +498,9 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
 }
 
 /* Polishes the roots that are found. Where Newton's steps do not converge, the bracket alone is halved. */
-SIMD_INLINE void kernel_polish(const kernel_search *s, kernel_point *out)
+static __attribute__((noinline)) void kernel_polish(const kernel_search *s, kernel_point *out)
 {
-    const vm open = kernel_polish_lanes(&s->rays, s->map, s->found, &s->low, &s->high, out);
+    const vm open = kernel_polish_lanes(&s->rays, &s->map, s->found, &s->low, &s->high, out);
     if (vm_any(open)) kernel_bracket(s, open, out);
 }
 

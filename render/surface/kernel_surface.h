@@ -14,7 +14,6 @@
 #include "grid.h"
 #include "kernel_accept.h"
 #include "kernel_bounds.h"
-#include "kernel_bounds_curved.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
@@ -149,9 +148,10 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     kernel_accept(p, state, c, value, hit, &at);
 }
 
-/* Takes the crossings that are visible, and returns them. */
+/* Takes the crossings of the isovalue that are visible, and returns them. */
 SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                    const kernel_curved *curved, vm found, const kernel_point *at)
+                                    const kernel_curved *curved, int value, const kernel_map_lanes *map, vm found,
+                                    const kernel_point *at)
 {
     const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
@@ -159,68 +159,65 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
     if (state->surface->layer->normal == RENDER_VERTEX) {
         memcpy(places.normal, at->r, sizeof places.normal);
     } else {
-        kernel_map_normal(&curved->map, at->r, places.normal);
+        kernel_lanes_normal(map, at->r, places.normal);
         kernel_unshear(p, places.normal);
     }
-    if (state->surface->layer->colour_map) places.w = kernel_map_value(&curved->map, &curved->map.colour, at->r);
-    kernel_accept(p, state, c, curved->value, hit, &places);
+    if (state->surface->layer->colour_map)
+        places.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
+    kernel_accept(p, state, c, value, hit, &places);
     return hit;
 }
 
 /* Takes the crossings of the interval in turn. A ray ends at an opaque surface's first visible one. */
 SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                      const kernel_curved *curved, const kernel_interval *i, vm rays)
+                                      const kernel_curved *curved, int value, const kernel_interval *i, vm wanted)
 {
-    kernel_search_cell cell;
+    const kernel_rays rays = kernel_packet_rays(p);
     kernel_search s;
-    if (!kernel_search_in(&s, &cell, p, &curved->map, &curved->bounds, i, rays)) return;
+    if (!kernel_search_in(&s, curved, &rays, vi_set(curved->lane), i, wanted, &p->thread->map_failures)) return;
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
-        const vm hit = kernel_curved_accept(p, state, c, curved, s.found, &at);
+        const vm hit = kernel_curved_accept(p, state, c, curved, value, &s.map, s.found, &at);
         if (state->is_opaque) kernel_search_close(&s, hit);
     } while (kernel_search_on(&s));
 }
 
-/* The cell's contraction, as lanes have it. */
-static __attribute__((noinline)) void kernel_curved_contraction(const kernel_packet *p, kernel_curved *curved,
-                                                                const kernel_cell *c)
+SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
+                                      kernel_contracted *out, int type)
 {
-    const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
-    float at[4][8][SIMD_WIDTH];
-    kernel_curved_batch_bounds lanes;
-    for (int n = 0; n < 4; n++)
-        for (int i = 0; i < 8; i++)
-            for (int lane = 0; lane < SIMD_WIDTH; lane++) at[n][i][lane] = i < c->count ? numbers[n][i] : 0;
-    kernel_curved_batch_bound(c->type, (const float(*)[8][SIMD_WIDTH])at, &beam, &lanes);
-    kernel_curved_batch_bounds_lane(&lanes, c->type, &curved->contraction);
-    curved->has_contraction = true;
+    kernel_contraction contraction;
+    kernel_sight ray;
+    kernel_sight_of(c, rays, lane, &ray);
+    kernel_contraction_of(c->bounds, lane, type, &contraction);
+    kernel_contract(&contraction, &ray, wanted, out, type);
+    out->t += kernel_take(c->at[2][0], lane);
 }
 
-/* Decides rays of a packet in a cell, whose vertex 0 is given. */
-static __attribute__((noinline)) void kernel_contract_cell(const kernel_cell_contraction *c, const float vertex[3],
-                                                           int type, const kernel_rays *rays, vm wanted,
-                                                           kernel_contracted *out)
+/* Decides the rays of a packet in a cell. */
+static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
+                                                             vm wanted, kernel_contracted *out)
 {
-    KERNEL_OF_TYPE(type, kernel_contract_cell_of, c, vertex, rays, wanted, out);
+    KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out);
 }
 
 /* Takes the crossings that a contraction knows (kernel_contraction.h); returns the rays that are decided by it. */
 static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel_surface_state *state,
-                                                        const kernel_cell *c, kernel_curved *curved, vm rays)
+                                                        const kernel_cell *c, const kernel_curved *curved, int value,
+                                                        vm wanted)
 {
-    const kernel_rays own = kernel_packet_rays(p);
+    const kernel_rays rays = kernel_packet_rays(p);
+    const vi lane = vi_set(curved->lane);
     kernel_contracted known;
-    kernel_contract_cell(&curved->contraction, curved->map.origin, c->type, &own, rays, &known);
+    kernel_contract_packet(curved, &rays, lane, wanted, &known);
     if (vm_any(known.one)) {
         kernel_map_lanes map;
         kernel_point at = {.t = known.t};
         memcpy(at.r, known.r, sizeof at.r);
-        kernel_map_spread(&curved->map, &map);
-        kernel_polish_near(&own, &map, known.one, KERNEL_CONTRACTION_END, &at);
-        kernel_curved_accept(p, state, c, curved, known.one, &at);
+        kernel_maps_of_type(curved->at, lane, curved->type, &map);
+        kernel_polish_near(&rays, &map, known.one, KERNEL_CONTRACTION_END, &at);
+        kernel_curved_accept(p, state, c, curved, value, &map, known.one, &at);
     }
     return vm_or(known.one, known.none);
 }
@@ -242,15 +239,15 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
         any = vm_or(any, asked[n]);
     }
     if (!vm_any(any)) return;
-    kernel_curved_setup(p->frame, p->tile, curved, layer, c, value);
-    if (!state->is_contracted) {
-        if (!curved->has_contraction) kernel_curved_contraction(p, curved, c); /* from here: less stack */
-        known = kernel_curved_known(p, state, c, curved, any);
+    if (!curved->bounds) {
+        const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
+        kernel_curved_alone(c, &beam, curved);
     }
+    if (!state->is_contracted) known = kernel_curved_known(p, state, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
-        if (vm_any(wanted)) kernel_curved_robust(p, state, c, curved, i, wanted);
+        if (vm_any(wanted)) kernel_curved_robust(p, state, c, curved, value, i, wanted);
     }
 }
 

@@ -109,7 +109,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
 /* A vector of rays, each in its cell. */
 typedef struct kernel_local_pairs {
     kernel_local_rays rays;
-    kernel_local_crossing ends[2];
+    kernel_point ends[2];
     kernel_local_deviations off_chord;
     vm active;
     vf begin;     /* for the window */
@@ -127,10 +127,10 @@ SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
 /* Rays of which one chord would end among values that have not been looked at. */
 SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
-    const vf v0 = p->ends[0].v, v1 = p->ends[1].v, lift = kernel_local_lift(p);
+    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
-    return vm_or(vf_lt(low, kernel_local_take(b->bounds.low, p->rays.lane)),
-                 vf_lt(kernel_local_take(b->bounds.high, p->rays.lane), high));
+    return vm_or(vf_lt(low, kernel_take(b->bounds.low, p->rays.lane)),
+                 vf_lt(kernel_take(b->bounds.high, p->rays.lane), high));
 }
 
 /* What makes one segment for all of a ray's way through its cell wrong. */
@@ -148,15 +148,15 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kerne
     const vi lane = p->rays.lane;
     const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
-    const vf bend = kernel_local_take(b->nonlinear.bend, lane);
-    const vf unseen = p->unseen * kernel_local_take(b->nonlinear.unseen, lane);
+    const vf bend = kernel_take(b->nonlinear.bend, lane);
+    const vf unseen = p->unseen * kernel_take(b->nonlinear.unseen, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
-    const vf depth = vf_min(kernel_local_take(b->bounds.extinction, lane) * length, vf_set(1));
+    const vf depth = vf_min(kernel_take(b->bounds.extinction, lane) * length, vf_set(1));
     out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
-    out->unknown = kernel_local_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
+    out->unknown = kernel_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
     out->length = length;
-    out->fade = kernel_local_take(b->bounds.fade, lane) * depth;
+    out->fade = kernel_take(b->bounds.fade, lane) * depth;
 }
 
 /* What one segment makes wrong a unit distance: by what varies along it, and by its mean. */
@@ -170,7 +170,7 @@ SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, v
 SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic, vf *sway,
                                         vf *cost)
 {
-    const vf *d = p->off_chord.field, v0 = p->ends[0].v, v1 = p->ends[1].v, zero = vf_set(0);
+    const vf *d = p->off_chord.field, v0 = p->ends[0].value, v1 = p->ends[1].value, zero = vf_set(0);
     const vf wide = 0.85f * vf_abs(d[2] - d[0]) + 10.0f * quartic;
     const vf low = vf_min(v0, v1) + (1.17f * vf_min(d[1], zero) - wide);
     const vf high = vf_max(v0, v1) + (1.17f * vf_max(d[1], zero) + wide);
@@ -184,7 +184,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
                                                                 kernel_local_pairs *p)
 {
     const kernel_transfer *transfer = &t->frame->volumes[0];
-    const vf v0 = p->ends[0].v, v1 = p->ends[1].v, one = vf_set(1);
+    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, one = vf_set(1);
     vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1)), sway, cost;
     for (int i = 0; i < 3; i++) {
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->off_chord.field[i];
@@ -209,8 +209,7 @@ SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local
     kernel_local_wrong wrong;
     kernel_local_wrong_of(b, p, &wrong);
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
-    const vf sway = kernel_local_take(b->bounds.sway, p->rays.lane),
-             cost = kernel_local_take(b->bounds.cost, p->rays.lane);
+    const vf sway = kernel_take(b->bounds.sway, p->rays.lane), cost = kernel_take(b->bounds.cost, p->rays.lane);
     const vm strays = kernel_local_strays(b, p);
     const vm enough = vm_andnot(vf_le(kernel_local_wrong_by_one(&wrong, sway, cost), allowed), strays);
     p->count = one;

@@ -121,7 +121,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     kernel_local_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
     const vf place[3] = {rays.origin[0] + rays.slope[0] * depth, rays.origin[1] + rays.slope[1] * depth, depth};
     const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
-    const vf inside = kernel_local_inside(type, points.r), blur = kernel_local_take(b->lanes.cells.blur, rays.lane);
+    const vf inside = kernel_local_inside(type, points.r), blur = kernel_take(b->lanes.cells.blur, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(blur, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -blur)));
     vf_store(values, kernel_local_value(type, &b->lanes.cells, rays.lane, &points));
@@ -192,7 +192,7 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     kernel_local_rays rays;
     vf base, step, near, far;
     kernel_local_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->rays.lane + n));
-    const vf depth = kernel_local_take(b->lanes.cells.origin[2], rays.lane);
+    const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
     kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;

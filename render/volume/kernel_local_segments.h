@@ -160,7 +160,7 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places
 SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
-    const vf ends[4] = {t0, t1, p->ends[0].v + lift, p->ends[1].v + lift};
+    const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
     kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
 
@@ -168,7 +168,8 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const ke
 static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
                                                              const kernel_local_pairs *p, vm rays)
 {
-    const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].v, v1 = p->ends[1].v;
+    const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
+             v1 = p->ends[1].value;
     const vf share = 1.0f / p->count, span = t1 - t0, rise = v1 - v0;
     kernel_local_polynomial f = {.a = 4.0f * d[1], .b = (32.0f / 3) * (d[2] - d[0])};
     f.c = 16.0f * ((8.0f / 3) * (d[0] + d[2]) - f.a);
@@ -212,7 +213,7 @@ typedef struct kernel_local_division {
 SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_local_pairs *whole, vm rays, int number,
                                      int count, int type)
 {
-    const kernel_local_crossing *first = &whole->ends[0], *last = &whole->ends[1];
+    const kernel_point *first = &whole->ends[0], *last = &whole->ends[1];
     const float share = 1.0f / (float)count;
     kernel_local_pairs *part = &d->parts[number];
     *part = *whole;
@@ -223,7 +224,7 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
     if (number + 1 < count) {
         const vf along = vf_set((float)(number + 1) * share);
         part->ends[1].t = first->t + (last->t - first->t) * along;
-        part->ends[1].v = (first->v + (last->v - first->v) * along) + d->at.deviation;
+        part->ends[1].value = (first->value + (last->value - first->value) * along) + d->at.deviation;
     }
 }
 
@@ -355,7 +356,7 @@ SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_l
     kernel_local_rays rays;
     vf near, far, begin, end;
     kernel_local_rays_of(&rays, &t->tile, pixel, lane);
-    const vf depth = kernel_local_take(b->lanes.cells.origin[2], rays.lane);
+    const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
     kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
