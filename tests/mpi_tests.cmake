@@ -18,10 +18,12 @@ function(insitu_rank_command out ranks target)
   set(${out} ${command} PARENT_SCOPE)
 endfunction()
 
-# insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [WHOLE RANKS ...] [ARGS arg ...]): one ctest case a count, named
-# NAME_np<RANKS>. WHOLE: with INSITU_TEST_WHOLE=1 (test_effort.h), NAME_np<RANKS>_whole, among the long ones.
+# insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [WHOLE RANKS ...] [ARGS arg ...] [ENVIRONMENT variable ...]): one ctest
+# case a count, named NAME_np<RANKS>. WHOLE: with INSITU_TEST_WHOLE=1 (test_effort.h), NAME_np<RANKS>_whole, among the
+# long ones.
 function(insitu_add_mpi_test name target)
-  cmake_parse_arguments(PARSE_ARGV 2 arg "" "TIMEOUT" "ARGS;WHOLE")
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "TIMEOUT" "ARGS;WHOLE;ENVIRONMENT")
+  set(environment ${INSITU_TEST_ENVIRONMENT} ${arg_ENVIRONMENT})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -29,7 +31,7 @@ function(insitu_add_mpi_test name target)
     insitu_rank_command(command ${ranks} ${target} ${arg_ARGS})
     insitu_add_long_test(${name}_np${ranks}_whole ${command})
     set_tests_properties(${name}_np${ranks}_whole PROPERTIES
-      ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};INSITU_TEST_WHOLE=1")
+      ENVIRONMENT "${environment};INSITU_TEST_WHOLE=1")
   endforeach()
   set(counts ${arg_UNPARSED_ARGUMENTS})
   if(INSITU_TEST_RANKS)
@@ -52,6 +54,6 @@ function(insitu_add_mpi_test name target)
     insitu_rank_command(command ${ranks} ${target} ${arg_ARGS})
     add_test(NAME ${name}_np${ranks} COMMAND ${command})
     set_tests_properties(${name}_np${ranks} PROPERTIES
-      ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${cores})
+      ENVIRONMENT "${environment}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${cores})
   endforeach()
 endfunction()

@@ -211,25 +211,28 @@ insitu_add_mpi_test(session_host test_session_host 1 2 TIMEOUT 120 ARGS ${CMAKE_
 insitu_session_program(test_session_isa)
 insitu_add_mpi_test(session_isa test_session_isa 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
-# Stacks: of the widest kernels here, of the others in the long run. The address sanitizer has its own, larger frames.
+# Stacks: of the widest kernels here, of the others in the long run. Those of one process are measured, on one rank
+# whatever ranks others run on. The address sanitizer has its own, larger frames.
 insitu_session_program(test_session_stack)
 target_link_libraries(test_session_stack PRIVATE OpenMP::OpenMP_C)
 if(NOT CMAKE_PROJECT_INCLUDE)
-  insitu_add_mpi_test(session_stack test_session_stack 1 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+  # Each has a folder of its own, as they run at once and name their scene files by the program.
+  foreach(name IN ITEMS session_stack session_told_stacks session_small_stacks session_stack_plain session_stack_sse4.2
+      session_stack_avx2)
+    file(MAKE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${name})
+  endforeach()
+  insitu_rank_command(stack_command 1 test_session_stack)
+  add_test(NAME session_stack_np1 COMMAND ${stack_command} ${CMAKE_CURRENT_BINARY_DIR}/session_stack)
+  add_test(NAME session_told_stacks_np1 COMMAND ${stack_command} ${CMAKE_CURRENT_BINARY_DIR}/session_told_stacks)
+  set_tests_properties(session_stack_np1 PROPERTIES TIMEOUT 120 ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+  set_tests_properties(session_told_stacks_np1 PROPERTIES TIMEOUT 120
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};OMP_STACKSIZE=280k;TOLD_STACKS=1")
   foreach(isa plain sse4.2 avx2)
     insitu_add_long_test(session_stack_${isa} ${CMAKE_COMMAND} -E env ${INSITU_TEST_ENVIRONMENT} INSITU_ISA=${isa}
-      ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 1 $<TARGET_FILE:test_session_stack> ${CMAKE_CURRENT_BINARY_DIR})
+      ${stack_command} ${CMAKE_CURRENT_BINARY_DIR}/session_stack_${isa})
   endforeach()
-  insitu_add_mpi_test(session_small_stacks test_session_stack 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
-  foreach(ranks 1 2)
-    set_property(TEST session_small_stacks_np${ranks} APPEND PROPERTY ENVIRONMENT OMP_STACKSIZE=100k SMALL_STACKS=1)
-  endforeach()
-  insitu_add_mpi_test(session_told_stacks test_session_stack 1 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
-  set_property(TEST session_told_stacks_np1 APPEND PROPERTY ENVIRONMENT OMP_STACKSIZE=280k TOLD_STACKS=1)
-  # They write scene files of the same name.
-  set_tests_properties(
-    session_stack_np1 session_small_stacks_np1 session_small_stacks_np2 session_told_stacks_np1 PROPERTIES
-    RESOURCE_LOCK session_stack)
+  insitu_add_mpi_test(session_small_stacks test_session_stack 1 2 TIMEOUT 120
+    ARGS ${CMAKE_CURRENT_BINARY_DIR}/session_small_stacks ENVIRONMENT OMP_STACKSIZE=100k SMALL_STACKS=1)
 endif()
 
 add_executable(test_session_guard test_session_guard.c)

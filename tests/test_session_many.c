@@ -1,4 +1,4 @@
-/* Thousands of meshes on a rank, of one hex each: what a step costs grows as their number does. */
+/* Thousands of meshes over all ranks, of one hex each: what a step costs grows as their number does. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,7 +6,7 @@
 
 #include "test_session_fixture.h"
 
-enum { FEW = 1000, MANY = 8000, STEPS = 4, CORNERS = 8 };
+enum { FEW = 1000, MANY = 8000, STEPS = 4, TRIES = 3, CORNERS = 8 };
 
 static const char *scene_text = "images:\n"
                                 "  - name: many\n"
@@ -88,11 +88,12 @@ static double cpu_seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* CPU seconds of the first step with its set calls, and the least of later ones with new values. */
+/* CPU seconds of the first step with its set calls, and the least of later ones with new values. count: of all ranks.
+ */
 static void measure(int count, double *first, double *later)
 {
     row_of_cubes row;
-    row_create(&row, count);
+    row_create(&row, count / rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     *first = *later = 1e9;
     for (int step = 0; step < STEPS; step++) {
@@ -104,22 +105,32 @@ static void measure(int count, double *first, double *later)
         if (step == 0) *first = seconds;
         if (step > 0 && seconds < *later) *later = seconds;
     }
-    everywhere(insitu_last_report(session)->cells == count);
+    everywhere(insitu_last_report(session)->cells == row.count);
     everywhere(insitu_destroy(&session) == INSITU_OK);
     row_free(&row);
 }
 
-/* Eight times the meshes take eight times as long, or a little more where caches no longer hold them; what grows as the
- * square would take 64 times as long. The bound is halfway between, by ratios. */
-static void a_step_is_linear_in_the_number_of_meshes(void **context)
+/* Tells whether all ranks' times are within the bound. */
+static bool is_linear(void)
 {
-    (void)context;
     const double most = 8 * sqrt(8);
     double few_first, few, many_first, many;
     measure(FEW, &few_first, &few);
     measure(MANY, &many_first, &many);
-    everywhere(many < most * few);
-    everywhere(many_first < most * few_first);
+    int is_within = many < most * few && many_first < most * few_first;
+    MPI_Allreduce(MPI_IN_PLACE, &is_within, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
+    return is_within;
+}
+
+/* Eight times the meshes take eight times as long, or a little more where caches no longer hold them; what grows as the
+ * square would take 64 times as long. The bound is halfway between, by ratios. Ranks of MPICH compute while they wait,
+ * so that their times have those in it that others do not run: then another try tells. */
+static void a_step_is_linear_in_the_number_of_meshes(void **context)
+{
+    (void)context;
+    bool is_well = false;
+    for (int i = 0; i < TRIES && !is_well; i++) is_well = is_linear();
+    everywhere(is_well);
 }
 
 int main(int argc, char **argv)
