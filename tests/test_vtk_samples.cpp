@@ -398,6 +398,86 @@ void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
     cg_close(file);
 }
 
+/* Writes sections of the grid's hexes and of the quads at its bottom. */
+struct section_writer {
+    int file, base, zone;
+    vtkUnstructuredGrid *grid;
+    cgsize_t quads = (size[0] - 1) * (size[1] - 1);
+
+    /* Adds the vertices of a hex, from 1, and its first one until there are count. */
+    void add_hex(vtkIdType cell, int count, std::vector<cgsize_t> &nodes) const
+    {
+        vtkIdType corners = 0;
+        const vtkIdType *points = nullptr;
+        grid->GetCellPoints(cell, corners, points);
+        for (int k = 0; k < count; k++) nodes.push_back(points[k < corners ? k : 0] + 1);
+    }
+    void add_quad(vtkIdType cell, std::vector<cgsize_t> &nodes) const
+    {
+        vtkIdType corners = 0;
+        const vtkIdType *points = nullptr;
+        grid->GetCellPoints(cell, corners, points);
+        for (int k = 3; k >= 0; k--) nodes.push_back(points[k] + 1);
+    }
+
+    /* These return the number behind the last element's. */
+    cgsize_t put_hexes(const char *name, cgsize_t number, cgsize_t begin, cgsize_t end, int nodes_each = 8) const
+    {
+        std::vector<cgsize_t> nodes;
+        for (cgsize_t i = begin; i < end; i++) add_hex(i, nodes_each, nodes);
+        int section = 0;
+        cg_section_write(file, base, zone, name, nodes_each == 8 ? CGNS_ENUMV(HEXA_8) : CGNS_ENUMV(HEXA_27), number,
+                         number + end - begin - 1, 0, nodes.data(), &section);
+        return number + end - begin;
+    }
+    cgsize_t put_wall(cgsize_t number, int times = 1) const
+    {
+        std::vector<cgsize_t> nodes;
+        for (cgsize_t i = 0; i < times * quads; i++) add_quad(i % quads, nodes);
+        int section = 0;
+        cg_section_write(file, base, zone, "Wall", CGNS_ENUMV(QUAD_4), number, number + times * quads - 1, 0,
+                         nodes.data(), &section);
+        return number + times * quads;
+    }
+    void put_mixed() const
+    {
+        std::vector<cgsize_t> nodes, starts = {0};
+        for (cgsize_t i = 0; i < cell_count; i++) {
+            if (i < quads) {
+                nodes.push_back(CGNS_ENUMV(QUAD_4));
+                add_quad(i, nodes);
+                starts.push_back(static_cast<cgsize_t>(nodes.size()));
+            }
+            nodes.push_back(CGNS_ENUMV(HEXA_8));
+            add_hex(i, 8, nodes);
+            starts.push_back(static_cast<cgsize_t>(nodes.size()));
+        }
+        int section = 0;
+        cg_poly_section_write(file, base, zone, "All", CGNS_ENUMV(MIXED), 1, cell_count + quads, 0, nodes.data(),
+                              starts.data(), &section);
+    }
+
+    void put(cgns_order order) const
+    {
+        const cgsize_t hexes = cell_count;
+        switch (order) {
+        case cgns_order::cells_first: put_wall(put_hexes("Fluid", 1, 0, hexes)); break;
+        case cgns_order::wall_first: put_hexes("Fluid", put_wall(1), 0, hexes); break;
+        case cgns_order::wall_stored:
+            put_wall(hexes + 1);
+            put_hexes("Fluid", 1, 0, hexes);
+            break;
+        case cgns_order::gap: put_hexes("Fluid", put_wall(1) + 1, 0, hexes); break;
+        case cgns_order::wall_between:
+            put_hexes("Rest", put_wall(put_hexes("Fluid", 1, 0, quads)), quads, hexes);
+            break;
+        case cgns_order::wall_long: put_hexes("Fluid", put_wall(1, 4), 0, hexes); break;
+        case cgns_order::mixed: put_mixed(); break;
+        case cgns_order::curved: put_hexes("Fluid", put_wall(1), 0, hexes, 27); break;
+        }
+    }
+};
+
 std::string foam_file(const std::string &kind, const std::string &name, const std::string &body)
 {
     return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind + ";\n    object " + name + ";\n}\n" +
@@ -406,27 +486,19 @@ std::string foam_file(const std::string &kind, const std::string &name, const st
 
 } // namespace
 
-void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, bool is_boundary_first)
+void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, cgns_order order, int claimed,
+                         const std::vector<std::string> &zones)
 {
-    int file = 0, base = 0, zone = 0, number = 0;
-    const cgsize_t sizes[3] = {point_count, cell_count, 0}, quads = (size[0] - 1) * (size[1] - 1);
-    std::vector<cgsize_t> boundary, cells;
-    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
-        vtkIdType count = 0;
-        const vtkIdType *points = nullptr;
-        grid->GetCellPoints(i, count, points);
-        for (vtkIdType k = 0; k < count; k++) cells.push_back(points[k] + 1);
-        for (vtkIdType k = 0; i < quads && k < 4; k++) boundary.push_back(points[3 - k] + 1);
-    }
+    int file = 0, base = 0, zone = 0;
+    const cgsize_t sizes[3] = {point_count, claimed, 0};
     cg_open(path.c_str(), CG_MODE_WRITE, &file);
     cg_base_write(file, "Base", 3, 3, &base);
-    cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Unstructured), &zone);
-    write_cgns_places(file, base, zone, grid);
-    const cgsize_t wall = is_boundary_first ? 1 : cell_count + 1, fluid = is_boundary_first ? quads + 1 : 1;
-    cg_section_write(file, base, zone, "Wall", CGNS_ENUMV(QUAD_4), wall, wall + quads - 1, 0, boundary.data(), &number);
-    cg_section_write(file, base, zone, "Fluid", CGNS_ENUMV(HEXA_8), fluid, fluid + cell_count - 1, 0, cells.data(),
-                     &number);
-    write_cgns_fields(file, base, zone, grid);
+    for (const std::string &name : zones) {
+        cg_zone_write(file, base, name.c_str(), sizes, CGNS_ENUMV(Unstructured), &zone);
+        write_cgns_places(file, base, zone, grid);
+        section_writer{file, base, zone, grid}.put(order);
+        write_cgns_fields(file, base, zone, grid);
+    }
     cg_close(file);
 }
 
@@ -470,7 +542,8 @@ std::vector<sample> write_samples(const std::string &folder)
     write_unstructured(folder, curved);
     write_ensight_text(folder, curved);
     write_cgns(folder + "/g.cgns", curved);
-    write_cgns_elements(folder + "/elements.cgns", curved, false);
+    write_cgns_elements(folder + "/elements.cgns", curved, cgns_order::cells_first);
+    write_cgns_elements(folder + "/wall.cgns", curved, cgns_order::wall_first);
     std::vector<sample> all = {{"g.vti", {"g.vti"}, image},
                                {"g.vtr", {"g.vtr"}, axes},
                                {"g.vts", {"g.vts"}, curved},
@@ -485,6 +558,7 @@ std::vector<sample> write_samples(const std::string &folder)
                                {"t.case", files_like(folder, "t."), curved},
                                {"g.cgns", {"g.cgns"}, curved},
                                {"elements.cgns", {"elements.cgns"}, curved},
+                               {"wall.cgns", {"wall.cgns"}, curved},
                                {"p.pvtu", {"p.pvtu", "p0.vtu", "p1.vtu"}, write_polyhedra(folder)}};
     for (const std::string start : {"binary_", "text_"}) {
         all.push_back({start + "image.vtk", {start + "image.vtk"}, image});

@@ -33,8 +33,22 @@ std::vector<sample> write_samples(const std::string &folder);
 
 void write_vtu(const std::string &path, vtkUnstructuredGrid *grid);
 
-/* Writes hexes() as an unstructured zone of CGNS, with a section of the quads at its bottom. */
-void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, bool is_boundary_first);
+/* How the elements of a CGNS zone are numbered. */
+enum class cgns_order {
+    cells_first,  // the hexes, then the quads at the bottom
+    wall_first,   // the quads, then the hexes
+    wall_between, // 20 hexes, the quads, the other hexes
+    wall_long,    // the quads four times, more than there are hexes, then the hexes
+    wall_stored,  // as cells_first, but the quads' section is the file's first
+    mixed,        // one section of both: a quad before each of the first hexes
+    curved,       // as wall_first, with HEXA_27 whose nodes beyond the corners are the first corner
+    gap           // as wall_first, but the hexes' numbers begin one too late
+};
+
+/* Writes hexes() as each of the unstructured zones of a CGNS file. claimed: the number of cells that a zone says it
+ * has. */
+void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, cgns_order order, int claimed = 60,
+                         const std::vector<std::string> &zones = {"Zone"});
 
 /* Writes an OpenFOAM case to folder: a cube that begins at x = first and, beside it, two wedges whose triangles
  * together are the cube's face, so that the cube has seven faces. The field p is the cell's number at time 0, twice

@@ -1,13 +1,31 @@
-/* VTK 9.1 takes the elements with the numbers 1 to N for a zone's N cells. CGNS has no such rule: a section of boundary
- * elements may come first. VTK's cells are then triangles and quads of the boundary, and values of the volume's cells
- * stand on them. */
+/* VTK 9.1 takes the sections that begin with one of the numbers 1 to N for a zone's N cells. CGNS has no such rule: a
+ * section of boundary elements may come first, or in between. VTK's cells are then triangles and quads of the boundary.
+ * And it mistakes where a section's vertices go unless the sections of cells are the zone's first ones in the file,
+ * too.
+ *
+ * For such zones VTK is given another file, of a few kilobytes, whose nodes are links to those of the user's, but for
+ * the numbers of elements and the order of sections. There the elements of the zone's highest dimension, which are its
+ * cells, come first, in the order that they had, in which values stand too. */
 #include "cgns_reader.h"
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <memory>
 #include <stdexcept>
 #include <vector>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <vtkCGNSReader.h>
+#include <vtkObjectFactory.h>
 #include <vtk_cgns.h>
 // clang-format off
 #include VTK_CGNS(cgns_io.h)
@@ -20,10 +38,11 @@ namespace render_tool
 namespace
 {
 
+using element_type = CGNS_ENUMT(ElementType_t);
 using name_buffer = std::array<char, 33>; // CGNS names have at most 32 bytes
 
 /* An element's dimension, by what its type's name begins with, as in HEXA_27; 3 for polyhedra and what is not known. */
-int dimension_of(CGNS_ENUMT(ElementType_t) type)
+int dimension_of(element_type type)
 {
     const std::string name = cg_ElementTypeName(type);
     const auto begins = [&](const char *start) { return name.rfind(start, 0) == 0; };
@@ -32,106 +51,362 @@ int dimension_of(CGNS_ENUMT(ElementType_t) type)
     return begins("TRI_") || begins("QUAD_") ? 2 : 3;
 }
 
-/* An open file. What cannot be read is passed over: VTK's reader reports it. */
-class cgns_file
+struct section {
+    int number; // in the file, from 1
+    std::string name;
+    element_type type;
+    cgsize_t first, last;
+    int dimension; // of a mixed section, its first element's
+
+    cgsize_t size() const { return last - first + 1; }
+};
+
+/* The sections of a zone, by the paths of their nodes, whose elements get other numbers, from these on. */
+using new_numbers = std::map<std::string, cgsize_t>;
+
+/* The sections of an unstructured zone. What cannot be read is passed over: VTK's reader reports it. */
+class cgns_zone
 {
   public:
-    explicit cgns_file(const std::string &path)
+    cgns_zone(int file, int base, int zone) : file_(file), base_(base), zone_(zone)
     {
-        if (cg_open(path.c_str(), CG_MODE_READ, &file_) != CG_OK) file_ = -1;
+        CGNS_ENUMT(ZoneType_t) kind = CGNS_ENUMV(ZoneTypeNull);
+        std::array<cgsize_t, 9> sizes{};
+        name_buffer name{};
+        int count = 0;
+        if (cg_zone_type(file, base, zone, &kind) != CG_OK || kind != CGNS_ENUMV(Unstructured) ||
+            cg_zone_read(file, base, zone, name.data(), sizes.data()) != CG_OK ||
+            cg_nsections(file, base, zone, &count) != CG_OK)
+            return;
+        name_ = name.data();
+        cell_count_ = sizes[1];
+        for (int number = 1; number <= count; number++) read_section(number);
+        for (const section &s : sections_) dimension_ = std::max(dimension_, s.dimension);
+        std::sort(sections_.begin(), sections_.end(), [](auto &a, auto &b) { return a.first < b.first; });
     }
-    ~cgns_file()
-    {
-        if (file_ >= 0) (void)cg_close(file_);
-    }
-    cgns_file(const cgns_file &) = delete;
-    cgns_file &operator=(const cgns_file &) = delete;
 
-    /* "" or which section of a boundary comes before the cells of its zone. */
-    std::string first_boundary() const
+    const std::string &name() const { return name_; }
+
+    /* Whether VTK's cells are others than the elements of the highest dimension. Faces of polyhedra it finds anywhere.
+     */
+    bool is_misread_by_vtk() const
     {
-        int bases = 0;
-        if (file_ < 0 || cg_nbases(file_, &bases) != CG_OK) return "";
-        for (int base = 1; base <= bases; base++) {
-            name_buffer name{};
-            int dimension = 0, space = 0, zones = 0;
-            if (cg_base_read(file_, base, name.data(), &dimension, &space) != CG_OK) continue;
-            if (cg_nzones(file_, base, &zones) != CG_OK) continue;
-            for (int zone = 1; zone <= zones; zone++) {
-                const std::string found = boundary_of(base, zone, dimension);
-                if (!found.empty()) return std::string(name.data()) + "/" + found;
-            }
+        cgsize_t taken = 0;
+        int count = 0, last = 0;
+        for (const section &s : sections_) {
+            if (s.type == CGNS_ENUMV(NGON_n) || s.type == CGNS_ENUMV(NFACE_n)) return false;
+            const bool is_taken = s.first <= cell_count_;
+            if (is_taken != (s.dimension == dimension_)) return true;
+            if (!is_taken) continue;
+            taken += s.size();
+            count++;
+            last = std::max(last, s.number);
         }
-        return "";
+        return taken > cell_count_ || last > count;
+    }
+
+    /* Adds the sections by their new numbers, cells first. Throws if they cannot be numbered so. */
+    void renumber(const std::string &where, const std::string &path, new_numbers &out) const
+    {
+        check(where);
+        cgsize_t next = 1;
+        for (const bool are_cells : {true, false})
+            for (const section &s : sections_) {
+                if ((s.dimension == dimension_) != are_cells) continue;
+                out[path + "/" + s.name] = next;
+                next += s.size();
+            }
     }
 
   private:
-    int file_ = -1;
+    int file_, base_, zone_, dimension_ = 0;
+    std::string name_;
+    cgsize_t cell_count_ = 0;
+    std::vector<section> sections_; // in the order of their elements' numbers
 
-    std::string boundary_of(int base, int zone, int dimension) const
+    void read_section(int number)
     {
         name_buffer name{};
-        std::array<cgsize_t, 9> sizes{};
-        CGNS_ENUMT(ZoneType_t) kind = CGNS_ENUMV(ZoneTypeNull);
-        int sections = 0;
-        if (cg_zone_type(file_, base, zone, &kind) != CG_OK || kind != CGNS_ENUMV(Unstructured) ||
-            cg_zone_read(file_, base, zone, name.data(), sizes.data()) != CG_OK ||
-            cg_nsections(file_, base, zone, &sections) != CG_OK)
-            return "";
-        for (int number = 1; number <= sections; number++) {
-            name_buffer section{};
-            CGNS_ENUMT(ElementType_t) type = CGNS_ENUMV(ElementTypeNull);
-            cgsize_t first = 0, last = 0;
-            int boundary = 0, has_parents = 0;
-            if (cg_section_read(file_, base, zone, number, section.data(), &type, &first, &last, &boundary,
-                                &has_parents) != CG_OK)
-                continue;
-            if (type == CGNS_ENUMV(NGON_n) || first > sizes[1]) continue; /* VTK finds faces of polyhedra */
-            if (type == CGNS_ENUMV(MIXED)) type = first_type(base, zone, number, first);
-            if (dimension_of(type) >= dimension) continue;
-            return std::string(name.data()) + ": its section \"" + section.data() + "\" of " +
-                   cg_ElementTypeName(type) + " has the elements " + std::to_string(first) + " to " +
-                   std::to_string(last);
-        }
-        return "";
+        section s{number, "", CGNS_ENUMV(ElementTypeNull), 0, 0, 0};
+        int boundary = 0, has_parents = 0;
+        if (cg_section_read(file_, base_, zone_, number, name.data(), &s.type, &s.first, &s.last, &boundary,
+                            &has_parents) != CG_OK)
+            return;
+        s.name = name.data();
+        s.dimension = dimension_of(s.type == CGNS_ENUMV(MIXED) ? first_type(s) : s.type);
+        sections_.push_back(s);
     }
 
-    /* The type of a mixed section's first element. */
-    CGNS_ENUMT(ElementType_t) first_type(int base, int zone, int section, cgsize_t first) const
+    element_type first_type(const section &s) const
     {
         cgsize_t size = 0, starts[2] = {0, 0};
-        if (cg_ElementPartialSize(file_, base, zone, section, first, first, &size) != CG_OK || size < 1)
-            return CGNS_ENUMV(MIXED);
+        if (cg_ElementPartialSize(file_, base_, zone_, s.number, s.first, s.first, &size) != CG_OK || size < 1)
+            return s.type;
         std::vector<cgsize_t> nodes(static_cast<size_t>(size));
-        if (cg_poly_elements_partial_read(file_, base, zone, section, first, first, nodes.data(), starts, nullptr) !=
-            CG_OK)
-            return CGNS_ENUMV(MIXED);
-        return static_cast<CGNS_ENUMT(ElementType_t)>(nodes[0]);
+        if (cg_poly_elements_partial_read(file_, base_, zone_, s.number, s.first, s.first, nodes.data(), starts,
+                                          nullptr) != CG_OK)
+            return s.type;
+        return static_cast<element_type>(nodes[0]);
+    }
+
+    /* VTK relies on numbers without gaps, and writes beyond its memory if there are some. */
+    void check(const std::string &where) const
+    {
+        cgsize_t next = 1, cells = 0;
+        for (const section &s : sections_) {
+            if (s.first != next || s.last < s.first)
+                throw std::runtime_error(where + ": its section \"" + s.name + "\" has the elements " +
+                                         std::to_string(s.first) + " to " + std::to_string(s.last) +
+                                         ", expected them to begin with " + std::to_string(next));
+            next = s.last + 1;
+            if (s.dimension == dimension_) cells += s.size();
+        }
+        if (cells == cell_count_) return;
+        throw std::runtime_error(where + ": its sections of dimension " + std::to_string(dimension_) + " have " +
+                                 std::to_string(cells) + " elements, expected its " + std::to_string(cell_count_) +
+                                 " cells (sections that mix cells and boundary are not read)");
     }
 };
 
-/* VTK's reader ends the program where a file cannot be opened, so it is opened here first. */
-void check_cgns(const std::string &path)
+/* The sections of all zones that VTK misreads. Throws if one cannot be numbered for it. */
+new_numbers numbers_for_vtk(const std::string &path)
 {
-    int type = CGIO_FILE_NONE, file = 0;
-    if (cgio_check_file(path.c_str(), &type) != CGIO_ERR_NONE ||
-        cgio_open_file(path.c_str(), CGIO_MODE_READ, type, &file) != CGIO_ERR_NONE)
-        throw std::runtime_error(path + ": cannot be read: is no CGNS file, or is cut short");
-    (void)cgio_close_file(file);
-    const std::string boundary = cgns_file(path).first_boundary();
-    if (boundary.empty()) return;
-    throw std::runtime_error(path + ": cannot be read: zone " + boundary +
-                             ", which VTK's reader takes for its cells: expected the cells numbered from 1, and "
-                             "elements of the boundary behind them");
+    new_numbers all;
+    int file = -1, bases = 0;
+    if (cg_open(path.c_str(), CG_MODE_READ, &file) != CG_OK) return all;
+    std::string wrong;
+    if (cg_nbases(file, &bases) != CG_OK) bases = 0;
+    for (int base = 1; base <= bases; base++) {
+        name_buffer name{};
+        int dimension = 0, space = 0, zones = 0;
+        if (cg_base_read(file, base, name.data(), &dimension, &space) != CG_OK ||
+            cg_nzones(file, base, &zones) != CG_OK)
+            continue;
+        for (int number = 1; number <= zones; number++) {
+            const cgns_zone zone(file, base, number);
+            const std::string place = std::string(name.data()) + "/" + zone.name();
+            if (!zone.is_misread_by_vtk()) continue;
+            try {
+                zone.renumber(path + ": cannot be read: zone " + place, "/" + place, all);
+            } catch (const std::runtime_error &e) {
+                wrong = e.what();
+            }
+        }
+    }
+    (void)cg_close(file);
+    if (!wrong.empty()) throw std::runtime_error(wrong);
+    return all;
 }
+
+/* A file by CGNS's layer of nodes. */
+class node_file
+{
+  public:
+    node_file(const std::string &path, int mode) : path_(path)
+    {
+        int type = CGIO_FILE_NONE;
+        if (mode == CGIO_MODE_READ && cgio_check_file(path.c_str(), &type) != CGIO_ERR_NONE) fail();
+        if (mode != CGIO_MODE_READ) type = CGIO_FILE_HDF5;
+        if (cgio_open_file(path.c_str(), mode, type, &file_) != CGIO_ERR_NONE) fail();
+        check(cgio_get_root_id(file_, &root_));
+    }
+    ~node_file()
+    {
+        if (file_ >= 0) (void)cgio_close_file(file_);
+    }
+    node_file(const node_file &) = delete;
+    node_file &operator=(const node_file &) = delete;
+
+    int file() const { return file_; }
+    double root() const { return root_; }
+    void check(int status) const
+    {
+        if (status != CGIO_ERR_NONE) fail();
+    }
+    std::vector<double> children(double node) const
+    {
+        int count = 0, found = 0;
+        check(cgio_number_children(file_, node, &count));
+        std::vector<double> ids(static_cast<size_t>(count));
+        if (count > 0) check(cgio_children_ids(file_, node, 1, count, &found, ids.data()));
+        return ids;
+    }
+    std::string name(double node) const
+    {
+        name_buffer text{};
+        check(cgio_get_name(file_, node, text.data()));
+        return text.data();
+    }
+
+  private:
+    std::string path_;
+    int file_ = -1;
+    double root_ = 0;
+
+    [[noreturn]] void fail() const
+    {
+        throw std::runtime_error(path_ + ": cannot be read: is no CGNS file, or is cut short");
+    }
+};
+
+/* Writes the file of links. */
+class link_writer
+{
+  public:
+    link_writer(const node_file &from, const node_file &to, std::string target, const new_numbers &numbers)
+        : from_(from), to_(to), target_(std::move(target)), numbers_(numbers)
+    {
+    }
+
+    /* Gives `into` the children of a node: links, but for those on the way to a section with other numbers. Such
+     * sections stand in the order of their numbers, behind all else. */
+    void write_children(double node, const std::string &path, double into) const
+    {
+        std::vector<double> children = from_.children(node);
+        const auto number_of = [&](double child) {
+            const auto found = numbers_.find(path + "/" + from_.name(child));
+            return found == numbers_.end() ? 0 : found->second;
+        };
+        std::stable_sort(children.begin(), children.end(),
+                         [&](double a, double b) { return number_of(a) < number_of(b); });
+        for (const double child : children) {
+            const std::string name = from_.name(child), child_path = path + "/" + name;
+            const auto below = numbers_.lower_bound(child_path + "/");
+            const bool is_on_way = numbers_.count(child_path) > 0 ||
+                                   (below != numbers_.end() && below->first.rfind(child_path + "/", 0) == 0);
+            const auto number = numbers_.find(path);
+            double made = 0;
+            if (is_on_way) {
+                copy(child, name, into, made);
+                write_children(child, child_path, made);
+            } else if (number != numbers_.end() && name == "ElementRange") {
+                copy(child, name, into, made);
+                set_range(child, number->second, made);
+            } else if (name != "CGNSLibraryVersion" || !path.empty()) {
+                to_.check(cgio_create_link(to_.file(), into, name.c_str(), target_.c_str(), child_path.c_str(), &made));
+            } else {
+                copy(child, name, into, made);
+            }
+        }
+    }
+
+  private:
+    const node_file &from_, &to_;
+    std::string target_;
+    const new_numbers &numbers_;
+
+    void copy(double node, const std::string &name, double into, double &made) const
+    {
+        to_.check(cgio_create_node(to_.file(), into, name.c_str(), &made));
+        to_.check(cgio_copy_node(from_.file(), node, to_.file(), made));
+    }
+
+    void set_range(double node, cgsize_t first, double made) const
+    {
+        int64_t range[2] = {0, 0};
+        from_.check(cgio_read_all_data_type(from_.file(), node, "I8", range));
+        range[1] += static_cast<int64_t>(first) - range[0];
+        range[0] = static_cast<int64_t>(first);
+        to_.check(cgio_write_all_data_type(to_.file(), made, "I8", range));
+    }
+};
+
+/* A file that exists only while VTK reads it. HDF5 opens no file that has no name. */
+class link_file
+{
+  public:
+    link_file(const std::string &path, const new_numbers &numbers)
+        : name_((std::filesystem::temp_directory_path() / "insitu-render-XXXXXX").string())
+    {
+        const int made = mkstemp(name_.data());
+        if (made < 0) throw std::runtime_error(name_ + ": cannot be written");
+        (void)close(made);
+        const removal at_end{name_};
+        const node_file from(path, CGIO_MODE_READ);
+        {
+            const node_file to(name_, CGIO_MODE_WRITE);
+            const std::string target = std::filesystem::absolute(path).string();
+            link_writer(from, to, target, numbers).write_children(from.root(), "", to.root());
+        }
+        std::ifstream in(name_, std::ios::binary);
+        content_.assign(std::istreambuf_iterator<char>(in), {});
+    }
+
+    const std::string &name() const { return name_; }
+
+    /* Calls read() while the file is there; false if it cannot be written. */
+    template <typename Read> bool while_there(const Read &read) const
+    {
+        const int file = open(name_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, S_IRUSR | S_IWUSR);
+        if (file < 0) return false;
+        const removal at_end{name_};
+        const bool is_whole = write(file, content_.data(), content_.size()) == static_cast<ssize_t>(content_.size());
+        (void)close(file);
+        return is_whole && read();
+    }
+
+  private:
+    struct removal {
+        const std::string &name;
+        ~removal() { (void)unlink(name.c_str()); }
+    };
+
+    std::string name_, content_;
+};
+
+/* VTK's reader, of the file of links if it has one. */
+class reader : public vtkCGNSReader
+{
+  public:
+    static reader *New();
+    vtkTypeMacro(reader, vtkCGNSReader);
+
+    void set_links(std::unique_ptr<link_file> links)
+    {
+        links_ = std::move(links);
+        SetFileName(links_->name().c_str());
+    }
+
+  protected:
+    int RequestInformation(vtkInformation *request, vtkInformationVector **in, vtkInformationVector *out) override
+    {
+        return while_there([&] { return Superclass::RequestInformation(request, in, out); });
+    }
+    int RequestData(vtkInformation *request, vtkInformationVector **in, vtkInformationVector *out) override
+    {
+        return while_there([&] { return Superclass::RequestData(request, in, out); });
+    }
+
+  private:
+    std::unique_ptr<link_file> links_;
+
+    template <typename Read> int while_there(const Read &read)
+    {
+        int status = 0;
+        if (!links_) return read();
+        const bool was_there = links_->while_there([&] {
+            status = read();
+            return true;
+        });
+        if (!was_there) vtkErrorMacro(<< links_->name() << " cannot be written");
+        return status;
+    }
+};
+
+vtkStandardNewMacro(reader)
 
 } // namespace
 
 vtkSmartPointer<vtkAlgorithm> make_cgns(const std::string &path)
 {
-    check_cgns(path);
-    auto r = vtkSmartPointer<vtkCGNSReader>::New();
-    r->SetFileName(path.c_str());
+    (void)node_file(path, CGIO_MODE_READ); /* VTK's reader ends the program where a file cannot be opened */
+    const new_numbers numbers = numbers_for_vtk(path);
+    auto r = vtkSmartPointer<reader>::New();
+    if (numbers.empty()) {
+        r->SetFileName(path.c_str());
+    } else {
+        r->set_links(std::make_unique<link_file>(path, numbers));
+    }
     r->UpdateInformation();
     r->EnableAllBases();
     r->EnableAllPointArrays();

@@ -1,4 +1,4 @@
-/* Reads CGNS files by VTK's reader, and refuses those of which that makes wrong cells. */
+/* Reads CGNS files by VTK's reader, with elements numbered as that expects them. */
 #ifndef CGNS_READER_H
 #define CGNS_READER_H
 
@@ -11,8 +11,8 @@ class vtkAlgorithm;
 namespace render_tool
 {
 
-/* A reader with all bases and arrays switched on. Throws std::runtime_error where path is no CGNS file, or is cut
- * short, and with the zone and the section where elements of a boundary come before the cells. */
+/* A reader with all bases and arrays switched on. Throws std::runtime_error if path is no CGNS file or is cut short,
+ * and with the zone and the section if the numbers of a misread zone's elements have gaps. */
 vtkSmartPointer<vtkAlgorithm> make_cgns(const std::string &path);
 
 } // namespace render_tool
