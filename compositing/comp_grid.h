@@ -12,7 +12,7 @@ enum {
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
     COMP_FEW_BLOCKS = 2048, /* so that claims to all of them are a small message, whatever the picture; unless */
     COMP_RANK_BLOCKS = 60,  /* a rank has fewer than these, on average, */
-    COMP_EVEN_RANKS = 1024  /* of so many ranks at most: more get no more blocks */
+    COMP_EVEN_RANKS = 1024  /* more ranks than this do not get more blocks */
 };
 
 typedef struct comp_grid {

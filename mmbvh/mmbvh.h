@@ -17,7 +17,7 @@
 
 enum {
     MMBVH_MAX_LEAF = 7,
-    MMBVH_MAX_DEPTH = 80 /* of a leaf, where the root has depth 1; a traversal's stack needs no more entries */
+    MMBVH_MAX_DEPTH = 80 /* greatest depth of a leaf; the root has depth 1. A traversal's stack needs no more entries */
 };
 
 typedef struct mmbvh_node {
@@ -43,7 +43,7 @@ typedef enum mmbvh_builder {
 typedef struct mmbvh {
     mmbvh_node *nodes;           /* the reference layout; else NULL */
     mmbvh_compact_node *compact; /* the compact layout; else NULL */
-    mmbvh_grid grid;             /* of the compact layout */
+    mmbvh_grid grid;             /* quantization grid of the compact layout */
     int64_t node_count;          /* 0 for no cells at all */
     uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
     int64_t cell_count;
@@ -94,7 +94,7 @@ int64_t mmbvh_bytes(const mmbvh *tree);
 
 /* Ranges of one field: the nodes' own (stride 24 or 40) or an array of pairs beside the tree (stride 8). */
 typedef struct mmbvh_ranges {
-    const char *low; /* of node 0 */
+    const char *low; /* node 0's lower bound */
     const char *high;
     int64_t stride; /* bytes from node to node */
 } mmbvh_ranges;
@@ -152,7 +152,7 @@ insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options
 
 /* The part of a tree that can be seen: nodes whose range meets one of the intervals. */
 typedef struct mmbvh_visible {
-    mmbvh_ranges ranges; /* of the current values */
+    mmbvh_ranges ranges; /* ranges of the current values */
     int interval_count;
     const mmbvh_interval *intervals;
 } mmbvh_visible;
@@ -191,7 +191,7 @@ double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options);
 
 typedef struct mmbvh_statistics {
     int64_t leaves;
-    int depth;              /* of the deepest leaf, root 1 */
+    int depth;              /* depth of the deepest leaf; the root has depth 1 */
     double cells_a_leaf;    /* mean */
     double sibling_overlap; /* mean over inner nodes: surface area of the children's intersection over their union's */
     double cost;            /* mmbvh_cost() */

@@ -22,7 +22,7 @@ typedef lanes item;
 typedef struct item_grid {
     double origin[3];
     double step;       /* 0: no axis has a finite extent */
-    double inverse[3]; /* of the step; 0 on an axis without a finite extent */
+    double inverse[3]; /* 1 / step; 0 on an axis without a finite extent */
     bool is_finest;    /* a finer grid would not tell more cells apart */
 } item_grid;
 

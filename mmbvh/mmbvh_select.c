@@ -23,7 +23,7 @@ struct selector {
     selector_run run;
     const grid *g;
     const mmbvh_wish *wish;
-    grid_array values; /* of the field's component */
+    grid_array values; /* values of the field's component */
     uint64_t *bits;
 };
 

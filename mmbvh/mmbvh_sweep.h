@@ -25,9 +25,9 @@ struct sweep {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    grid_array values;           /* of the field's component */
-    const float *box_ranges;     /* of a parent tree */
-    const bounds_source *source; /* of a sweep of bounds */
+    grid_array values;           /* values of the field's component */
+    const float *box_ranges;     /* ranges of the boxes, for a parent tree */
+    const bounds_source *source; /* source of the bounds, for a sweep of bounds */
     mmbvh_ranges ranges;         /* written by a sweep of ranges */
     int64_t run_max;             /* nodes in a run; 0: as many as are worth a task */
     bool is_measured;            /* for a sweep of bounds: the nodes have bounds already, and grown is wanted */

@@ -74,9 +74,9 @@ static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint
 /* The head of a packed sheet. */
 typedef struct comp_sheet_head {
     uint32_t strip;
-    uint16_t bytes, count; /* of the whole sheet; pixels */
+    uint16_t bytes, count; /* size of the whole sheet; number of its pixels */
     uint32_t rows, full;   /* rows that have pixels; that have all */
-    uint32_t kinds;        /* of words, two bits each */
+    uint32_t kinds;        /* kinds of words, two bits each */
 } comp_sheet_head;
 
 /* The most bytes that a sheet of so many pixels and words takes, with slack that may be written behind them. */

@@ -11,9 +11,9 @@
 typedef struct sheet_plan {
     int rows, count;
     bool is_sparse;                            /* such sheets are closed first; fresh lanes are those of others */
-    uint8_t row[COMP_ROWS], number[COMP_ROWS]; /* of its pixels */
+    uint8_t row[COMP_ROWS], number[COMP_ROWS]; /* rows that have pixels, and the number of pixels in each */
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
-    uint8_t source[COMP_ROWS][COMP_LANES]; /* of fresh lanes */
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* the lane from which each fresh lane takes its last value */
 } sheet_plan;
 
 typedef struct comp_sheet_loops {

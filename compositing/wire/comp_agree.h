@@ -12,7 +12,7 @@
  * rank that lacks memory for a picture has to take part in the agreement on its status. */
 typedef struct comp_claims {
     MPI_Op add;
-    comp_claim items[]; /* of blocks, and two more */
+    comp_claim items[]; /* one per block, and two more */
 } comp_claims;
 
 /* Makes what so many ranks need for any picture; NULL: no memory. Local. May be freed after MPI_Finalize(). */

@@ -19,7 +19,7 @@ typedef struct file_failure {
 typedef struct file_content {
     char *text; /* size bytes and a NUL, from base_alloc() */
     size_t size;
-    struct stat stamp; /* of the file when it was opened */
+    struct stat stamp; /* state of the file when it was opened */
 } file_content;
 
 /* Read a file that the user names, of at most limit bytes. Symbolic links are followed. False: *out->text is NULL;

@@ -14,7 +14,7 @@
 typedef struct fragment {
     uint32_t pixel; /* y * width + x, y = 0 at the top */
     float t_in;     /* the ray's parameter, (depth - depth_origin) * scale (render.h), of the first sample or the hit */
-    float t_out;    /* of the last sample, or a little before the last cell's end (kernel_segments.h); for a hit t_in */
+    float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit t_in */
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* 0 opaque .. 1 clear */
     uint32_t kind;       /* as below */

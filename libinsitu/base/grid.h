@@ -20,7 +20,7 @@ enum {
     GRID_WEDGE = 13,
     GRID_PYRAMID = 14,
     GRID_POLYHEDRON = 42,
-    GRID_MAX_CELL_VERTICES = 8 /* of a type that fixes the number: all types but polyhedra and polygons */
+    GRID_MAX_CELL_VERTICES = 8 /* most vertices of a cell, except polyhedra and polygons, which have any number */
 };
 
 /* The three indices of a lattice's vertices or cells, by their numbers: the index along an axis of number n is
@@ -45,7 +45,7 @@ static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64
 /* Coordinates along one axis of a uniform or rectilinear lattice. */
 typedef struct grid_axis {
     const double *places; /* by index */
-    int64_t count;        /* of places */
+    int64_t count;        /* number of places */
     const grid_numbering *vertices;
     int axis;
 } grid_axis;
@@ -225,8 +225,8 @@ static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *firs
 typedef struct grid_walk {
     const grid *cells;
     bool is_polyhedron;
-    const int64_t *corner;       /* of a lattice: from its first vertex to each; else NULL */
-    int64_t base;                /* that first vertex */
+    const int64_t *corner;       /* for a lattice: offsets from the cell's first vertex to each; else NULL */
+    int64_t base;                /* the cell's first vertex, for a lattice */
     int64_t next, end;           /* entries of connectivity, or of corner */
     int64_t face_next, face_end; /* entries of face_connectivity */
 } grid_walk;

@@ -12,8 +12,8 @@
 
 enum {
     BINS_MAX = 16,
-    BINS_SAMPLED = 2048, /* of so many items or more */
-    BINS_STRIDE = 7      /* one in so many is taken into the bins; it tells as well where to split */
+    BINS_SAMPLED = 2048, /* this many items or more are sampled */
+    BINS_STRIDE = 7      /* one item in this many is binned; the split found is as good */
 };
 
 /* Maps twice the centroid, less TOP, to a bin on each axis. Lanes 4 to 6 repeat 0 to 2, for two items at a time. */

@@ -33,7 +33,7 @@ typedef struct build {
     morton_coder *coder;
     item_grid grid;
     item_set set;
-    fetch_box exact; /* of all cells, in the source's coordinates */
+    fetch_box exact; /* bounds of all cells, in the source's coordinates */
     mmbvh tree;
 } build;
 

@@ -43,7 +43,7 @@ static inline int64_t topology_new_pair(topology_scratch *s)
 }
 
 typedef struct topology {
-    int64_t first, count;         /* of the cells */
+    int64_t first, count;         /* range of the node's cells */
     struct topology *children[2]; /* NULL: a subtree */
     topology_link root;
     topology_link *links; /* all below the root */

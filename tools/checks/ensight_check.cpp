@@ -92,7 +92,7 @@ class geometry_walk
   public:
     geometry_walk(const std::string &path, encoding how) : in_(path, how), how_(how) {}
 
-    /* Of each step in the file; one where it has no steps. */
+    /* Returns the geometry of each step in the file; one if it has no steps. */
     std::vector<geometry> steps()
     {
         std::vector<geometry> all;

@@ -67,7 +67,7 @@ typedef struct insitu_stroke {
 /* Words beside a point of the picture, left out where they would lie over others. */
 typedef struct insitu_label {
     double at[2];   /* pixels, as of a stroke */
-    double away[2]; /* of length 1: the direction from the point to the words */
+    double away[2]; /* unit vector from the point to the words */
     double gap;     /* between point and words, in heights of words */
     char text[32];
 } insitu_label;
@@ -82,7 +82,7 @@ typedef struct insitu_scale_bar {
 /* Decorations to draw over a picture, and the background that is put behind it first. All of it is borrowed. */
 typedef struct insitu_decorations {
     float background[4]; /* linear, premultiplied */
-    float colour[3];     /* of words and lines; linear */
+    float colour[3];     /* colour of words and lines, linear */
     double size;         /* height of words, as a share of the picture's height */
     int words_count;
     const insitu_words *words;
@@ -100,7 +100,7 @@ typedef struct insitu_decorations {
 /* One more number for each pixel of an image, for EXR. */
 typedef struct insitu_channel {
     const char *name;
-    const float *values; /* of the first pixel */
+    const float *values; /* points to the first pixel's value */
     int stride;          /* floats from pixel to pixel, row-major, top row first */
 } insitu_channel;
 

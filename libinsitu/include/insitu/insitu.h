@@ -49,7 +49,7 @@ typedef enum insitu_type {
 /* A borrowed array: the caller's memory, read only, never written or kept beyond what insitu_set_mesh() says. */
 typedef struct insitu_array {
     const void *data;     /* first element; NULL: the array is not given. Aligned to its element type. */
-    insitu_type type;     /* of one element */
+    insitu_type type;     /* type of one element */
     int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. Any multiple of the size;
                              a negative one reads backwards from data. A stride by which the elements would span more
                              than 2^48 bytes is an error. */
@@ -337,9 +337,9 @@ typedef struct insitu_report {
     int64_t bytes_sent;       /* sent by this rank to others for pictures: fragments and finished pixels, passed-on ones
                                  included; rays of shadows do not count */
     int64_t map_failures;     /* inverse maps that did not converge, where linear interpolation was used instead */
-    int64_t bytes_borrowed;   /* of the caller's arrays in use */
-    int64_t bytes_copied;     /* of the caller's data held in copies, with reasons in copied_why */
-    int64_t bytes_trees;      /* of all trees held */
+    int64_t bytes_borrowed;   /* size of the caller's arrays in use */
+    int64_t bytes_copied;     /* size of copies of the caller's data; copied_why has the reasons */
+    int64_t bytes_trees;      /* size of all trees held */
     int64_t bytes_pictures;   /* on rank 0: of pictures that wait to be written (at most 128 MiB, or one picture), and
                                  of memory kept for later ones (at most 64 MiB) */
     int64_t bytes_peak;       /* most bytes the library held at once in this step */

@@ -20,17 +20,17 @@ enum { SESSION_NEWS_LINES = 64 };
 /* Rank 0's. */
 typedef struct session_news {
     bool is_new;                     /* since the last text was made */
-    int64_t count;                   /* of warnings so far; the last SESSION_NEWS_LINES are kept */
+    int64_t count;                   /* number of warnings so far; the last SESSION_NEWS_LINES are kept */
     char *lines[SESSION_NEWS_LINES]; /* warning i is at i % SESSION_NEWS_LINES; NULL: there was no memory for it */
     int64_t cycles[SESSION_NEWS_LINES];
-    base_error error; /* of the last step that had some error, or drew without */
+    base_error error; /* the error of the last step that failed or drew; empty if it drew */
 } session_news;
 
 /* The scene file, as the news tell of it. */
 typedef struct session_news_scene {
     const scene *scene;
     const char *path;         /* as the caller gave it */
-    const struct stat *stamp; /* of the file when it was last read, taken or not; NULL: there is none */
+    const struct stat *stamp; /* the file's state when it was last read, accepted or not; NULL: there is no file */
     const char *refusal;      /* why the last edit was not taken; NULL: it was */
 } session_news_scene;
 

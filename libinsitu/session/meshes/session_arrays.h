@@ -18,7 +18,7 @@ enum {
 /* What an array must be. */
 typedef struct session_array_rule {
     const char *name; /* in the plural */
-    int64_t count;    /* of its elements */
+    int64_t count;    /* number of its elements */
     int kind;         /* the bits above */
     int per_tuple;    /* elements from one to the next if there is no stride */
 } session_array_rule;

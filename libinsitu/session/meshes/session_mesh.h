@@ -11,8 +11,8 @@ typedef struct session_field {
     insitu_field given; /* name is a copy of ours, the values are borrowed */
     grid_array values;
     int64_t component_stride;
-    base_error problem;          /* of the last insitu_set_field(), */
-    bool is_problem_of_contents; /* or of its values, which this step has found */
+    base_error problem;          /* what was wrong with the last insitu_set_field(), */
+    bool is_problem_of_contents; /* or with its values, found by this step's check */
     bool has_index;
     bool is_copy_stale; /* it was made of other values or by another index */
     bool is_wanted;     /* by statistics of this step; fields of images have scalars */
@@ -20,8 +20,8 @@ typedef struct session_field {
     base_error fill_problem;
     bool is_derived;       /* the session makes it of other fields, in copy (plan/session_derived.h) */
     bool is_source;        /* a derived field that this step needs is made of it */
-    uint64_t made_of;      /* of derived ones: a hash of what the values were made of; 0: there are none yet */
-    int64_t version;       /* of the values: one more after each change that is known of */
+    uint64_t made_of;      /* hash of the inputs of a derived field's values; 0: no values yet */
+    int64_t version;       /* incremented at each known change of the values */
     insitu_patch *patches; /* given.patches, a table of ours */
     char *copy;            /* NULL until made; packed tuples, components interleaved */
     int64_t copy_bytes;
@@ -55,11 +55,11 @@ typedef struct session_scalar {
     int field;     /* in the mesh's fields; -1: distances */
     int component; /* as grid_field.component */
     bool is_recentred;
-    uint64_t joined;    /* of recentred ones: scene_field.joined */
+    uint64_t joined;    /* scene_field.joined of recentred values */
     int64_t made;       /* how often their values were made */
     uint64_t of_places; /* the session_joint.places that they were made of */
-    bool is_used;       /* by an image of this step */
-    bool wants_ranges;  /* by an image of this step: colours need none */
+    bool is_used;       /* an image of this step uses it */
+    bool wants_ranges;  /* an image of this step needs its trees' ranges; colours need none */
     bool needs_all;     /* an image of this step may need any cell */
     int interval_count; /* else the values that this step's images show: cells with some are candidates */
     mmbvh_interval *intervals;
@@ -105,7 +105,7 @@ typedef struct session_threshold {
 typedef struct session_outer {
     session_threshold threshold;
     int64_t version; /* the version of the values that the threshold has tested, if there is one */
-    bool is_wanted;  /* by an image of this step */
+    bool is_wanted;  /* an image of this step needs it */
     bool are_faces_known;
     int64_t face_count;
     session_face *faces;       /* in the order of the cells */
@@ -152,7 +152,7 @@ typedef struct session_lattice {
     insitu_lattice given; /* what given.lattice of the mesh points to, unless that is NULL */
     grid_lattice cells;
     double *places[3]; /* coordinates along the axes, of uniform and rectilinear ones: a declared copy */
-    int64_t bytes;     /* of places */
+    int64_t bytes;     /* size of places in bytes */
 } session_lattice;
 
 /* One rank's part of a mesh. */
@@ -164,8 +164,8 @@ typedef struct session_mesh {
     session_lattice lattice;
     grid cells;
     bool is_given;               /* false after an insitu_set_mesh() that failed: problem says why */
-    base_error problem;          /* of the last insitu_set_mesh(), */
-    bool is_problem_of_contents; /* or of what the arrays hold, which the step's check has found */
+    base_error problem;          /* what was wrong with the last insitu_set_mesh(), */
+    bool is_problem_of_contents; /* or with the arrays' contents, found by the step's check */
     int field_count;
     session_field *fields;
 
@@ -179,7 +179,7 @@ typedef struct session_mesh {
     uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
 
     uint64_t apart; /* session_catalogue_mesh.apart */
-    bool is_needed; /* by an image of this step */
+    bool is_needed; /* an image of this step draws it */
     bool has_tree;
     mmbvh tree;
     bool is_partial;         /* the tree is over the candidates of candidates_key, while nothing changes */

@@ -11,8 +11,8 @@ typedef struct session_extent {
     double lower[3], upper[3]; /* both 0 where there are no cells */
     double half_diagonal;
     int64_t cell_count;  /* drawn ones */
-    int64_t solid_count; /* of them, those with a volume */
-    double cell_size;    /* their mean: of the cube roots of their volumes; 0 where they have none */
+    int64_t solid_count; /* cells that have a volume */
+    double cell_size;    /* mean cube root of the volumes of solid cells; 0 if there are none */
     int rank_count;      /* ranks that have some */
 } session_extent;
 

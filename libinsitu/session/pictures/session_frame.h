@@ -12,7 +12,7 @@ typedef struct session_frame {
     int64_t overlaps; /* pixels in which cells overlap */
     int turns;        /* in which these pixels are drawn */
     int64_t sent_bytes;
-    comp_schedule schedule; /* COMP_AUTOMATIC: nothing went to other ranks */
+    comp_schedule schedule;             /* COMP_AUTOMATIC: nothing went to other ranks */
     struct render_occluders *occluders; /* made by the first drawing that needs them; NULL once the frame is drawn */
 } session_frame;
 
@@ -21,8 +21,8 @@ typedef struct session_frame_target {
     MPI_Comm comm;
     comp_group compositing;
     const float *background; /* 4; borrowed */
-    int64_t fragment_limit;  /* of a rank: more pixels in which cells overlap than make so many fragments on the busiest
-                                are drawn in turns; the same on every rank */
+    int64_t fragment_limit;  /* most fragments the busiest rank may make at once for pixels in which cells overlap;
+                                beyond it these pixels are drawn in turns. The same on every rank */
 } session_frame_target;
 
 /* Draw one frame of the job, which differs between ranks in its parts alone, into out (comp.h). Collective; returns the

@@ -33,7 +33,7 @@ typedef struct derive_work {
     int number;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale; /* of each recentring or mesh */
+    int *stale; /* nonzero for each recentring or mesh that is out of date */
 } derive_work;
 
 /* ---- where it is, and what it is made of ---------------------------------------------------------------------- */
@@ -248,7 +248,7 @@ static void load_block(const grid_field *field, int64_t first, int count, double
 /* What a thread needs for a block. */
 typedef struct block_room {
     const double **inputs;
-    double *values; /* of the inputs, then the stack */
+    double *values; /* values of the inputs, followed by the stack */
 } block_room;
 
 static bool rooms_create(const scene_derived *derived, int threads, block_room **out)

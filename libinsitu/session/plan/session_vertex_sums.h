@@ -12,7 +12,7 @@ typedef struct session_sum_part {
     session_mesh *mesh; /* NULL: nothing of it is here */
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
-    int32_t *entries; /* of each vertex, its key, or -1 */
+    int32_t *entries; /* key of each vertex, or -1 */
 } session_sum_part;
 
 /* This rank's work on the sums of the same scalars of one mesh or several. */
@@ -23,7 +23,7 @@ typedef struct session_vertex_sums {
     bool by_id;   /* vertices are the same by global ids, else by coordinates */
     bool are_all; /* every vertex of each part has a key: all ranks have all their cells' sums */
     session_key_table keys;
-    int64_t own_count; /* of keys: those behind are others' questions */
+    int64_t own_count; /* number of this rank's keys; the keys after them were asked for by other ranks */
     session_gradient_bounds bounds;
     double length;
     int64_t *sums; /* session_sum_words() a key */

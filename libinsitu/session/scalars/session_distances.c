@@ -17,7 +17,7 @@ static void move_along(const double from[3], const double normal[3], double offs
 
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3])
 {
-    double middle[3], half = 0; /* of the extent of the bounds along the normal */
+    double middle[3], half = 0; /* half the extent of the bounds along the normal */
     for (int axis = 0; axis < 3; axis++) {
         middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
         half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);

@@ -27,8 +27,8 @@
 #include "vector3.h"
 
 enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
-#define LOW_UNIT 0x1p44      /* of low words, in a high one's last bit */
-#define LEAST_SQUARE 0x1p-64 /* of a corner's edges, in lengths */
+#define LOW_UNIT 0x1p44      /* units of a low word in the last bit of a high word */
+#define LEAST_SQUARE 0x1p-64 /* least sum of the squares of a corner's edges, in units of length */
 #define ROUNDING_SHIFT                                                                                                 \
     0x1.8p52 /* added to a number below 2^51, it leaves the nearest whole number in the last bits                      \
               */
@@ -46,9 +46,9 @@ typedef int64_t word_pair __attribute__((vector_size(16)));
 typedef struct target {
     const session_gradient_basis *basis;
     int64_t *sums;
-    unsigned char *owners; /* of each sum, the thread that adds to it; NULL: there is one thread */
+    unsigned char *owners; /* the thread that adds to each sum; NULL: there is one thread */
     unsigned char owner;   /* this thread's */
-    double scale;          /* of coordinates: a power of two */
+    double scale;          /* factor for coordinates, a power of two */
     number_pair units[MOST_NUMBERS / 2];
     session_gradient_bounds bounds;
 } target;

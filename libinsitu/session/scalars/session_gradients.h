@@ -13,7 +13,7 @@ typedef struct session_gradient_basis {
     const grid_field *fields; /* field_count scalars */
     int field_count;          /* 1 .. SESSION_GRADIENTS */
     bool of_shells;           /* sums are of shells, in whose planes their gradients lie; else of cells with volume */
-    const int32_t *entries;   /* of each vertex: which of the sums, or -1 */
+    const int32_t *entries;   /* for each vertex the index of its sum, or -1 */
     double length;            /* a power of two near the size of the scene; the same on all ranks */
     int threads;
 } session_gradient_basis;

@@ -23,7 +23,7 @@ typedef struct scene_field {
     int component;      /* 0 .., or one of the above */
     bool at_vertices;   /* cell values are recentred to the vertices; else they are drawn as they are */
     bool joins_corners; /* values at cells' corners give way to their means at the vertices */
-    int line;           /* of the scene file, for messages about the field */
+    int line;           /* line in the scene file, for messages about the field */
     int mesh_count;     /* 0: on the meshes that have the field */
     char **meshes;      /* a name stands for the meshes below it too: "a" for "a/0" */
     int meshes_line;    /* for messages about them */
@@ -53,13 +53,13 @@ typedef struct scene_derived {
     char *name;
     int line;
     scene_derivation kind;
-    const char *key;             /* of the file, for messages; "" of an expression without */
-    int component;               /* of a gradient or vorticity: SCENE_COMPONENT_DEFAULT: all three */
+    const char *key;             /* key in the scene file, for messages; "" for an expression without one */
+    int component;               /* component of a gradient or vorticity; SCENE_COMPONENT_DEFAULT: all three */
     scene_expression expression; /* its inputs are those below */
     int input_count;
-    scene_field *inputs; /* of the expression's; else a vector field, its two or three components, or of a gradient a
-                            scalar */
-    int *made_by;        /* of each input: which of the scene's derived fields it is, or -1 */
+    scene_field *inputs; /* an expression's inputs; otherwise a vector field, its two or three components, or for a
+                            gradient a scalar */
+    int *made_by;        /* for each input, the index of the derived field it comes from, or -1 */
     uint64_t joined;     /* as scene_field.joined, of meshes that gradients are over; the session's */
 } scene_derived;
 
@@ -86,14 +86,14 @@ typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
  * 1, or those of outside. A place's colour is taken from the table, linear between entries; in bands it is that of
  * entry floor(place × count). */
 typedef struct scene_colour_map {
-    char *name;     /* of a built-in map or of one in a file; "" of a list */
-    int count;      /* >= 2; of bands >= 1 */
+    char *name;     /* name of a built-in map or path of a map file; "" for a list of colours */
+    int count;      /* at least 2 colours, or 1 for bands */
     float *colours; /* count × 3, linear light, evenly spaced over the places from 0 to 1; reversed where asked for */
     bool is_banded; /* the colours are those of bands of equal width */
     scene_scale scale;
-    double threshold; /* of SCENE_SYMLOG, > 0 */
+    double threshold; /* the linear part of SCENE_SYMLOG reaches from -threshold to threshold; > 0 */
     bool has_below, has_above;
-    float outside[3][3]; /* below, above (the map's ends where not given), and of what is not a number */
+    float outside[3][3]; /* colours below and above the range (by default the map's ends), and of NaN */
     bool has_nan;
     scene_range range;
 } scene_colour_map;
@@ -175,10 +175,10 @@ typedef struct scene_surface {
 } scene_surface;
 
 typedef struct scene_plane {
-    double normal[3]; /* of length 1 */
+    double normal[3]; /* unit length */
     bool has_point;   /* else it goes by the middle of the data's bounds */
     double point[3];
-    double offset; /* along the normal, from the point to the plane */
+    double offset; /* distance along the normal from the point to the plane */
     double share; /* without a point: moved by this share of half the data's extent along the normal besides; -1 .. 1 */
 } scene_plane;
 
@@ -189,7 +189,7 @@ typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;
 
 enum { SCENE_MAX_CLIPS = 32 };
 
-/* Of an image: isovalues, planes and outer surfaces together, and volumes. */
+/* Most surfaces of an image (isovalues, planes and outer surfaces together), and most volumes. */
 enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 
 /* Everything outside the half space, box or sphere is cut away; with is_outside, everything inside. */
@@ -224,7 +224,7 @@ enum { SCENE_MAX_ELEVATIONS = 32 };
 /* The default of step_cells. */
 #define SCENE_STEP_CELLS 0.5
 typedef struct scene_orbit {
-    int view_count;                          /* of a circle; 0: there is no orbit */
+    int view_count;                          /* views on each circle; 0: there is no orbit */
     double axis[3];                          /* unit length */
     double start;                            /* degrees: phi of the first view of a circle */
     int circle_count;                        /* 1 .. SCENE_MAX_ELEVATIONS */
@@ -252,9 +252,9 @@ typedef struct scene_camera {
     bool is_orthographic;
     double height; /* orthographic: of what the picture shows, scene units; 0: as far as a perspective one shows */
     scene_orbit orbit;
-    double phi, theta;          /* of an orbit's view: degrees around the axis, and above the plane across it */
-    bool is_by_cycle;           /* points are at cycles, else at times */
-    int point_count;            /* 0: the camera does not move */
+    double phi, theta; /* angles of an orbit's view in degrees: around the axis, and above the plane across it */
+    bool is_by_cycle;  /* points are at cycles, else at times */
+    int point_count;   /* 0: the camera does not move */
     scene_camera_point *points; /* rising */
 } scene_camera;
 
@@ -300,9 +300,9 @@ typedef struct scene_decorations {
     scene_anchor bars_at;
     int tick_count; /* about so many a bar */
     int label_count;
-    char **labels; /* of the bars in turn; beyond them the fields' names */
+    char **labels; /* one label a bar, in order; further bars are called by their fields */
     int unit_count;
-    char **units; /* likewise; one alone is that of all bars */
+    char **units; /* one unit a bar, in order; a single one holds for all bars */
     scene_number_form numbers;
     scene_boxes outline;
     bool has_rulers, has_axes;
@@ -311,7 +311,7 @@ typedef struct scene_decorations {
     scene_anchor scale_at;
     bool has_colour;
     float colour[3]; /* linear; where has_colour is not set, light on a dark background and dark on a light one */
-    double size;     /* of words, a share of the picture's height */
+    double size;     /* height of words, as a share of the picture's height */
 } scene_decorations;
 
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
@@ -319,8 +319,8 @@ typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 typedef struct scene_output {
     char *path;           /* with placeholders (scene_expand()); relative to the working directory of rank 0 */
     scene_format format;  /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
-    bool has_decorations; /* of the image, if that has any */
-    bool has_data;        /* of EXR: the nearest surface's normal, value and numbers too */
+    bool has_decorations; /* the image's decorations are drawn, if it has any */
+    bool has_data;        /* an EXR also holds the nearest surface's normal, value and numbers */
     bool is_deep;         /* an EXR of all that lies behind each other in a pixel */
     int database;         /* index of the scene's, in which the picture is a line; -1: none */
     int folder_bytes;     /* bytes of path that are the database's folder and its slash; 0 without a database */
@@ -348,8 +348,8 @@ typedef struct scene_statistics {
     scene_field field;
     char *path;       /* relative to the working directory of rank 0 */
     int every;        /* written at cycles that are multiples of it */
-    int bin_count;    /* of the histogram; 0: none */
-    double low, high; /* of the bins; low > high: of the values */
+    int bin_count;    /* bins of the histogram; 0: there is no histogram */
+    double low, high; /* range of the bins; low > high: the range of the values */
 } scene_statistics;
 
 /* An image of the file makes a picture for each field and isovalue of its sweep and each view of its orbit: in this
@@ -366,7 +366,7 @@ typedef struct scene_image {
     char *name; /* the same of all variants */
     int line;
     scene_variant variant;
-    bool has_isovalue; /* of a sweep */
+    bool has_isovalue; /* the sweep sets the isovalue */
     double isovalue;
     char *swept_field; /* NULL: the sweep has no fields */
     int width, height; /* 1 .. 32768; 1280 × 720 by default */
@@ -390,14 +390,14 @@ typedef struct scene_image {
     uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */
     int occlusion_samples;        /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
     double occlusion_radius;      /* how far they go, in scene units; 0: by the bounds */
-    scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
-    double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
-    bool has_default_samples;     /* several volumes are sampled because the scene does not say how */
-    double step;                  /* sample distance in scene units; 0: by step_cells */
-    double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume */
-    bool jitter;                  /* true by default */
-    bool is_reproducible;         /* volumes to the last bit */
-    int frames;                   /* accumulated; a multiple of antialias; 1 by default, 1 .. 4096 */
+    scene_sampling_method method; /* default: one volume by segments, several by samples */
+    double max_error; /* error bound of segments in a linear colour channel; 0: by step; default for one volume: 0.01 */
+    bool has_default_samples; /* several volumes are sampled because the scene does not say how */
+    double step;              /* sample distance in scene units; 0: by step_cells */
+    double step_cells;        /* in mean cell sizes: a cell's is the cube root of its volume */
+    bool jitter;              /* true by default */
+    bool is_reproducible;     /* volumes to the last bit */
+    int frames;               /* accumulated; a multiple of antialias; 1 by default, 1 .. 4096 */
     int antialias; /* places in a pixel that frames go through in turn: 1 (default), 2, 4, 8 or 16. Where there are no
                     * volumes only pixels at edges take more than one frame */
     double max_seconds; /* that samples may take by estimate; 3600 by default */
@@ -421,9 +421,9 @@ typedef enum scene_field_role {
 
 typedef struct scene_field_walk {
     const scene_image *image;
-    int place; /* of the next field, of all that the layers may have */
+    int place; /* place of the next field among all that the layers may have */
     scene_layer_kind kind;
-    scene_field_role role; /* of the last field */
+    scene_field_role role; /* role of the last field returned */
 } scene_field_walk;
 
 /* The next field; NULL: there is none. A walk begins with the image alone. */
@@ -504,12 +504,12 @@ void scene_list_parameters(const scene *s, const char *name, char *words, size_t
 
 /* The values that placeholders stand for. */
 typedef struct scene_moment {
-    const char *name; /* of the image */
+    const char *name; /* name of the image */
     long long cycle;
     double time;
     int view;
     double isovalue;
-    const char *field; /* of a sweep; NULL: none */
+    const char *field; /* the sweep's field; NULL: no sweep */
 } scene_moment;
 
 scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time);

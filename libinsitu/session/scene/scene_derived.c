@@ -180,7 +180,7 @@ typedef struct search {
     const scene_document *d;
     scene *s;
     int path[SCENE_MAX_DERIVED], length; /* from the one that is being made on */
-    int order[SCENE_MAX_DERIVED], count; /* of those that are done */
+    int order[SCENE_MAX_DERIVED], count; /* indices of the finished fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];
 } search;
 

@@ -8,7 +8,7 @@
 enum {
     SCENE_EXPRESSION_BYTES = 1000,
     SCENE_BLOCK = 256, /* places that a program runs for at most */
-    SCENE_STACK = 32,  /* of a program at most */
+    SCENE_STACK = 32,  /* most stack entries of a program */
     SCENE_FAULT_SIZE = 400
 };
 
@@ -37,8 +37,8 @@ typedef enum scene_operation {
 
 typedef struct scene_instruction {
     scene_operation operation;
-    int input;     /* of SCENE_OP_PUSH_INPUT */
-    double number; /* of SCENE_OP_PUSH_NUMBER and SCENE_OP_WHOLE_POWER */
+    int input;     /* which input SCENE_OP_PUSH_INPUT pushes */
+    double number; /* operand of SCENE_OP_PUSH_NUMBER and SCENE_OP_WHOLE_POWER */
 } scene_instruction;
 
 /* A scalar of a field by name. component: as scene_field.component. */
@@ -50,7 +50,7 @@ typedef struct scene_reference {
 typedef struct scene_expression {
     int count;
     scene_instruction *instructions; /* operands come before their operator */
-    int depth;                       /* of the stack, 1 .. SCENE_STACK */
+    int depth;                       /* most stack entries in use, 1 .. SCENE_STACK */
     int input_count;
     scene_reference *inputs; /* each once */
 } scene_expression;

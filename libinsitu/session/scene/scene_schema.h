@@ -80,7 +80,7 @@ typedef struct scene_file_colour_by {
 typedef struct scene_file_plane {
     double *normal, *point; /* 3 */
     double *offset;
-    double *offsets; /* of slices alone, as count is */
+    double *offsets; /* only slices have offsets and a count */
     int offsets_count;
     int *count;
 } scene_file_plane;
@@ -275,15 +275,15 @@ struct scene_mapping;
 typedef struct scene_key {
     const char *help;
     const char *by_default; /* as the reference shows it; NULL: the key is required */
-    double low, high;       /* of a number, or of each number in a list; both 0: any finite number */
+    double low, high;       /* range of a number, or of each number in a list; both 0: any finite number */
     bool is_low_excluded;
     bool is_high_excluded;
-    bool is_named;                     /* of a list: its entries' key `name` stands for them in paths */
-    const struct scene_mapping *child; /* of a mapping, or of a list of mappings */
-    const struct scene_form *forms;    /* of a value that may be of several types: one of each; else NULL */
+    bool is_named;                     /* for a list: paths call its entries by their key `name` */
+    const struct scene_mapping *child; /* the keys of a mapping, or of each mapping in a list */
+    const struct scene_form *forms;    /* one form for each type that the value may have; NULL: the key has one type */
     int form_count;
     const struct scene_form
-        *named; /* of a mapping whose keys are names that the scene gives: their values; else NULL */
+        *named; /* for a mapping whose keys are names chosen by the scene: the form of its values; else NULL */
 } scene_key;
 
 /* One of the forms that a value may have. */

@@ -19,8 +19,8 @@ typedef struct session_statistics_wish {
 typedef struct session_statistics {
     int64_t cells;
     bool is_of_shells;
-    double volume;          /* of the cells */
-    double least, most;     /* values, of vertices where the field is there; least > most: there are none */
+    double volume;          /* total volume of the cells */
+    double least, most;     /* range of the values, at vertices for a vertex field; least > most: there are no values */
     double mean, deviation; /* mean and deviation of cells' values, weighted by volume */
     int bin_count;
     double low, high;                /* the ends of the first and last bin */

@@ -29,7 +29,7 @@ typedef struct session_layers {
 typedef struct session_layer_basis {
     const session_meshes *meshes;
     const session_team *team;
-    double half_diagonal; /* of the global bounds */
+    double half_diagonal; /* half the diagonal of the global bounds */
     bool is_flat;         /* session_flat_axis() found an axis */
     session_report *report;
     session_image_ranges *run_ranges; /* NULL: no layer has one over the run */

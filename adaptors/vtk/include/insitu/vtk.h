@@ -58,8 +58,8 @@ typedef struct insitu_vtk_report {
     int64_t cells_linear;    /* quadratic and higher-order cells drawn by their corners */
     int64_t cells_flat;      /* not drawn: points and lines */
     int64_t cells_not_drawn; /* not drawn: 3-D cells of unknown types, cells with too few points or faces */
-    int64_t bytes_borrowed;  /* of VTK's arrays handed over as they are */
-    int64_t bytes_copied;    /* of arrays converted, held until the mesh is set again */
+    int64_t bytes_borrowed;  /* size of VTK's arrays that are borrowed as they are */
+    int64_t bytes_copied;    /* size of converted arrays, held until the mesh is set again */
     const char *copied_why;  /* "" or one "what: why (bytes)" a line; valid until the next call on the adaptor */
     const char *cells_why;   /* "" or, a line each, the kinds of cells that are simplified or not drawn, and how many;
                                 valid as long */
