@@ -8,7 +8,7 @@
 
 enum {
     COMP_LANES = 16,
-    COMP_ROWS = 32, /* the most that a strip has */
+    COMP_ROWS = 32, /* most rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
     COMP_FEW_BLOCKS = 2048, /* so that claims to all of them are a small message, whatever the picture; unless */
     COMP_RANK_BLOCKS = 60,  /* a rank has fewer than these, on average, */

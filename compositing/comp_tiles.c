@@ -27,9 +27,9 @@ typedef struct room {
 } room;
 
 struct comp_tile_scratch {
-    room starts; /* int64_t, pixels of a tile + 1: in order */
+    room starts; /* int64_t, pixels of a tile + 1: where each pixel begins in order */
     room order;  /* int64_t: numbers of fragments, pixel by pixel */
-    room pile;   /* fragments of one pixel */
+    room pile;   /* copies of one pixel's fragments, to be sorted */
     int64_t fragments;
     double seconds;
     char apart[64]; /* padding: threads write to no common cache line */

@@ -15,7 +15,7 @@
 class encoded_file
 {
   public:
-    /* The ending of name tells the format. */
+    /* The ending of name selects the format. */
     encoded_file(const char *name, const OIIO::ImageSpec &spec, std::vector<unsigned char> &bytes);
     /* Writes to a file of that path: OpenImageIO 2.4 knows no other place for deep images. */
     encoded_file(const char *name, const OIIO::ImageSpec &spec, const std::string &path);

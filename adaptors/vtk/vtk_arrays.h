@@ -56,8 +56,8 @@ struct array_view {
 
 int64_t type_size(insitu_type type);
 
-/* The array as a field's values: borrowed, or copied where VTK's type or layout has no counterpart; what names it in
- * the tally. */
+/* Returns the array as a field's values. They are borrowed, or copied if VTK's type or layout has no counterpart here.
+ * what is the array's name in the tally. */
 array_view view_array(vtkDataArray *array, const std::string &what, hold &held, tally &count);
 
 /* The three coordinate arrays of points: borrowed (AOS, or SOA with components wherever they lie) or copied. */

@@ -21,7 +21,7 @@ typedef struct morton_coder {
 /* Prepares for cells below index_count, within a box in the tree's coordinates. */
 void morton_coder_init(morton_coder *coder, const double lower[3], const double upper[3], int64_t index_count);
 
-/* Makes the keys of the cells whose indices keys holds; exact grows by the cells' boxes in the source's coordinates. */
+/* Replaces the cell indices in keys by Morton keys, and extends exact by these cells' boxes in source coordinates. */
 void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
                   fetch_box *exact);
 

@@ -10,7 +10,7 @@
 #include "mmbvh.h"
 
 enum {
-    TOPOLOGY_SUBTREE_CELLS = 16384,              /* at most: they and their nodes fit a core's cache */
+    TOPOLOGY_SUBTREE_CELLS = 16384,              /* most cells of a subtree: with their nodes they fit a core's cache */
     TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32 /* from here on nodes are halved, so that 2^32 cells end within the
                                                     depth allowed */
 };

@@ -69,7 +69,7 @@ typedef enum insitu_cell_type {
     INSITU_TRIANGLE = 5, /* 3 vertices */
     INSITU_POLYGON = 7,  /* 3 vertices or more around it; offsets tell how many. It is drawn as triangles, which
                             cover it once, convex or not; it should be flat. */
-    INSITU_QUAD = 9      /* 4 vertices around it; may be warped. Two triangles where it is concave */
+    INSITU_QUAD = 9      /* 4 vertices around it; may be warped; a concave quad is two triangles */
 } insitu_cell_type;
 
 /* The order of a cell's vertices in connectivity. Cell types that an order does not name are in VTK's order. Mirrored

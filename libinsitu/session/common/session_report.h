@@ -21,10 +21,10 @@ typedef struct session_text {
 typedef struct session_report {
     insitu_report numbers; /* its texts are set at the end of a step */
     session_text copied_why, left_out, warnings;
-    session_text own; /* warnings that this rank alone knows of, until session_share_lines() */
+    session_text own; /* this rank's warnings until session_share_lines() gathers those of all ranks */
     int told_count;
-    uint64_t *told;        /* hashes of the warnings that were told and have held since */
-    uint64_t unusable_key; /* session_unusable_key() when warnings of it were told; 0: of nothing */
+    uint64_t *told;        /* hashes of warnings that were reported and still hold */
+    uint64_t unusable_key; /* session_unusable_key() when its warnings were reported; 0: there were none */
 } session_report;
 
 /* Add a line. */

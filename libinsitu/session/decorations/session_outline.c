@@ -39,7 +39,7 @@ static void take_boxes(const double *ends, int count, session_outline *out)
     }
 }
 
-/* This rank's ends: of each mesh of the catalogue, or of all of them together. */
+/* Finds the bounds of this rank's cells: a row for each mesh of the catalogue, or one row for all meshes. */
 static void find_ends(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
 {
     for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;

@@ -26,7 +26,7 @@ int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[S
  * those of ids have, the ticks stand in the bands' middles: all of them, or every so many. Local. */
 int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
-/* The one tick of a range whose values are all the same, in the middle. Returns 1. Local. */
+/* Makes the only tick of a range whose values are all the same, in its middle. Returns 1. Local. */
 int session_make_constant_tick(double value, const scene_number_form *form, insitu_tick *tick);
 
 #endif

@@ -47,7 +47,7 @@ typedef struct session_border {
 typedef struct session_hanging {
     uint64_t places;         /* session_joint.places that it is of; 0: not known */
     session_border *borders; /* one for each mesh; NULL: none are known */
-    uint64_t twins;          /* the places that the borders' twins are of */
+    uint64_t twins;          /* version of the vertex places for which the twins of borders were found */
     int64_t count, total;    /* on this rank, on all */
     session_hanging_vertex *vertices;
     int64_t *sent_counts, *sent_groups; /* to each rank; whose values, rank by rank */

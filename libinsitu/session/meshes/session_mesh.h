@@ -65,7 +65,7 @@ typedef struct session_scalar {
     mmbvh_interval *intervals;
     session_plane plane;       /* the plane that distances are from */
     float *distances;          /* at vertices, a declared copy; NULL until computed */
-    double *vertex_values;     /* recentred values, a declared copy; NULL until computed */
+    double *vertex_values;     /* cell values recentred to vertices, reported as a copy; NULL until computed */
     grid_field own;            /* the cells' own values, where recentred ones are in use */
     int32_t *gradient_entries; /* each vertex's entry in gradients, or -1; NULL until computed. A declared copy, for
                                   smooth normals of the last step that drew some */

@@ -98,7 +98,8 @@ static int64_t least_entry(const grid *g, int64_t from, int64_t to)
     return least;
 }
 
-/* Sums over tets: those with the mean, and those with a corner of the cell. */
+/* Sums of tet volumes over the triangles of a cell's faces. Each triangle makes one tet with the mean of the cell's
+ * vertices (signed), and one with a corner of the cell's box, by which flat cells are found. */
 typedef struct volume_sums {
     int64_t triangles;
     double from_mean, from_corner;

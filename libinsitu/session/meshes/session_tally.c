@@ -162,8 +162,8 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 
 /* ---- corners that do not agree ------------------------------------------------------------------------------- */
 
-/* Corners of less volume than this share of the cell's largest count as flat: as those of a hex with two vertices in
- * one place, or of an edge that is nearly straight. */
+/* A corner counts as flat if its volume is less than this share of the cell's largest. Hexes with two coincident
+ * vertices have such corners, and so have cells with a vertex on a nearly straight edge. */
 static const double least_share = 1e-6;
 
 /* A quad's corner has an area along the normal at the first corner. */
@@ -368,7 +368,7 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     const grid *g = &mesh->cells;
     if (!g->coordinates[0].axis || g->ghosts) return false;
     mesh_tally t = tally_empty();
-    int64_t sized = 1, difference = 1; /* products of positive plus and minus negative */
+    int64_t sized = 1, difference = 1; /* products over the axes: of positive + negative, of positive - negative */
     t.drawn = 1;
     t.sizes = 1;
     for (int axis = 0; axis < 3; axis++) {

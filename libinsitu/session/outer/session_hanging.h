@@ -26,8 +26,8 @@ typedef struct session_hanging_basis {
     int64_t group_count;
 } session_hanging_basis;
 
-/* Finds the joint's borders, and of several meshes the twins of their vertices, where they are not known. meshes: as
- * above. Collective, agreed. */
+/* Finds the joint's borders if they are not known, and for a joint of several meshes also which vertices are twins.
+ * meshes: as above. Collective, agreed. */
 insitu_status session_update_borders(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
                                      base_error *error);
 

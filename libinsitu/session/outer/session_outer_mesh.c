@@ -121,10 +121,10 @@ typedef struct face_polygon {
     double (*places)[3];
     int (*triangles)[3];
     void *room;
-    double normal[3]; /* towards the apexes */
+    double normal[3]; /* points towards the apexes of the pyramids made on the face */
 } face_polygon;
 
-/* The mesh while it is made, in arrays of the most that the faces can take. */
+/* The mesh under construction. Its arrays are as large as the faces may need at most. */
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;

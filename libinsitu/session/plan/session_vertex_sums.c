@@ -304,7 +304,7 @@ static insitu_status make_sums(const session_team *team, session_vertex_sums *su
     const int64_t bytes = sums->keys.count * session_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
     if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
         session_no_memory(error, bytes, "gradients at vertices");
-    /* The last one tells whether a rank has failed. */
+    /* The last entry is 1 if this rank has failed. */
     double largest[3] = {sums->bounds.rise, sums->bounds.sharpness, error->status != INSITU_OK};
     insitu_status status =
         session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");

@@ -1,4 +1,6 @@
-/* As session_mesh_input.c, for fields. */
+/* insitu_set_field() fills in the table of fields. Only descriptions are checked here; a step reads the values. An
+ * error is returned at once, and stays with the field until it is set again, so that the next step returns it on every
+ * rank. */
 #include "session_field_input.h"
 
 #include <string.h>

@@ -463,7 +463,7 @@ typedef enum scene_schedule {
 /* Pictures are written by a thread while the simulation goes on, or before the step is over. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
-/* Images of a file, which have a bit each in session_events.h; and pictures that they make in a step. */
+/* Most images of a scene file (session_events.h has a bit for each), and most pictures that they make in a step. */
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 
 /* A number of the scene for the simulation (insitu_parameter()). */

@@ -359,7 +359,7 @@ static void list_of_numbers(const char *text, const cyaml_schema_value_t *value,
     if (!is_right) list[0] = '\0';
 }
 
-/* Asks whether an empty value lacks quotes, as #ff0000 does, or its keys' indentation. */
+/* Adds a question about an empty value: an unquoted #ff0000 reads as a comment, and keys may lack their indentation. */
 static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                            char question[question_size])
 {
@@ -371,7 +371,7 @@ static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, con
         snprintf(question, question_size, " (its keys stand on the next lines, further in, or in { })");
 }
 
-/* Asks whether a value was meant that is written otherwise: in quotes, as a list, or as a list's entry. */
+/* Adds "did you mean ...?" if the value would be right in quotes, as a list, or as an entry of a list. */
 static void ask_for_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                          const scene_key *key, char question[question_size])
 {

@@ -1,4 +1,4 @@
-/* Slices of an image, which are planes and the field that colours them. */
+/* Converts an image's slices from the file: their planes, and the field that colours them. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
