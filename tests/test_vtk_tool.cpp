@@ -246,6 +246,12 @@ void wrong_options_are_named(void **)
     expect(run_tool("--fast"), 1, "insitu-render: --fast: unknown option; see insitu-render --help");
     expect(run_tool("--filed x row.vtu"), 1, "--filed: unknown option (did you mean --field?)");
     expect(run_tool("--step=0 row.vtu"), 1, "--step: unknown option (did you mean --steps?)");
+    expect(run_tool("--output x.png row.vtu"), 1,
+           "--output: unknown option (pictures go where the scene's outputs say");
+    expect(run_tool("-o x.png row.vtu"), 1, "-o: unknown option (pictures go where the scene's outputs say");
+    expect(run_tool("--scene scene.yaml row.vtu"), 1, "--scene: unknown option (the scene is given without an option");
+    expect(run_tool("--ranks 2 row.vtu"), 1, "--ranks: unknown option (ranks are mpirun's");
+    expect(run_tool("--colormap viridis row.vtu"), 1, "unknown option (what is drawn is said by a scene file");
     expect(run_tool("--size 64x48 scene.yaml row.vtu"), 1, "--size: given with the scene file scene.yaml");
     expect(run_tool("scene.yaml row.vtu scene.yaml"), 1, "scene.yaml: a second scene file beside scene.yaml");
     expect(run_tool("--info scene.yaml"), 1, "scene.yaml: is a scene file, expected data");
@@ -367,6 +373,11 @@ void a_field_that_begins_later_leaves_out_the_first_steps(void **)
     expect(r, 0, "3 steps, 2 pictures");
     expect(r, 0, "late_0.vtu: not drawn: scene.yaml:6: no mesh has the field \"x\"");
     expect(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1, "insitu-render: scene.yaml:6: no mesh has the field");
+    write_vtu("lost_0.vtu", row_of_tets(3));
+    write_vtu("lost_1.vtu", row_without_x(3));
+    const run_result lost = run_tool("lost_0.vtu lost_1.vtu");
+    expect(lost, 0, "lost_1.vtu: not drawn: no mesh has the field \"x\"; there are");
+    expect(lost, 0, "; the first step has it, and --field takes another");
 }
 
 /* Without a scene a small step is drawn otherwise where a step of more and larger values follows, by the scale and the

@@ -222,7 +222,8 @@ std::string by_option(const options &o, const std::string &missing)
 {
     const size_t reason = missing.find("no mesh has the field");
     if (!o.scene.empty() || reason == std::string::npos) return missing;
-    return (o.field.empty() ? "" : "--field " + o.field + ": ") + missing.substr(reason);
+    if (o.field.empty()) return missing.substr(reason) + "; the first step has it, and --field takes another";
+    return "--field " + o.field + ": " + missing.substr(reason);
 }
 
 void draw_step(const world &w, step_source &source, stage &on, size_t index, run_state &run, progress &bar)

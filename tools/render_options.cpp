@@ -13,6 +13,7 @@
 #include <set>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "data_file.h"
 #include "part_files.h"
@@ -161,11 +162,26 @@ size_t count_edits(const std::string &a, const std::string &b)
     return row.back();
 }
 
+/* What to do instead of options that other programs have; "" for other names. */
+std::string instead_of(const std::string &name)
+{
+    static const std::vector<std::pair<std::set<std::string>, const char *>> known = {
+        {{"-o", "--out", "--output", "--outdir"},
+         "pictures go where the scene's outputs say, without a scene into the working folder"},
+        {{"-s", "--scene"}, "the scene is given without an option: insitu-render scene.yaml file..."},
+        {{"-n", "-np", "--np", "--ranks"}, "ranks are mpirun's: mpirun -n 4 insitu-render file..."},
+        {{"--range", "--map", "--cmap", "--colormap", "--color", "--colour", "--slice", "--isosurface", "--volume"},
+         "what is drawn is said by a scene file: insitu-render scene.yaml file..."}};
+    for (const auto &[names, text] : known)
+        if (names.count(name)) return std::string(" (") + text + ")";
+    return "";
+}
+
 [[noreturn]] void refuse_unknown(const CLI::App &app, const std::string &given)
 {
     const std::string name = given.substr(0, given.find('='));
-    std::string nearest;
-    size_t least = name.size() / 3 + 1;
+    std::string nearest = instead_of(name);
+    size_t least = nearest.empty() ? name.size() / 3 + 1 : 0;
     for (const CLI::Option *option : app.get_options()) {
         const std::string known = option->get_positional() ? "" : option->get_name();
         const size_t edits = count_edits(name, known);
