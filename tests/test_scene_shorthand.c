@@ -37,6 +37,7 @@ static void print_layers(char *to, const scene_image *image)
 {
     for (int i = 0; i < image->surface_count; i++) {
         print_numbers(to, "surface", image->surfaces[i].colour, 3);
+        if (image->surfaces[i].has_colour_by) print_flag(to, image->surfaces[i].colour_by.name, true);
         print_numbers(to, "edge width", &image->surfaces[i].edge_width, 1);
         print_numbers(to, "edges", image->surfaces[i].edge_colour, 3);
     }
@@ -44,6 +45,7 @@ static void print_layers(char *to, const scene_image *image)
         const scene_isosurface *layer = &image->isosurfaces[i];
         for (int n = 0; n < layer->value_count; n++) print_flag(to, "value", layer->values[n] == 0.5);
         print_numbers(to, "colours", layer->colours, 3 * layer->value_count);
+        if (layer->has_colour_by) print_flag(to, layer->colour_by.name, true);
     }
     for (int i = 0; i < image->slice_count; i++) {
         print_numbers(to, "outside", image->slices[i].colour_map.outside[0], 9);
@@ -70,6 +72,7 @@ static void print_image(char *to, const scene_image *image)
         print_vector(to, "light", image->lights[i].direction);
         print_numbers(to, "light", image->lights[i].colour, 3);
     }
+    for (int i = 0; i < image->output_count; i++) print_flag(to, image->outputs[i].path, true);
     for (int i = 0; i < image->clip_count; i++) print_vector(to, "centre", image->clips[i].centre);
     print_layers(to, image);
 }
@@ -118,11 +121,16 @@ static const char *const forms[][2] = {
      "layers: [{isosurface: {field: p, values: [0.5, 2], colours: [[1, 0, 0], [0, 0, 1]]}}]"},
     {"layers: [{isosurface: {field: p, values: 0.5, colours: aqua}}]",
      "layers: [{isosurface: {field: p, values: [0.5], colours: [[0, 1, 1]]}}]"},
+    {"layers: [{surface: {colour_by: heat}}]", "layers: [{surface: {colour_by: {field: heat}}}]"},
+    {"layers: [{isosurface: {field: p, values: 1, color_by: 2}}]",
+     "layers: [{isosurface: {field: p, values: [1], colour_by: {field: 2}}}]"},
     {"layers: [{slice: {field: p}}]", "layers: [{slice: {field: p, planes: [{normal: [0, 0, 1]}]}}]"},
     {"layers: [{slice: {field: p, planes: {normal: -y}, below: navy, above: \"#FF0000\", nan: white}}]",
      "layers: [{slice: {field: p, planes: [{normal: [0, -1, 0]}], below: [0, 0, 0.50196078431372548], above: [1, 0, "
      "0], nan: [1, 1, 1]}}]"},
     {"outputs: {path: a.png}", "outputs: [{path: a.png}]"},
+    {"outputs: b.png", "outputs: [{path: b.png}]"},
+    {"outputs: [c.png, {path: d.exr}]", "outputs: [{path: c.png}, {path: d.exr}]"},
 };
 
 static void short_forms_mean_their_full_forms(void **context)

@@ -427,7 +427,7 @@ static void missing_field_leaves_the_other_picture(void **context)
     everywhere(hand_over(session, &input) == INSITU_OK);
     forget_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"",
+    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
                     "\"f\" (mesh \"m\")");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_0.exr")));

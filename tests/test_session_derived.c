@@ -635,7 +635,8 @@ static void what_is_wrong_is_told_to_all(void **state)
     input_free(&in);
 }
 
-/* A name that the simulation has, too; and a field whose components differ on one rank. */
+/* A name that the simulation has, too; one that is nearly a derived field's; and a field whose components differ on one
+ * rank. */
 static void clashes_are_told_to_all(void **state)
 {
     (void)state;
@@ -647,6 +648,11 @@ static void clashes_are_told_to_all(void **state)
     insitu_status status = insitu_step(session, 0, 0);
     told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: fields.f: mesh \"m\" has a field of this name already",
                     "expected another name");
+    insitu_destroy(&session);
+    session = begin(MPI_COMM_WORLD, SCENE("speed: mag(u)", "sped"), &in, &u);
+    status = insitu_step(session, 0, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
+                    "there are: ");
     insitu_destroy(&session);
     /* It may come later. */
     session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);

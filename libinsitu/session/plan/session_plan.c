@@ -106,12 +106,13 @@ static insitu_status refuse_sources(const session_plan_basis *basis, const scene
 
 static insitu_status refuse_missing(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
-    char names[NAMES_SIZE];
+    char names[NAMES_SIZE], meant[300];
     if (refuse_fault(find_hidden(basis, field), error)) return error->status;
     if (refuse_sources(basis, field, error)) return error->status;
     list_fields(basis->catalogue, names);
-    return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"; there are: %s", basis->scene_path,
-                     field->line, field->name, names);
+    word_meant(basis->catalogue, field->name, meant);
+    return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"%s; there are: %s",
+                     basis->scene_path, field->line, field->name, meant, names);
 }
 
 /* Checks that a mesh that the layer names is there, and has the field unless it has no cells anywhere. */

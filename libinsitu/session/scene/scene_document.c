@@ -359,6 +359,14 @@ static void list_of_numbers(const char *text, const cyaml_schema_value_t *value,
     if (!is_right) list[0] = '\0';
 }
 
+static bool read_number(const char *text, double *number)
+{
+    char *end;
+    if (text[strspn(text, "+-.0123456789eE")]) return false; /* no nan, inf, hexadecimal */
+    *number = strtod(text, &end);
+    return end != text && !*end && isfinite(*number);
+}
+
 /* Adds a question about an empty value: an unquoted #ff0000 reads as a comment, and keys may lack their indentation. */
 static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                            char question[question_size])
@@ -378,6 +386,7 @@ static void ask_for_form(const scene_document *d, const yaml_node_t *node, const
     const bool is_list = value->type == CYAML_SEQUENCE || value->type == CYAML_SEQUENCE_FIXED;
     const cyaml_type_e entry = is_list ? value->sequence.entry->type : CYAML_IGNORE;
     char list[list_size] = "";
+    double number;
     if (node->type == YAML_SCALAR_NODE && node->data.scalar.length == 0) {
         ask_of_nothing(d, node, value, question);
     } else if (node->type == YAML_SCALAR_NODE && is_list) {
@@ -387,6 +396,9 @@ static void ask_for_form(const scene_document *d, const yaml_node_t *node, const
             snprintf(question, question_size, " (did you mean \"#%s\" in quotes?)", digits);
         else if (*list)
             snprintf(question, question_size, " (did you mean %s?)", list);
+        else if (entry == CYAML_SEQUENCE_FIXED && value->sequence.entry->sequence.max == 2 &&
+                 read_number(text, &number))
+            snprintf(question, question_size, " (did you mean [[0, %.24s], [1, %.24s]]?)", text, text);
     } else if (node->type == YAML_MAPPING_NODE && entry == CYAML_MAPPING) {
         snprintf(question, question_size, " (is a \"- \" missing before its first key?)");
     } else if (node->type == YAML_MAPPING_NODE && node->data.mapping.pairs.top - node->data.mapping.pairs.start == 1) {
@@ -409,6 +421,9 @@ static insitu_status bad_value(const scene_document *d, const char *path, const 
     if (is_switch) words[count++] = "true", words[count++] = "false";
     ask_for_meant(node, words, count, question);
     if (!*question) ask_for_form(d, node, value, key, question);
+    const bool is_entry = *path && path[strlen(path) - 1] == ']';
+    if (!*question && is_entry && value->type == CYAML_SEQUENCE_FIXED && node->type == YAML_SCALAR_NODE)
+        snprintf(question, question_size, " (each entry is a list of its own, in [ ])");
     return scene_bad(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
@@ -420,14 +435,6 @@ static bool read_whole_number(const char *text, double *number)
     if (count == 0 || digits[count] || (count > 1 && digits[0] == '0')) return false;
     *number = strtod(text, NULL);
     return true;
-}
-
-static bool read_number(const char *text, double *number)
-{
-    char *end;
-    if (text[strspn(text, "+-.0123456789eE")]) return false; /* no nan, inf, hexadecimal */
-    *number = strtod(text, &end);
-    return end != text && !*end && isfinite(*number);
 }
 
 static bool is_in_range(double number, const scene_key *key)
@@ -609,6 +616,26 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
     return status;
 }
 
+/* Asks whether an unknown key was meant to stand at the file's top, or in the one mapping below this one that has it.
+ */
+static void ask_for_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
+{
+    const char *text = name->type == YAML_SCALAR_NODE ? text_of(name) : "", *holder = NULL;
+    int holders = 0;
+    for (int i = 0; mapping->fields[i].key; i++) {
+        const scene_mapping *child = mapping->keys[i].child;
+        for (const cyaml_schema_field_t *f = child ? child->fields : NULL; f && f->key; f++) {
+            if (strcmp(f->key, text) != 0) continue;
+            holder = mapping->fields[i].key;
+            holders++;
+        }
+    }
+    if (holders == 1) snprintf(question, question_size, " (did you mean %s.%s?)", holder, text);
+    for (const cyaml_schema_field_t *f = scene_top.fields; f->key; f++)
+        if (strcmp(f->key, text) == 0)
+            snprintf(question, question_size, " (it stands at the top of the file, beside images)");
+}
+
 static insitu_status bad_key(scene_document *d, const char *path, const yaml_node_t *name, const scene_mapping *mapping,
                              const char *fault)
 {
@@ -621,6 +648,7 @@ static insitu_status bad_key(scene_document *d, const char *path, const yaml_nod
     scene_value_words(&value, &holder, expected);
     for (const cyaml_schema_field_t *f = mapping->fields; f->key && count < most_words; f++) words[count++] = f->key;
     ask_for_meant(name, words, count, question);
+    if (!*question) ask_for_place(name, mapping, question);
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s%s, expected %s", d->file_name,
                      line_of(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }

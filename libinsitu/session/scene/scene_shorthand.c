@@ -147,6 +147,35 @@ static void expand_axis(rewrite *r, int *value)
 
 /* ---- other forms ------------------------------------------------------------------------------------------------ */
 
+/* A text alone: a mapping in which it is the key's value. */
+static void expand_text(rewrite *r, const char *key, int *value)
+{
+    const int text = *value;
+    if (!text_of(r, text) || !*text_of(r, text)) return;
+    *value = make_mapping(r);
+    append_pair(r, *value, key, text);
+}
+
+static void expand_field(rewrite *r, int *value)
+{
+    expand_text(r, "field", value);
+}
+
+/* A path, a mapping, or a list of either: a list of mappings. */
+static void expand_outputs(rewrite *r, int *value)
+{
+    expand_text(r, "path", value);
+    if (r->has_memory && node_of(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
+    if (!r->has_memory || node_of(r, *value)->type != YAML_SEQUENCE_NODE) return;
+    for (int i = 0; r->has_memory &&
+                    node_of(r, *value)->data.sequence.items.start + i < node_of(r, *value)->data.sequence.items.top;
+         i++) {
+        int item = node_of(r, *value)->data.sequence.items.start[i];
+        expand_text(r, "path", &item);
+        if (item) node_of(r, *value)->data.sequence.items.start[i] = item;
+    }
+}
+
 /* true: all defaults; false: the pair goes, for which *value becomes 0. */
 static void expand_switch(rewrite *r, int *value)
 {
@@ -236,10 +265,11 @@ static const struct {
     {"edges", expand_switch, switch_words},
     {"automatic", expand_switch, switch_words},
     {"camera", expand_camera, "automatic"},
+    {"colour_by", expand_field, "a field's name"},
     {"values", expand_values, "one number"},
     {"planes", expand_mappings, NULL},
     {"lights", expand_mappings, NULL},
-    {"outputs", expand_mappings, NULL},
+    {"outputs", expand_outputs, "a path"},
     {"text", expand_mappings, NULL},
     {"slice", expand_slice, NULL},
     {"fields", expand_fields, "a mapping from names to these, or to expressions"},
@@ -383,6 +413,22 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"eye", "position"},
                                           {"from", "position"},
                                           {"look_at", "focal"},
+                                          {"lookat", "focal"},
+                                          {"focal_point", "focal"},
+                                          {"view_up", "up"},
+                                          {"up_vector", "up"},
+                                          {"bands", "discrete"},
+                                          {"log", "scale"},
+                                          {"min", "range"},
+                                          {"max", "range"},
+                                          {"vmin", "range"},
+                                          {"vmax", "range"},
+                                          {"clim", "range"},
+                                          {"label", "labels"},
+                                          {"title", "labels"},
+                                          {"wireframe", "edges"},
+                                          {"representation", "edges"},
+                                          {"background_colour", "background"},
                                           {"target", "focal"},
                                           {"to", "focal"},
                                           {"fov", "angle"},
@@ -411,6 +457,7 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"off", "false"},
                                           {"0", "false"},
                                           {"step", "cycle"},
+                                          {"time", "text"},
                                           {"curl", "vorticity"},
                                           {"div", "divergence"},
                                           {"grad", "gradient"},
