@@ -400,6 +400,35 @@ static void sheets_across_any_axis_are_their_quads(void **state)
         }
 }
 
+/* A cube whose three axes run downwards is left-handed throughout: nothing is wrong with it. */
+static void left_handed_blocks_are_no_warning(void **state)
+{
+    (void)state;
+    enum { SIDE = 4, VERTICES = (SIDE + 1) * (SIDE + 1) * (SIDE + 1) };
+    const insitu_lattice lattice = {.cells = {SIDE, SIDE, SIDE}, .spacing = {-1, -1, -1}};
+    double values[VERTICES];
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    insitu_field_defaults(&field);
+    for (int v = 0; v < VERTICES; v++) values[v] = v;
+    mesh.vertex_count = VERTICES;
+    mesh.cell_count = SIDE * SIDE * SIDE;
+    mesh.lattice = &lattice;
+    field.name = "f";
+    field.count = VERTICES;
+    field.values = (insitu_array){values, INSITU_FLOAT64, 0};
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD, write_scene("images: [{name: s, size: [40, 30], layers: [{surface: {colour_by: f}}], "
+                                    "outputs: [{path: s.exr}]}]\n"));
+    if (!own_rank) assert_int_equal(insitu_set_mesh(session, "m", &mesh), INSITU_OK);
+    if (!own_rank) assert_int_equal(insitu_set_field(session, "m", &field), INSITU_OK);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    assert_string_equal(insitu_last_report(session)->warnings, "");
+    insitu_destroy(&session);
+    forget_pictures();
+}
+
 static int begin_tests(void **state)
 {
     (void)state;
@@ -409,6 +438,7 @@ static int begin_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes),
-                                       cmocka_unit_test(sheets_across_any_axis_are_their_quads)};
+                                       cmocka_unit_test(sheets_across_any_axis_are_their_quads),
+                                       cmocka_unit_test(left_handed_blocks_are_no_warning)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -69,7 +69,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     if (!mesh || !mesh->is_given) return;
     sums[DRAWN] = mesh->drawn_count - mesh->shell_count;
     sums[FLAT] = mesh->flat_count - mesh->shell_count;
-    sums[INVERTED] = mesh->inverted_count;
+    sums[INVERTED] = mesh->cells.lattice ? 0 : mesh->inverted_count; /* axes may run either way */
     sums[SHELLS] = mesh->shell_count;
     sum_orders(mesh, sums);
 }
