@@ -188,6 +188,18 @@ static void edges_that_data_hides_are_told(void **state)
 
 /* ---- lengths -------------------------------------------------------------------------------------------------- */
 
+/* Numbers beside an edge leave its name no room at their height: it is as far from the two nearest ticks. */
+static void check_name(const insitu_label *name, const insitu_stroke *ticks, int count)
+{
+    double nearest = INFINITY, next = INFINITY;
+    for (int i = 0; i < count; i++) {
+        const double distance = hypot(ticks[i].from[0] - name->at[0], ticks[i].from[1] - name->at[1]);
+        next = fmin(next, fmax(distance, nearest));
+        nearest = fmin(nearest, distance);
+    }
+    if (fabs(name->away[0]) > fabs(name->away[1]) && count > 1) assert_true(nearest > 1 && next - nearest < 1e-9);
+}
+
 /* The ray through a tick meets its edge where the coordinate is the number that it has; words are beyond the tick. */
 static void check_rulers(const render_camera *c, const double lower[3], const double upper[3])
 {
@@ -197,11 +209,13 @@ static void check_rulers(const render_camera *c, const double lower[3], const do
     session_box_rulers(lower, upper, c, 10, &all, strokes, labels);
     assert_in_range(all.stroke_count, 6, SESSION_RULER_STROKES);
     assert_int_equal(all.label_count, all.stroke_count + 3);
-    for (int stroke = 0, label = 0, axis = 0; label < all.label_count; label++) {
+    for (int stroke = 0, first = 0, label = 0, axis = 0; label < all.label_count; label++) {
         const insitu_label *words = &labels[label];
         assert_true(fabs(hypot(words->away[0], words->away[1]) - 1) < 1e-12);
         if (strspn(words->text, "xyz") == 1) {
             assert_int_equal(words->text[0], 'x' + axis++);
+            check_name(words, strokes + first, stroke - first);
+            first = stroke;
             continue;
         }
         const insitu_stroke *tick = &strokes[stroke++];

@@ -131,6 +131,23 @@ static insitu_label label_at(const double at[2], const double away[2], double ga
     return out;
 }
 
+/* Finds where an axis's name stands: in the middle of its edge, or, if the numbers stand beside the edge rather than
+ * below it, midway between the two ticks around which that is nearest, so that it meets no number. */
+static void place_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
+{
+    double middle[2], least = INFINITY;
+    for (int a = 0; a < 2; a++) at[a] = middle[a] = 0.5 * (e->pixels[0][a] + e->pixels[1][a]);
+    if (fabs(e->away[0]) <= fabs(e->away[1])) return;
+    for (int i = 0; i + 1 < count; i++) {
+        const double between[2] = {0.5 * (ticks[i].from[0] + ticks[i + 1].from[0]),
+                                   0.5 * (ticks[i].from[1] + ticks[i + 1].from[1])};
+        const double distance = hypot(between[0] - middle[0], between[1] - middle[1]);
+        if (distance >= least) continue;
+        least = distance;
+        memcpy(at, between, sizeof between);
+    }
+}
+
 /* Draws as many ticks as there is room for words. */
 static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
                       insitu_stroke *strokes, insitu_label *labels)
@@ -140,7 +157,8 @@ static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, dou
     const double length = hypot(e->pixels[1][0] - e->pixels[0][0], e->pixels[1][1] - e->pixels[0][1]);
     const int most = (int)fmin(fmax(length / (4 * size), 2), 8);
     const session_scale scale = {.kind = RENDER_LINEAR, .low = e->from[axis], .high = e->to[axis]};
-    const double middle[2] = {0.5 * (e->pixels[0][0] + e->pixels[1][0]), 0.5 * (e->pixels[0][1] + e->pixels[1][1])};
+    double name_at[2];
+    const insitu_stroke *first = strokes + out->stroke_count;
     const int count = e->from[axis] < e->to[axis] ? session_make_ticks(&scale, most, ticks) : 0;
     for (int i = 0; i < count; i++) {
         double place[3], at[2];
@@ -151,7 +169,8 @@ static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, dou
             {at[0], at[1]}, {at[0] + 0.35 * size * e->away[0], at[1] + 0.35 * size * e->away[1]}, false};
         labels[out->label_count++] = label_at(at, e->away, 0.55, ticks[i].text);
     }
-    labels[out->label_count++] = label_at(middle, e->away, 2.4, names[axis]);
+    place_name(e, first, count, name_at);
+    labels[out->label_count++] = label_at(name_at, e->away, 2.4, names[axis]);
 }
 
 void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
