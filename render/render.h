@@ -90,6 +90,7 @@ typedef struct render_transfer {
 } render_transfer;
 
 enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 64, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
+enum { RENDER_MAX_LINES = 64 };
 enum { RENDER_MAX_GROUP = 64 };
 enum { RENDER_MAX_CLIPS = 32 };
 enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
@@ -104,6 +105,11 @@ typedef struct render_light {
 typedef struct render_material {
     float ambient, diffuse, specular, shininess;
 } render_material;
+
+static inline bool render_takes_light(const render_material *m)
+{
+    return m->diffuse != 0 || m->specular != 0;
+}
 
 /* One field over all parts: fields[i] and ranges[i] belong to parts[i]. ranges[i].low NULL: not on that part. */
 typedef struct render_field {
@@ -160,6 +166,19 @@ typedef struct render_vertex_gradients {
     const float (*gradients)[3]; /* world axes */
 } render_vertex_gradients;
 
+/* Contour lines on a surface: the share of a pixel that one covers takes its colour, before light falls on it. Lines
+ * that are less than two widths apart fade. */
+typedef struct render_lines {
+    render_field field;   /* vertex-centred, with values (or NaN) on every part that has the surface; ranges not looked
+                             at */
+    int count;            /* 1 .. RENDER_MAX_LINES */
+    const double *values; /* rising */
+    float width;          /* pixels, > 0 */
+    const float *colours; /* count × 3, linear; NULL: the hit's own */
+    bool is_alone; /* nothing of the surface is seen but lines: hits beside them are none, and if it is transparent, a
+                      hit's opacity is the layer's times the share. The material takes no light */
+} render_lines;
+
 typedef struct render_surface_layer {
     render_field field; /* vertex-centred */
     int value_count;
@@ -173,6 +192,7 @@ typedef struct render_surface_layer {
     render_normal normal;
     double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
     const render_vertex_gradients *gradients; /* for RENDER_VERTEX: part by part */
+    const render_lines *lines;                /* NULL: none */
     float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
                          of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
@@ -235,8 +255,9 @@ typedef struct render_clip {
  * numbers, surfaces must be opaque and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
-    RENDER_UNLIT, /* colours before light falls on them; in the place of t_out and transmittance the normal, from which
-                     render_light_fragment() makes those of RENDER_LIGHT (render_light.h) */
+    RENDER_UNLIT,   /* of surfaces that take light, colours before it falls on them; in the place of t_out and
+                       transmittance the normal, from which render_light_fragment() makes those of RENDER_LIGHT
+                       (render_light.h) */
     RENDER_NORMALS, /* the unit normal that light falls on, towards the eye, in world axes */
     RENDER_VALUES   /* the value that colours the surface, or where none does its isovalue; and the number of the
                        isovalue among the job's */

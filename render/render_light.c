@@ -33,11 +33,6 @@ static const render_surface_layer *layer_of(const render_job *job, const fragmen
     return &job->surfaces[i];
 }
 
-static bool takes_light(const render_material *m)
-{
-    return m->diffuse != 0 || m->specular != 0;
-}
-
 static uint64_t all_samples(int count)
 {
     return count < 64 ? ((uint64_t)1 << count) - 1 : ~(uint64_t)0;
@@ -46,7 +41,7 @@ static uint64_t all_samples(int count)
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays)
 {
     double n[3];
-    if (f->kind < FRAGMENT_SURFACE || !takes_light(&layer_of(job, f)->material)) return false;
+    if (f->kind < FRAGMENT_SURFACE || !render_takes_light(&layer_of(job, f)->material)) return false;
     if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false; /* a gradient that is no number */
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
@@ -509,13 +504,10 @@ void render_light_fragment(const render_job *job, const render_hit_rays *open, f
     render_hit hit;
     if (f->kind < FRAGMENT_SURFACE) return;
     layer = layer_of(job, f);
+    if (!render_takes_light(&layer->material)) return;
     hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     f->t_out = f->t_in;
     f->transmittance = layer->opacity >= 1 ? 0 : 1 - layer->opacity;
-    if (!takes_light(&layer->material)) {
-        for (int a = 0; a < 3; a++) f->colour[a] *= layer->material.ambient;
-        return;
-    }
     const render_occlusion *o = job->occlusion;
     const hit_place p = place_of(job, &hit);
     const double sky = o->samples ? (double)__builtin_popcountll(open->samples) / o->samples : 1;

@@ -5,7 +5,7 @@
  * which of them its opaque surfaces block, and a ray is open where none does. Whether one blocks depends on the ray and
  * on the cell alone, so that the picture does not depend on who holds which cell. Transparent surfaces and volumes
  * block nothing; transparent surfaces are lit as opaque ones are; a surface that takes no light (its material is
- * ambient alone) keeps the colours it has, and has no rays.
+ * ambient alone) has its colours from the frame, and has no rays.
  *
  * Where rays begin. A hit is off its surface by the rounding of its depth, and of what the depth was found by: by no
  * more than 1e-6 in the space's scaled units (KERNEL_WEIGHT_ERROR twice, and t's own rounding). Rays begin RENDER_LIFT

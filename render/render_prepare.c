@@ -121,6 +121,20 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
     prepare_visible(&out->interest, t);
 }
 
+static void prepare_lines(kernel_lines *out, const render_lines *l)
+{
+    const double width = l->values[l->count - 1] - l->values[0];
+    out->count = l->count;
+    out->low = l->values[0];
+    out->inverse_width = width > 0 ? 1 / width : 1 / fmax(fabs(out->low), 1e-30);
+    for (int i = 0; i < l->count; i++) {
+        const double before = i > 0 ? l->values[i] - l->values[i - 1] : (double)INFINITY;
+        const double after = i + 1 < l->count ? l->values[i + 1] - l->values[i] : (double)INFINITY;
+        out->level[i] = (float)((l->values[i] - out->low) * out->inverse_width);
+        out->gap[i] = (float)(fmin(before, after) * out->inverse_width);
+    }
+}
+
 static void prepare_camera(kernel_frame *f)
 {
     const render_camera *c = &f->job->camera;
@@ -203,6 +217,7 @@ static void prepare_surfaces(kernel_frame *f)
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
                 f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
+                if (layer->lines) prepare_lines(&s->lines, layer->lines);
                 f->opaque_count += is_opaque;
                 for (int value = 0; value < layer->value_count; value++)
                     f->isovalues[isovalues++] = (kernel_isovalue){f->surface_count - 1, value};
@@ -211,6 +226,20 @@ static void prepare_surfaces(kernel_frame *f)
             kind += (uint32_t)layer->value_count;
         }
     }
+}
+
+static insitu_status check_lines(const render_lines *l, int layer, base_error *error)
+{
+    if (l->count < 1 || l->count > RENDER_MAX_LINES || !(l->width > 0))
+        return base_fail(error, INSITU_ERROR_ARGUMENT,
+                         "isosurface %d: %d lines of %g pixels, expected 1 to %d of more "
+                         "than 0",
+                         layer, l->count, (double)l->width, RENDER_MAX_LINES);
+    for (int i = 0; i < l->count; i++)
+        if (!isfinite(l->values[i]) || (i > 0 && !(l->values[i] > l->values[i - 1])))
+            return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: line %d at %g, expected values that rise",
+                             layer, i, l->values[i]);
+    return INSITU_OK;
 }
 
 static insitu_status check_job(const render_job *job, base_error *error)
@@ -227,6 +256,8 @@ static insitu_status check_job(const render_job *job, base_error *error)
                              job->surfaces[i].difference);
         if (job->surfaces[i].normal == RENDER_VERTEX && !job->surfaces[i].gradients)
             return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: no gradients at vertices were given", i);
+        const insitu_status lines = job->surfaces[i].lines ? check_lines(job->surfaces[i].lines, i, error) : INSITU_OK;
+        if (lines) return lines;
     }
     if (job->camera.width < 1 || job->camera.height < 1 || job->camera.width > UINT16_MAX ||
         job->camera.height > UINT16_MAX)

@@ -38,6 +38,10 @@ insitu_render_program(test_slice)
 add_test(NAME slice COMMAND test_slice)
 set_tests_properties(slice PROPERTIES TIMEOUT 120)
 
+insitu_render_program(test_lines)
+add_test(NAME lines COMMAND test_lines)
+set_tests_properties(lines PROPERTIES TIMEOUT 120)
+
 insitu_render_program(test_light)
 target_sources(test_light PRIVATE test_mesh_honeycomb.c)
 insitu_add_split_test(light $<TARGET_FILE:test_light>)

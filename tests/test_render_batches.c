@@ -167,13 +167,49 @@ static void odd_values_are_found_one_by_one(void **state)
     }
 }
 
+/* Contour lines are drawn over the isovalues' colours, and over a colour map; cells have the order of their
+ * coordinates, whatever that of their vertices. */
+static void lines_are_those_of_single_cells(void **state)
+{
+    static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
+    static const double levels[3] = {-0.4, 0.05, 0.3};
+    static const float white[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1};
+    (void)state;
+    for (int turn = 0; turn < 4 * (int)(sizeof kinds / sizeof *kinds); turn++) {
+        const int n = turn % 2 ? 13 : 4;
+        render_fixture f;
+        test_mesh mesh, other;
+        test_view view;
+        test_mesh_lattice(kinds[turn / 4], n, 0.2, test_wave, &mesh);
+        test_mesh_lattice(kinds[turn / 4], n, 0.2, test_linear, &other);
+        test_mesh_turn(&mesh, 3);
+        test_mesh_turn(&other, 3);
+        test_view_create(&other, (test_layout){.is_interleaved = true}, &view);
+        create(&f, &mesh, 1, n, (fixture_camera)(turn % (int)CAMERA_COUNT));
+        fixture_add_surface(&f, values, 2, 1);
+        const render_lines lines = {
+            .field = {&view.field, f.ranges}, .count = 3, .values = levels, .width = 2, .colours = white};
+        f.surfaces[0].lines = &lines;
+        if (turn % 4 > 1) {
+            fixture_set_volume(&f, 0.3); /* its colours serve the surface */
+            f.job.volume_count = 0;
+            f.surfaces[0].colour_field = (render_field){&view.field, f.ranges};
+            f.surfaces[0].colour_map = &f.transfer;
+        }
+        compare(&f);
+        test_view_free(&view);
+        test_mesh_free(&mesh);
+        test_mesh_free(&other);
+    }
+}
+
 int main(void)
 {
     if (fixture_lacks_set()) return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(cells_are_numbered_anyhow),
         cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),
-        cmocka_unit_test(odd_values_are_found_one_by_one),
+        cmocka_unit_test(odd_values_are_found_one_by_one),   cmocka_unit_test(lines_are_those_of_single_cells),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -237,11 +237,11 @@ static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][S
     KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
 }
 
-/* Returns the field with these values at the vertices at r in each ray's own cell. */
-SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
+/* Fits the polynomial of a field in each ray's own cell, of whose vertices it has these values. */
+SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi lane, vf c[8], int type)
 {
     const int count = grid_type_vertices(type);
-    vf v[8], c[8];
+    vf v[8];
     for (int i = 0; i < count; i++) v[i] = kernel_take(values[i], lane);
     for (int half = 0; half < 2; half++) {
         kernel_half d[8], e[8];
@@ -249,14 +249,15 @@ SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, con
         kernel_half_fit(type, e, d);
         for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
     }
-    const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
-    return kernel_value_of(c, kernel_has_apex(type), &m, r);
 }
 
-static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
-                                                              int type)
+/* Returns the field with these values at the vertices at r in each ray's own cell. */
+SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_maps_value, values, lane, r);
+    const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
+    vf c[8];
+    kernel_maps_polynomial(values, lane, c, type);
+    return kernel_value_of(c, kernel_has_apex(type), &m, r);
 }
 
 /* Relative to the map's origin. */

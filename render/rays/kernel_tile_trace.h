@@ -341,6 +341,7 @@ SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
     const render_surface_layer *l = t->surface->layer;
     /* Rays that are clipped begin each at a depth of its own, which packets know. */
     if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
+    if (l->lines && l->lines->is_alone) return false;
     return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
 }
 

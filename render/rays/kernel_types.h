@@ -164,10 +164,19 @@ typedef struct kernel_transfer {
     kernel_interest interest;
 } kernel_transfer;
 
+/* The levels of contour lines, in a domain in which the first is 0 and the last, if there are several, 1; and how near
+ * each one's nearest neighbour is, infinite if there is none. */
+typedef struct kernel_lines {
+    double low, inverse_width; /* value -> domain */
+    int count;
+    float level[RENDER_MAX_LINES], gap[RENDER_MAX_LINES];
+} kernel_lines;
+
 typedef struct kernel_surface {
     const render_surface_layer *layer;
     kernel_interest interest; /* the isovalues */
     kernel_transfer colour;   /* where layer->colour_map */
+    kernel_lines lines;       /* where layer->lines */
     uint32_t own_clips;       /* those of the layer that are not the frame's common ones */
     uint32_t first_kind;      /* fragment kind of the layer's first isovalue */
     double value_scale;       /* a power of two that brings the field's range near 1: for differences */

@@ -10,6 +10,7 @@
 #include "kernel_clip.h"
 #include "kernel_colour.h"
 #include "kernel_hits.h"
+#include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_tile_trace.h"
@@ -231,14 +232,16 @@ static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p,
     f->transmittance = vf_select(is_below, (1.0f - vf_abs(u)) * side_v, v);
 }
 
-/* Paints hits as the job asks; kind is that of the fragments. */
+/* Paints hits as the job asks; kind is that of the fragments. What takes no light is done, as nothing waits for it. */
 SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
                               kernel_fragments *f)
 {
+    const render_paint paint = p->frame->job->paint;
     kernel_packet_view(p);
-    if (__builtin_expect(p->frame->job->paint == RENDER_LIGHT, 1))
+    if (__builtin_expect(paint == RENDER_LIGHT, 1) ||
+        (paint == RENDER_UNLIT && !render_takes_light(&s->layer->material)))
         kernel_shade(p, &s->layer->material, normal, f->colour);
-    else if (p->frame->job->paint == RENDER_UNLIT)
+    else if (paint == RENDER_UNLIT)
         kernel_paint_unlit(p, normal, f);
     else
         kernel_paint_numbers(p, normal, kind, f->colour);
@@ -287,10 +290,11 @@ static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const ke
     return vm_andnot(hit, waits);
 }
 
-/* Hits: the depth, a vector along the normal (or the coordinates from which kernel_vertex_normals() makes one), and the
- * value that the surface is coloured by. */
+/* Hits: the depth, a vector along the normal (or the coordinates from which kernel_vertex_normals() makes one), the
+ * value that the surface is coloured by, and the field of its contour lines (NULL: it has none). */
 typedef struct kernel_hit_places {
     vf t, normal[3], w;
+    const kernel_along *along;
 } kernel_hit_places;
 
 /* Returns the value that colours the surface, or else its isovalue. w is the value's place along the colour map's

@@ -195,7 +195,8 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     b->is_of_faces = t->surface->layer->is_of_faces;
     kernel_arrays_begin(&b->arrays, t->frame->job->parts[part].cells,
                         &t->frame->surfaces[layer].layer->field.fields[part]);
-    b->takes_batches = b->arrays.has_lanes && !t->surface->layer->colour_map && kernel_tile_layer_batches(t);
+    b->takes_batches = b->arrays.has_lanes && !t->surface->layer->colour_map && !t->surface->layer->lines &&
+                       kernel_tile_layer_batches(t);
 }
 
 /* The last ones. */

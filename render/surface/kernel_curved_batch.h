@@ -29,6 +29,7 @@
 #include "kernel_colour.h"
 #include "kernel_contraction.h"
 #include "kernel_curved_rays.h"
+#include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_placed_curved.h"
@@ -61,6 +62,7 @@ typedef struct kernel_curved_batch {
     kernel_curved_batch_pending *own;       /* those that are traced */
     kernel_placed_curved placed;
     float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
+    float lines[8][SIMD_WIDTH];   /* of the field of contour lines; likewise */
     kernel_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
@@ -78,6 +80,7 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
         h->pending[n].count = 0;
     }
     memset(h->colours, 0, sizeof h->colours);
+    memset(h->lines, 0, sizeof h->lines);
 }
 
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
@@ -99,6 +102,7 @@ SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
     h->cells[n].part = h->part;
     h->cells[n].index = h->own->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
+    for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->placed.vertex[i][n];
 }
 
 /* Rays that are for the cell alone. */
@@ -270,6 +274,17 @@ static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_til
     KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
 }
 
+/* Finds how the lines' field goes along the surface at r in each ray's own cell. */
+SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
+                                           const vf r[3], kernel_along *out, int type)
+{
+    kernel_map_lanes map;
+    vf c[8];
+    kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, lane, &map, type);
+    kernel_maps_polynomial((const float(*)[SIMD_WIDTH])h->lines, lane, c, type);
+    kernel_map_along(&t->tile, &map, c, r, out);
+}
+
 /* The colours' field of the lanes' cells, in the order of their vertices. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const kernel_tile_trace *t,
                                                                         kernel_curved_batch *h)
@@ -290,6 +305,36 @@ typedef struct kernel_curved_batch_places {
     vf t, normal[3], r[3];
 } kernel_curved_batch_places;
 
+/* The lines' field, likewise. */
+static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
+                                                                      kernel_curved_batch *h)
+{
+    const grid_field *field = &t->surface->layer->lines->field.fields[h->part];
+    for (int n = 0; n < h->own->count; n++)
+        for (int i = 0; i < grid_type_vertices(h->own->type); i++)
+            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->placed.vertex[i][n]);
+}
+
+/* Finds the colours of hits that are not each of their isovalue's colour alone. */
+static __attribute__((noinline)) void
+kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batch *h, const uint8_t *lanes,
+                            const kernel_lane_rays *p, const kernel_curved_batch_places *places, vf colours[3])
+{
+    const render_surface_layer *layer = t->surface->layer;
+    if (layer->colour_map) {
+        const vf place =
+            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->own->type);
+        kernel_base_colour(t->surface, 0, place, colours);
+    } else {
+        for (int i = 0; i < SIMD_WIDTH; i++)
+            for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->own->value[lanes[i]] + a];
+    }
+    if (!layer->lines) return;
+    kernel_along along;
+    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_along, t, h, p->lane, places->r, &along);
+    kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
+}
+
 /* Returns the blocks in which something is nearer. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
@@ -297,14 +342,11 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
                                                                      const kernel_curved_batch_places *places)
 {
     const render_surface_layer *layer = t->surface->layer;
+    const bool has_own = layer->colour_map || layer->lines;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     vf colours[3];
-    if (layer->colour_map) {
-        const vf place =
-            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->own->type);
-        kernel_base_colour(t->surface, 0, place, colours);
-    }
+    if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, places, colours);
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), value = h->own->value[rays->lane[first + i]];
@@ -314,9 +356,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
                                     .cell = h->own->cell[rays->lane[first + i]],
                                     .depth = places->t[i],
                                     .normal = {places->normal[0][i], places->normal[1][i], places->normal[2][i]},
-                                    .colour = {layer->colour_map ? colours[0][i] : plain[0],
-                                               layer->colour_map ? colours[1][i] : plain[1],
-                                               layer->colour_map ? colours[2][i] : plain[2]}};
+                                    .colour = {has_own ? colours[0][i] : plain[0], has_own ? colours[1][i] : plain[1],
+                                               has_own ? colours[2][i] : plain[2]}};
         blocks |= kernel_ray_accept(t, at[i], &one);
     }
     return blocks;
@@ -482,6 +523,7 @@ static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trac
         kernel_place_curved(&h->placed, &h->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
     kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
+    if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->ready = 0;
     kernel_curved *const alone = t->curved;
     kernel_curved cells = kernel_curved_batch_cells(h);

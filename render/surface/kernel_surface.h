@@ -23,6 +23,7 @@
 #include "kernel_differences.h"
 #include "kernel_edges.h"
 #include "kernel_hits.h"
+#include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
@@ -48,6 +49,7 @@ SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int valu
 typedef struct kernel_accepted {
     int value;
     vf t, reach;
+    vf opacity; /* of transparent surfaces */
     kernel_look look;
     kernel_hit_cells cells;
 } kernel_accepted;
@@ -93,15 +95,32 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
 {
     const kernel_surface *s = state->surface;
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
-    const float opacity = s->layer->opacity;
     kernel_hits_cut(state->hits, hit, h->t);
     if (s->layer->normal == RENDER_DIFFERENCES) hit = kernel_differ(p, s, h->value, hit, h->t, h->reach, &h->look);
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, &h->cells, h->look.normal);
     const vf *colour = h->look.colour;
-    kernel_fragments f = {h->t, h->t, {colour[0], colour[1], colour[2]}, vf_set(1 - opacity), vf_set(0)};
+    kernel_fragments f = {h->t, h->t, {colour[0], colour[1], colour[2]}, 1.0f - h->opacity, vf_set(0)};
     kernel_paint(p, s, h->look.normal, vf_set((float)kind), &f);
-    for (int a = 0; a < 3; a++) f.colour[a] *= opacity;
+    for (int a = 0; a < 3; a++) f.colour[a] *= h->opacity;
     kernel_emit(p, hit, kind, &f);
+}
+
+/* Draws contour lines over the hits' colours, unless these are numbers. Returns the hits that are seen: where lines are
+ * alone, those that one covers. */
+static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
+                                                        const kernel_hit_places *at, kernel_accepted *h)
+{
+    const kernel_rays rays = kernel_packet_rays(p);
+    const bool is_alone = s->layer->lines->is_alone, are_numbers = p->frame->job->paint == RENDER_VALUES;
+    if (are_numbers && !is_alone) return hit;
+    vf colour[3] = {h->look.colour[0], h->look.colour[1], h->look.colour[2]};
+    const vf share = kernel_draw_lines(p->frame, p->tile, s, &rays, at->t, at->along, colour);
+    for (int a = 0; a < 3 && !are_numbers; a++) h->look.colour[a] = colour[a];
+    if (are_numbers && !s->layer->colour_map)
+        h->look.colour[0] = at->along->value * (float)(1 / s->lines.inverse_width) + (float)s->lines.low;
+    if (!is_alone) return hit;
+    h->opacity *= share;
+    return vm_and(hit, vf_lt(vf_set(0), share));
 }
 
 /* Takes hits: the nearest are kept; those of a transparent surface are written at once. c: NULL of polyhedra. */
@@ -119,6 +138,8 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         h.look.colour[0] = kernel_surface_value(s, value, at->w);
     else if (s->layer->edge_width > 0 && c)
         kernel_draw_edges(p, s->layer, c, at->t, h.look.colour);
+    h.opacity = vf_set(s->layer->opacity);
+    if (__builtin_expect(at->along != NULL, 0)) hit = kernel_accept_lines(p, s, hit, at, &h);
     if (state->is_opaque)
         kernel_accept_opaque(p, state, hit, &h);
     else
@@ -145,7 +166,19 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
         at.w = i.w_in + along * (i.w_out - i.w_in);
     }
+    kernel_along along;
+    if (state->surface->layer->lines) {
+        kernel_tet_along(p, state->surface, c, t, at.normal, &along);
+        at.along = &along;
+    }
     kernel_accept(p, state, c, value, hit, &at);
+}
+
+/* As kernel_maps_value(), in one function for all types. */
+static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
+                                                              int type)
+{
+    return KERNEL_OF_TYPE(type, kernel_maps_value, values, lane, r);
 }
 
 /* Takes the crossings of the isovalue that are visible, and returns them. */
@@ -164,6 +197,11 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
     }
     if (state->surface->layer->colour_map)
         places.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
+    kernel_along along;
+    if (state->surface->layer->lines) {
+        kernel_curved_along(p, state->surface, c, map, at->r, &along);
+        places.along = &along;
+    }
     kernel_accept(p, state, c, value, hit, &places);
     return hit;
 }
@@ -312,34 +350,18 @@ static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, in
     c->g[c->vertex_count] = (float)sum;
 }
 
-/* Solves for the gradient of a field that changes by df along d, by Cramer's rule. */
-SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
-{
-    double n[3][3];
-    for (int i = 0; i < 3; i++) {
-        const double *u = d[(i + 1) % 3], *v = d[(i + 2) % 3];
-        for (int a = 0; a < 3; a++) n[i][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
-    }
-    const double volume = d[0][0] * n[0][0] + d[0][1] * n[0][1] + d[0][2] * n[0][2];
-    for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
-}
-
 /* Computes the gradient of the field in a tet, in camera axes and in double. */
 static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
 {
-    const int *vertex = c->facets[facet].vertex, centre = c->vertex_count;
-    const double scale = p->frame->job->space.scale;
-    double d[3][3], df[3], g[3];
-    for (int i = 0; i < 3; i++) {
-        df[i] = (double)c->f[vertex[i]] - (double)c->f[centre];
-        for (int a = 0; a < 3; a++) d[i][a] = (c->world[vertex[i]][a] - c->world[centre][a]) * scale;
+    const double *corner[4];
+    double value[4];
+    for (int i = 0; i < 4; i++) {
+        const int v = i < 3 ? c->facets[facet].vertex[i] : c->vertex_count;
+        corner[i] = c->world[v];
+        value[i] = (double)c->f[v];
     }
-    kernel_gradient(d, df, g);
-    for (int a = 0; a < 3; a++) {
-        const double *axis = p->frame->scaled_axes[a];
-        const double along = (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) / scale;
-        out[a] = along > 1e18 ? 1e18 : along >= -1e18 ? along : -1e18;
-    }
+    kernel_tet_gradient(p->frame, corner, value, out);
+    for (int a = 0; a < 3; a++) out[a] = out[a] > 1e18 ? 1e18 : out[a] >= -1e18 ? out[a] : -1e18;
 }
 
 /* Finds the signed sum of gradients where tets overlap. Returns the rays that have one. */
@@ -581,6 +603,42 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
     return found;
 }
 
+/* Finds how the lines' field goes along the surface at the hits: in the tet that holds the hit or is nearest to it. */
+static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packet *p, const kernel_surface *s,
+                                                              const kernel_passage *r, vm hit, vf t, kernel_along *out)
+{
+    const polyhedron *c = r->cell;
+    const grid_field *field = &s->layer->lines->field.fields[c->part];
+    int32_t facets[SIMD_WIDTH];
+    double mean = 0;
+    kernel_polyhedron_facets(r, hit, t, facets);
+    for (int i = 0; i < c->vertex_count; i++) mean += kernel_lines_value(s, field, c->vertices[i]) / c->vertex_count;
+    *out = (kernel_along){.value = vf_set(NAN)};
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int ray = __builtin_ctz(left);
+        if (facets[ray] < 0) continue;
+        const double *corner[4];
+        double place[4][3], value[4], point[3], share[4], g[3], n[3];
+        for (int i = 0; i < 4; i++) {
+            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : c->vertex_count;
+            const double at[3] = {(double)c->x[v], (double)c->y[v], (double)c->z[v]};
+            memcpy(place[i], at, sizeof at);
+            corner[i] = c->world[v];
+            value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[v]) : mean;
+        }
+        kernel_ray_point(p, ray, t[ray], point);
+        kernel_barycentric((const double(*)[3])place, point, share);
+        kernel_tet_gradient(p->frame, corner, value, g);
+        kernel_polyhedron_gradient(p, c, facets[ray], n);
+        out->value[ray] =
+            (float)((share[0] * value[0] + share[1] * value[1]) + (share[2] * value[2] + share[3] * value[3]));
+        for (int a = 0; a < 3; a++) {
+            out->gradient[a][ray] = (float)g[a];
+            out->normal[a][ray] = (float)n[a];
+        }
+    }
+}
+
 static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_passage *r,
                                      vm hit, const kernel_walk *walk)
 {
@@ -591,6 +649,11 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
         kernel_polyhedron_smooth(p, r->cell, state->surface->layer, r, hit, walk->t, at.normal);
     else
         kernel_polyhedron_normal(p, r->cell, r, hit, walk->t, at.normal);
+    kernel_along along;
+    if (state->surface->layer->lines) {
+        kernel_polyhedron_along(p, state->surface, r, hit, walk->t, &along);
+        at.along = &along;
+    }
     kernel_accept(p, state, NULL, value, hit, &at);
 }
 

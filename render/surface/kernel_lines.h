@@ -1,0 +1,178 @@
+/* Contour lines on surfaces: where another field, interpolated in the cell that is hit, has one of the layer's levels.
+ *
+ * A hit is as many pixels away from the line of a level as |f - level| over the change of f from one pixel to the next.
+ * That change is along the surface: the rays through the neighbouring pixels meet the surface's tangent plane beside
+ * the hit. With a ray of direction d (1 along the view's axis), a surface normal n and the gradient g of f, a step
+ * across the view at the hit's depth, and then along the ray back to the plane, changes f by
+ *
+ *      G = (gx, gy) - (nx, ny) (g.d) / (n.d)
+ *
+ * times the step's length, which is a pixel's size at that depth. A line covers of a pixel what a strip of its width
+ * covers of a box of one pixel: a ramp one pixel wide at either side. Where lines are less than two widths apart they
+ * fade, and at one width they are gone, for else nothing but lines would be seen.
+ *
+ * Everything is computed from the cell and the ray alone, so that lines are the same on any partition. */
+#ifndef RENDER_KERNEL_LINES_H
+#define RENDER_KERNEL_LINES_H
+
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_colour.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "render.h"
+#include "simd.h"
+
+/* The lines' field at hits, by the levels' domain; its gradient per scaled unit, and a vector of any length along the
+ * surface's normal, both in camera axes. */
+typedef struct kernel_along {
+    vf value, gradient[3], normal[3];
+} kernel_along;
+
+/* Returns the field's value at a vertex, or NaN, in the levels' domain. */
+SIMD_INLINE double kernel_lines_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
+{
+    return (grid_field_value(field, vertex) - s->lines.low) * s->lines.inverse_width;
+}
+
+/* Solves for the gradient of a field that changes by df along d, by Cramer's rule. */
+SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
+{
+    double n[3][3];
+    for (int i = 0; i < 3; i++) {
+        const double *u = d[(i + 1) % 3], *v = d[(i + 2) % 3];
+        for (int a = 0; a < 3; a++) n[i][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+    }
+    const double volume = d[0][0] * n[0][0] + d[0][1] * n[0][1] + d[0][2] * n[0][2];
+    for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
+}
+
+/* Computes the gradient of a field in the tet of these corners, per scaled unit, in camera axes. */
+SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const corner[4], const double value[4],
+                                     double out[3])
+{
+    const double scale = f->job->space.scale;
+    double d[3][3], df[3], g[3];
+    for (int i = 0; i < 3; i++) {
+        df[i] = value[i] - value[3];
+        for (int a = 0; a < 3; a++) d[i][a] = (corner[i][a] - corner[3][a]) * scale;
+    }
+    kernel_gradient((const double(*)[3])d, df, g);
+    for (int a = 0; a < 3; a++) {
+        const double *axis = f->scaled_axes[a];
+        out[a] = (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) / scale;
+    }
+}
+
+/* Finds how the lines' field goes along the surface of a tet. t, normal: of hits, as kernel_tet_normal() has it. */
+static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, const kernel_surface *s,
+                                                       const kernel_cell *c, vf t, const vf normal[3],
+                                                       kernel_along *out)
+{
+    const grid_field *field = &s->layer->lines->field.fields[c->part];
+    const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
+    double value[4], g[3];
+    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
+    kernel_tet_gradient(p->frame, corner, value, g);
+    /* In tile space the third axis is the middle ray. */
+    const double shear[2] = {(double)p->tile->shear_x, (double)p->tile->shear_y};
+    const vf x = (p->origin_x + p->slope_x * t) - c->x[3], y = (p->origin_y + p->slope_y * t) - c->y[3];
+    const float along = (float)(g[2] + (g[0] * shear[0] + g[1] * shear[1]));
+    out->value = ((float)value[3] + x * (float)g[0]) + (y * (float)g[1] + (t - c->z[3]) * along);
+    for (int a = 0; a < 3; a++) {
+        out->gradient[a] = vf_set((float)g[a]);
+        out->normal[a] = normal[a];
+    }
+}
+
+/* Finds how the lines' field goes along the surface at r, each lane in its own cell, of which line has the field's
+ * polynomial. */
+SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map_lanes *map, const vf line[8], const vf r[3],
+                                  kernel_along *out)
+{
+    const kernel_product m = kernel_product_at(map->is_pyramid, r);
+    kernel_jacobian j;
+    vf n[3], g[3];
+    kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
+    kernel_gradient_of(map->field, map->is_pyramid, &m, r, n);
+    kernel_gradient_of(line, map->is_pyramid, &m, r, g);
+    for (int a = 0; a < 3; a++) {
+        out->normal[a] = kernel_dot(j.cross[a], n);
+        out->gradient[a] = kernel_dot(j.cross[a], g) / j.det;
+    }
+    out->normal[2] -= out->normal[0] * tile->shear_x + out->normal[1] * tile->shear_y;
+    out->gradient[2] -= out->gradient[0] * tile->shear_x + out->gradient[1] * tile->shear_y;
+    out->value = kernel_value_of(line, map->is_pyramid, &m, r);
+}
+
+/* As above, of a packet's hits in one hex, wedge or pyramid. */
+static __attribute__((noinline)) void kernel_curved_along(const kernel_packet *p, const kernel_surface *s,
+                                                          const kernel_cell *c, const kernel_map_lanes *map,
+                                                          const vf r[3], kernel_along *out)
+{
+    const grid_field *field = &s->layer->lines->field.fields[c->part];
+    kernel_polynomial line;
+    float value[GRID_MAX_CELL_VERTICES];
+    double unused[8];
+    vf spread[8];
+    for (int i = 0; i < c->count; i++) value[i] = (float)kernel_lines_value(s, field, c->vertices[i]);
+    kernel_polynomial_of_floats(&line, c->type, value, 0, unused);
+    kernel_polynomial_spread(&line, spread);
+    kernel_map_along(p->tile, map, spread, r, out);
+}
+
+/* The share of each hit's pixel that the nearest line covers, and which line that is. */
+typedef struct kernel_cover {
+    vf share;
+    vi line;
+} kernel_cover;
+
+/* The share is 0 where the field does not change, or is not a number. */
+static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
+                                                                 const kernel_surface *s, const kernel_rays *rays, vf t,
+                                                                 const kernel_along *at)
+{
+    const kernel_lines *l = &s->lines;
+    const vf zero = vf_set(0), one = vf_set(1), *g = at->gradient, *n = at->normal;
+    const bool flat = f->job->camera.is_orthographic;
+    const vf depth = flat ? vf_set((float)f->job->space.scale) : (vf)(t + (float)f->depth_shift);
+    const vf pixel = depth * (float)f->slope_dx;
+    const vf dx = rays->slope_x + tile->shear_x, dy = rays->slope_y + tile->shear_y;
+    const vf turn = ((g[0] * dx + g[1] * dy) + g[2]), tilt = ((n[0] * dx + n[1] * dy) + n[2]);
+    const vf change[3] = {(g[0] - n[0] / tilt * turn) * pixel, (g[1] - n[1] / tilt * turn) * pixel, zero};
+    kernel_cover out = {zero, vi_set(0)};
+    vf distance = vf_set(INFINITY), gap = distance;
+    vm still;
+    const vf inverse = kernel_inverse_length(change, &still);
+    for (int i = 0; i < l->count; i++) {
+        const vf away = vf_abs(at->value - l->level[i]);
+        const vm nearer = vf_lt(away, distance);
+        distance = vf_select(nearer, away, distance);
+        gap = vf_select(nearer, vf_set(l->gap[i]), gap);
+        out.line = vi_select(nearer, vi_set(i), out.line);
+    }
+    const float width = s->layer->lines->width, most = width < 1 ? width : 1;
+    const vf covered = vf_min(0.5f * (width + 1) - distance * inverse, vf_set(most));
+    const vf fade = vf_clamp(gap * inverse / width - 1.0f, zero, one);
+    out.share = vf_select(vm_andnot(vf_lt(zero, covered), still), covered * fade, zero);
+    return out;
+}
+
+/* Draws the lines over colours that are not lit yet; returns the share that they cover. */
+SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
+                                 const kernel_rays *rays, vf t, const kernel_along *at, vf colour[3])
+{
+    const float *colours = s->layer->lines->colours;
+    const kernel_cover cover = kernel_lines_cover(f, tile, s, rays, t, at);
+    for (int a = 0; a < 3 && colours; a++) {
+        const vf own = vf_gather(colours + a, cover.line * 3);
+        colour[a] = s->layer->lines->is_alone ? own : (vf)(colour[a] + cover.share * (own - colour[a]));
+    }
+    return cover.share;
+}
+
+#endif

@@ -1,0 +1,330 @@
+/* Contour lines on surfaces against closed forms: where the line of a level goes in the picture follows from the
+ * surface's and the field's formulas alone, and the share of a pixel that a strip of the line's width covers from
+ * counting points of the pixel that are nearer to it than half the width. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_render_fixture.h"
+
+enum { WIDTH = 97, HEIGHT = 83, PIXELS = WIDTH * HEIGHT, POINTS = 16 };
+
+static const double through = 0;
+static const double normal[3] = {0.36, -0.48, 0.8};
+static const float black[3] = {0, 0, 0};
+static const float white[12] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+
+/* ---- surfaces and fields ---------------------------------------------------------------------------------------- */
+
+static double distance(const double p[3])
+{
+    return normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - 0.1;
+}
+
+static double square_radius(const double p[3])
+{
+    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - 0.64;
+}
+
+/* Depth of the plane or of the sphere on a ray. */
+static double plane_depth(const double base[3], const double direction[3])
+{
+    const double along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
+    return -distance(base) / along;
+}
+
+static double sphere_depth(const double base[3], const double direction[3])
+{
+    double a = 0, b = 0;
+    for (int i = 0; i < 3; i++) {
+        a += direction[i] * direction[i];
+        b += base[i] * direction[i];
+    }
+    return (-b - sqrt(b * b - a * square_radius(base))) / a;
+}
+
+static double quadratic(const double p[3])
+{
+    return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.3 * p[2] - 0.2 * p[0] * p[2];
+}
+
+typedef struct lines_case {
+    const char *name;
+    test_function *surface;
+    double (*depth)(const double base[3], const double direction[3]);
+    test_function *field;
+    fixture_camera camera;
+    float width;
+    int cubes;     /* of the lattice along an axis */
+    double jitter; /* of its vertices */
+    int count;
+    double values[4];
+} lines_case;
+
+/* A linear field is linear in every cell, and so is the distance from a plane: cells may be of any size. Of the others
+ * the cells' interpolants are off by the square of their size, at most h^2 / 8 times the sum of the second derivatives
+ * (for the quadratic 3, for the square of the radius 6): on 40 cubes 9e-4 and 2e-3, in places 1e-3 of the scene, by
+ * slopes of 1 and more, or 0.04 of a pixel. */
+static const lines_case cases[] = {
+    {"a linear field on a plane", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 1.5F, 4, 0.2, 3, {-0.3, 0, 0.25}},
+    {"thin lines", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 0.7F, 4, 0.2, 2, {-0.1, 0.3}},
+    {"wide lines", distance, plane_depth, test_linear, CAMERA_ORTHOGRAPHIC, 4, 4, 0.2, 2, {-0.3, 0.25}},
+    {"a quadratic field on a plane", distance, plane_depth, quadratic, CAMERA_OUTSIDE, 1.5F, 40, 0.1, 3, {0.2, 0.5, 1}},
+    {"a linear field on a sphere",
+     square_radius,
+     sphere_depth,
+     test_linear,
+     CAMERA_OUTSIDE,
+     1.5F,
+     40,
+     0,
+     2,
+     {-0.1, 0.3}},
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+/* ---- the truth --------------------------------------------------------------------------------------------------- */
+
+typedef struct truth {
+    const lines_case *of;
+    render_camera camera;
+    double cover[PIXELS]; /* -1: the surface or the cube ends nearby, or two lines are near */
+} truth;
+
+/* The field at a place of the picture, (0, 0) being the middle of the first pixel; NaN beside the surface, and where
+ * that is near the border of the cube. */
+static double field_at(const truth *t, double x, double y)
+{
+    render_camera camera = t->camera;
+    double base[3], direction[3], at[3];
+    camera.offset[0] = x;
+    camera.offset[1] = y;
+    render_camera_ray(&camera, 0, 0, base, direction);
+    const double z = t->of->depth(base, direction);
+    if (!(z > 0)) return NAN;
+    for (int a = 0; a < 3; a++) {
+        at[a] = base[a] + z * direction[a];
+        if (!(fabs(at[a]) < 1)) return NAN;
+    }
+    return t->of->field(at);
+}
+
+/* The distance of a place from the line of a level: Newton's method along the slope in the picture. */
+static double line_distance(const truth *t, double level, double x, double y)
+{
+    const double h = 1e-3;
+    double px = x, py = y;
+    for (int step = 0; step < 4; step++) {
+        const double dx = (field_at(t, px + h, py) - field_at(t, px - h, py)) / (2 * h);
+        const double dy = (field_at(t, px, py + h) - field_at(t, px, py - h)) / (2 * h);
+        const double move = (field_at(t, px, py) - level) / (dx * dx + dy * dy);
+        px -= move * dx;
+        py -= move * dy;
+    }
+    return hypot(px - x, py - y);
+}
+
+/* The share of points in the pixel that the strip holds; no more than half a pixel's diagonal from its middle. */
+static double exact_cover(const truth *t, double level, double x, double y)
+{
+    const double reach = 0.5 * (double)t->of->width, middle = line_distance(t, level, x, y);
+    int inside = 0;
+    if (middle > reach + 1) return 0;
+    for (int j = 0; j < POINTS; j++)
+        for (int i = 0; i < POINTS; i++)
+            inside += line_distance(t, level, x + (i + 0.5) / POINTS - 0.5, y + (j + 0.5) / POINTS - 0.5) <= reach;
+    return (double)inside / (POINTS * POINTS);
+}
+
+static bool is_inside(const truth *t, double x, double y)
+{
+    const double far = (double)t->of->width + 3;
+    return isfinite(field_at(t, x - far, y - far)) && isfinite(field_at(t, x + far, y - far)) &&
+           isfinite(field_at(t, x - far, y + far)) && isfinite(field_at(t, x + far, y + far));
+}
+
+static double pixel_cover(const truth *t, int x, int y)
+{
+    int nearest = 0;
+    double value = field_at(t, x, y);
+    if (!is_inside(t, x, y)) return -1;
+    for (int i = 1; i < t->of->count; i++)
+        if (fabs(value - t->of->values[i]) < fabs(value - t->of->values[nearest])) nearest = i;
+    return exact_cover(t, t->of->values[nearest], x, y);
+}
+
+static truth *find_truth(const lines_case *of, const render_camera *camera)
+{
+    truth *t = malloc(sizeof *t);
+    assert_non_null(t);
+    t->of = of;
+    t->camera = *camera;
+    for (int p = 0; p < PIXELS; p++) t->cover[p] = pixel_cover(t, p % WIDTH, p / WIDTH);
+    return t;
+}
+
+/* ---- frames ------------------------------------------------------------------------------------------------------ */
+
+typedef struct lines_frame {
+    render_fixture f;
+    test_mesh mesh;
+    test_view field;
+    render_lines lines;
+} lines_frame;
+
+/* White lines on black. kind: of the cells. */
+static void create_frame(lines_frame *out, const lines_case *of, test_mesh_kind kind, test_layout layout)
+{
+    test_mesh lines;
+    test_mesh_lattice(kind, of->cubes, of->jitter, of->surface, &out->mesh);
+    test_mesh_lattice(kind, of->cubes, of->jitter, of->field, &lines);
+    test_view_create(&lines, layout, &out->field);
+    test_mesh_free(&lines);
+    fixture_create(&out->f, &out->mesh, 1, layout, 2.0 / of->cubes, 1, (const double[]){0, 0, 0});
+    fixture_look(&out->f, of->camera, WIDTH, HEIGHT);
+    fixture_add_surface(&out->f, &through, 1, 1);
+    out->lines = (render_lines){.field = {&out->field.field, out->f.ranges},
+                                .count = of->count,
+                                .values = of->values,
+                                .width = of->width,
+                                .colours = white};
+    out->f.surfaces[0].lines = &out->lines;
+    out->f.surfaces[0].colours = black;
+    out->f.surfaces[0].material = (render_material){.ambient = 1, .shininess = 1};
+}
+
+static void free_frame(lines_frame *frame)
+{
+    test_view_free(&frame->field);
+    test_mesh_free(&frame->mesh);
+    fixture_free(&frame->f);
+}
+
+typedef struct lines_error {
+    int count;
+    double squares, drawn, exact; /* sums over the pixels that lines touch */
+} lines_error;
+
+static lines_error compare(const truth *t, const drawn_frame *drawn)
+{
+    lines_error e = {0};
+    for (int p = 0; p < PIXELS; p++) {
+        const double is = (double)drawn->picture.rgba[4 * p], off = is - t->cover[p];
+        if (t->cover[p] < 0 || (t->cover[p] == 0 && is == 0)) continue;
+        e.count++;
+        e.squares += off * off;
+        e.drawn += is;
+        e.exact += t->cover[p];
+    }
+    return e;
+}
+
+/* ---- tests ------------------------------------------------------------------------------------------------------- */
+
+static const test_layout layouts[2] = {{.wide_coordinates = true, .wide_values = true, .wide_indices = true},
+                                       {.is_interleaved = true}};
+
+/* The root of the mean square of a pixel's error is asked to be 0.02. A ramp of one pixel for every direction of a line
+ * is off by up to 0.06 where a diagonal line's own is wider. Sums of coverage are the width times the length. */
+static void check_frame(const truth *t, const lines_frame *frame, const char *kind, int set)
+{
+    drawn_frame drawn;
+    fixture_use_set(set);
+    fixture_draw(&frame->f, &drawn);
+    const lines_error e = compare(t, &drawn);
+    const double rms = sqrt(e.squares / e.count), share = e.drawn / e.exact;
+    if (getenv("TEST_LINES_SHOW"))
+        printf("%s, %s, %s: %d pixels, %.4f rms, width %.4f\n", t->of->name, kind, fixture_set_name(set), e.count, rms,
+               share);
+    if (!(e.count > 100 && rms < 0.02 && fabs(share - 1) < 0.01))
+        fail_msg("%s, %s, %s: %d pixels, %g rms, %g of the width", t->of->name, kind, fixture_set_name(set), e.count,
+                 rms, share);
+    drawn_free(&drawn);
+}
+
+/* Of fine lattices, tets and hexes alone. */
+static void check_case(const lines_case *of)
+{
+    truth *t = NULL;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        lines_frame frame;
+        if (of->cubes > 8 && kind != TEST_TETS && kind != TEST_HEXES) continue;
+        create_frame(&frame, of, kind, layouts[(int)kind % 2]);
+        if (!t) t = find_truth(of, &frame.f.job.camera);
+        for (int set = 0; set < fixture_set_count(); set++) check_frame(t, &frame, test_mesh_kind_name(kind), set);
+        free_frame(&frame);
+    }
+    free(t);
+}
+
+static void lines_cover_what_strips_do(void **state)
+{
+    (void)state;
+    for (int i = 0; i < CASES; i++) check_case(&cases[i]);
+}
+
+/* Whole, and in the parts of three ranks, of every partition: the same bits. */
+static void lines_are_the_same_on_any_partition(void **state)
+{
+    (void)state;
+    enum { RANKS = 3 };
+    const lines_case *of = &cases[0];
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++) {
+            static render_fixture parts[RANKS];
+            static test_view fields[RANKS];
+            static render_lines lines[RANKS];
+            lines_frame whole;
+            test_mesh values;
+            drawn_frame one, several;
+            create_frame(&whole, of, kind, layouts[0]);
+            test_mesh_lattice(kind, of->cubes, of->jitter, of->field, &values);
+            int *owners = malloc((size_t)values.cell_count * sizeof *owners);
+            assert_non_null(owners);
+            test_partition(&values, partition, of->cubes, RANKS, owners);
+            for (int rank = 0; rank < RANKS; rank++) {
+                test_mesh part;
+                test_mesh_part(&values, owners, rank, &part);
+                test_view_create(&part, layouts[0], &fields[rank]);
+                test_mesh_free(&part);
+                test_mesh_part(&whole.mesh, owners, rank, &part);
+                fixture_create(&parts[rank], &part, 1, layouts[0], 2.0 / of->cubes, 1, (const double[]){0, 0, 0});
+                test_mesh_free(&part);
+                lines[rank] = whole.lines;
+                lines[rank].field = (render_field){&fields[rank].field, parts[rank].ranges};
+                fixture_look(&parts[rank], of->camera, WIDTH, HEIGHT);
+                fixture_add_surface(&parts[rank], &through, 1, 1);
+                parts[rank].surfaces[0] = whole.f.surfaces[0];
+                parts[rank].surfaces[0].field = (render_field){parts[rank].fields, parts[rank].ranges};
+                parts[rank].surfaces[0].lines = &lines[rank];
+            }
+            fixture_draw(&whole.f, &one);
+            fixture_draw_apart(parts, RANKS, &several);
+            drawn_assert_same(&one, &several);
+            for (int rank = 0; rank < RANKS; rank++) {
+                fixture_free(&parts[rank]);
+                test_view_free(&fields[rank]);
+            }
+            free(owners);
+            test_mesh_free(&values);
+            drawn_free(&one);
+            drawn_free(&several);
+            free_frame(&whole);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lines_cover_what_strips_do),
+        cmocka_unit_test(lines_are_the_same_on_any_partition),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
