@@ -141,9 +141,10 @@ static const char every_key[] =
     "    camera:\n"
     "      automatic: {zoom: 0.9}\n"
     "      orbit: {views: 4, axis: [0, 0, 2], elevation: [-10, 20.5], start: 45}\n"
-    "    sweep: {isovalues: true, fields: [p, r]}\n"
+    "    sweep: {isovalues: true, planes: true, fields: [p, r]}\n"
     "    layers:\n"
     "      - isosurface: {field: q, values: [1, 2, 3], colour_by: {field: p}}\n"
+    "      - slice: {field: p, planes: [{normal: x}]}\n"
     "    outputs:\n"
     "      - {cinema: runs/all.cdb}\n"
     "      - {path: \"d{view:02}{isovalue:.1f}{field}.exr\"}\n"
@@ -1036,7 +1037,7 @@ static const struct bad_file {
      {"path[0].position[0]: \"1e31"}},
     {6, "    camera: {automatic: {}, path: [" AT_THE("time: 1") "]}", 6, {"camera.automatic: given beside path"}},
     {6, "    camera: {orbit: {views: 2}, path: [" AT_THE("time: 1") "]}", 6, {"camera.path: given beside orbit"}},
-    {6, "    sweep: {}", 6, {"images[0].sweep: holds nothing", "isovalues: true, fields"}},
+    {6, "    sweep: {}", 6, {"images[0].sweep: holds nothing", "isovalues: true, planes: true, fields"}},
     {6, "    sweep: {isovalues: 3}", 6, {"sweep.isovalues: \"3\"", "true or false"}},
     {6,
      "    sweep: {isovalues: true}",
@@ -1249,6 +1250,7 @@ static void check_mapping(const scene_mapping *mapping)
         const bool is_optional = field->value.flags & CYAML_FLAG_OPTIONAL;
         char in_file[64];
         snprintf(in_file, sizeof in_file, "%s:", field->key);
+                 {"{plane} {plane:03}", 1, "7 007"},
         if (!key->help || strlen(key->help) < 10) fail_msg("%s.%s has no help", mapping->title, field->key);
         if (is_optional == !key->by_default) fail_msg("%s.%s: default and optional differ", mapping->title, field->key);
         if (is_of_mappings(&field->value) == !key->child) fail_msg("%s.%s: child", mapping->title, field->key);

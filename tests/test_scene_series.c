@@ -149,6 +149,36 @@ static void sweeps_make_each_combination_once(void **state)
     scene_free(&s);
 }
 
+static void sweeps_go_through_planes(void **state)
+{
+    (void)state;
+    static const double shares[] = {-0.5, 0.5}, offsets[] = {-1, 0, 2};
+    scene s;
+    parse_good("images:\n- name: a\n  sweep: {isovalues: true, planes: true}\n  layers:\n"
+               "  - slice: {field: p, planes: [{normal: x, offsets: [-1, 0, 2]}, {normal: y, count: 2}]}\n"
+               "  - isosurface: {field: q, values: [3, 4]}\n"
+               "  outputs: [{cinema: a.cdb}, {path: \"{isovalue}_{plane}.png\"}]\n",
+               &s);
+    assert_int_equal(s.image_count, 2 * 5);
+    assert_true(s.databases[0].has_planes && s.databases[0].has_isovalues);
+    for (int i = 0; i < 10; i++) {
+        const scene_image *image = &s.images[i];
+        const scene_slice *slice = &image->slices[0];
+        const int plane = i % 5;
+        assert_true(image->has_plane && image->variant.plane == plane && image->variant.isovalue == i / 5);
+        assert_true(slice->plane_count == 1 && image->isosurfaces[0].values[0] == 3 + i / 5);
+        assert_true(slice->planes[0].offset == (plane < 3 ? offsets[plane] : 0));
+        assert_true(slice->planes[0].share == (plane < 3 ? 0 : shares[plane - 3]));
+        assert_true(scene_is_first_variant(image) == (i == 0));
+        const scene_moment moment = scene_moment_of(image, 5, 0);
+        char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
+        snprintf(expected, sizeof expected, "a.cdb/a_000005_%d_%02d.png", 3 + i / 5, plane);
+        assert_string_equal(path, expected);
+        base_free(path);
+    }
+    scene_free(&s);
+}
+
 static void databases_have_the_columns_of_their_images(void **state)
 {
     (void)state;
@@ -260,6 +290,7 @@ int main(void)
         cmocka_unit_test(orbits_are_circles_about_any_axis),
         cmocka_unit_test(orbits_have_their_defaults),
         cmocka_unit_test(sweeps_make_each_combination_once),
+        cmocka_unit_test(sweeps_go_through_planes),
         cmocka_unit_test(databases_have_the_columns_of_their_images),
         cmocka_unit_test(paths_go_through_their_places_and_stay_at_the_ends),
         cmocka_unit_test(paths_of_two_places_ease_in_and_out),

@@ -87,11 +87,12 @@ static void add_header(table_line *line)
 {
     const scene_database *database = line->table->database;
     static const char begin[] = "cycle,time,", images[] = "image,", orbits[] = "phi,theta,", isovalues[] = "isovalue,",
-                      fields[] = "field,", end[] = "FILE\n";
+                      planes[] = "plane,", fields[] = "field,", end[] = "FILE\n";
     add_bytes(line, begin, sizeof begin - 1);
     if (database->has_images) add_bytes(line, images, sizeof images - 1);
     if (database->has_orbits) add_bytes(line, orbits, sizeof orbits - 1);
     if (database->has_isovalues) add_bytes(line, isovalues, sizeof isovalues - 1);
+    if (database->has_planes) add_bytes(line, planes, sizeof planes - 1);
     if (database->has_fields) add_bytes(line, fields, sizeof fields - 1);
     add_bytes(line, end, sizeof end - 1);
 }
@@ -112,6 +113,8 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
     }
     if (database->has_isovalues && image->has_isovalue) add_number(line, image->isovalue);
     if (database->has_isovalues && !image->has_isovalue) add_nothing(line);
+    if (database->has_planes && image->has_plane) add_number(line, image->variant.plane);
+    if (database->has_planes && !image->has_plane) add_nothing(line);
     if (database->has_fields) add_text(line, "'", image->swept_field ? image->swept_field : "", ',');
     add_text(line, "./", file, '\n');
 }

@@ -74,14 +74,14 @@ static void list_thresholds(const scene_image *image, layer_window *window)
 }
 
 /* Lists the layers of the window; returns how many there are in all. Views of an image share their layers, fields of a
- * sweep its isosurfaces, isovalues its volumes, all of them its thresholds. */
+ * sweep its isosurfaces, isovalues its volumes, planes both, all of them its thresholds. */
 static int list_layers(const session_plan *plan, layer_window *window)
 {
     for (int i = 0; i < plan->image_count; i++) {
         const scene_image *image = plan->images[i];
         if (image->variant.view > 0) continue;
-        if (image->variant.field == 0) list_isosurfaces(image, window);
-        if (image->variant.isovalue == 0) list_volumes(image, window);
+        if (image->variant.plane == 0 && image->variant.field == 0) list_isosurfaces(image, window);
+        if (image->variant.plane == 0 && image->variant.isovalue == 0) list_volumes(image, window);
         if (scene_is_first_variant(image)) list_thresholds(image, window);
     }
     return window->next;

@@ -127,9 +127,11 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
     scene_series series;
     snprintf(path, sizeof path, "images[%d]", source);
     insitu_status status = scene_find_series(d, path, &in->images[source], &series);
-    for (int i = 0; !status && i < series.fields * series.isovalues; i++) {
+    for (int i = 0; !status && i < series.fields * series.isovalues * series.planes; i++) {
         scene_image *image = &out->images[out->image_count++];
-        image->variant = (scene_variant){source, i, i / series.isovalues, i % series.isovalues, 0};
+        const int values = i / series.planes;
+        image->variant =
+            (scene_variant){source, i, values / series.isovalues, values % series.isovalues, i % series.planes, 0};
         status = convert_image(d, path, &in->images[source], out, image);
     }
     return status;

@@ -330,7 +330,7 @@ typedef struct scene_output {
 typedef struct scene_database {
     char *path;      /* the folder, relative to the working directory of rank 0; no slash at its end */
     int first_image; /* the source of the first image in it */
-    bool has_images, has_orbits, has_isovalues, has_fields; /* the table has this column */
+    bool has_images, has_orbits, has_isovalues, has_planes, has_fields; /* the table has this column */
 } scene_database;
 
 typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
@@ -352,12 +352,12 @@ typedef struct scene_statistics {
     double low, high; /* range of the bins; low > high: the range of the values */
 } scene_statistics;
 
-/* An image of the file makes a picture for each field and isovalue of its sweep and each view of its orbit: in this
- * order, views running fastest. Each is a scene_image. */
+/* An image of the file makes a picture for each field, isovalue and plane of its sweep and each view of its orbit: in
+ * this order, views running fastest. Each is a scene_image. */
 typedef struct scene_variant {
-    int source;          /* which image of the file */
-    int layers;          /* counts the fields and isovalues of a source through; 0 without a sweep */
-    int field, isovalue; /* which of the sweep's; 0 where there is none */
+    int source;                 /* which image of the file */
+    int layers;                 /* counts the fields, isovalues and planes of a source through; 0 without a sweep */
+    int field, isovalue, plane; /* which of the sweep's; 0 where there is none */
     int view; /* pictures of the same source and layers differ in this and the camera alone: those after view 0 point
                * to what that one owns */
 } scene_variant;
@@ -390,6 +390,7 @@ typedef struct scene_image {
     uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */
     int occlusion_samples;        /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
     double occlusion_radius;      /* how far they go, in scene units; 0: by the bounds */
+    bool has_plane;               /* of a sweep: the variant has a plane of its own */
     scene_sampling_method method; /* default: one volume by segments, several by samples */
     double max_error; /* error bound of segments in a linear colour channel; 0: by step; default for one volume: 0.01 */
     bool has_default_samples; /* several volumes are sampled because the scene does not say how */
@@ -507,16 +508,16 @@ typedef struct scene_moment {
     const char *name; /* name of the image */
     long long cycle;
     double time;
-    int view;
+    int view, plane;
     double isovalue;
     const char *field; /* the sweep's field; NULL: no sweep */
 } scene_moment;
 
 scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time);
 
-/* Replace {cycle}, {cycle:0N}, {view}, {view:0N}, {time}, {time:.Nf} (or e, or g), {isovalue} as {time}, {name} and
- * {field} of pattern. Numbers have a decimal point in any locale. The result is from base_alloc(), NULL where memory
- * ran out. */
+/* Replace {cycle}, {cycle:0N}, {view} and {plane} likewise, {time}, {time:.Nf} (or e, or g), {isovalue} as {time},
+ * {name} and {field} of pattern. Numbers have a decimal point in any locale. The result is from base_alloc(), NULL
+ * where memory ran out. */
 char *scene_expand(const char *pattern, const scene_moment *moment);
 
 #endif

@@ -24,7 +24,7 @@ bool scene_is_parallel(const double a[3], const double b[3]);
 
 /* The numbers whose product is how many pictures an image makes in a step. */
 typedef struct scene_series {
-    int fields, isovalues, views; /* each 1 or more */
+    int fields, isovalues, planes, views; /* each 1 or more */
 } scene_series;
 
 /* Checks the image's sweep. path: of the image. */

@@ -15,6 +15,7 @@ typedef enum placeholder_kind {
     PLACEHOLDER_VIEW,
     PLACEHOLDER_TIME,
     PLACEHOLDER_ISOVALUE,
+    PLACEHOLDER_PLANE,
     PLACEHOLDER_NAME,
     PLACEHOLDER_FIELD
 } placeholder_kind;
@@ -57,9 +58,10 @@ static placeholder read_placeholder(const char *text)
         placeholder_kind kind;
         int digits;
         char conversion; /* 0: a whole number; 't': a text, without a format */
-    } known[] = {{"{cycle", PLACEHOLDER_CYCLE, 1, 0},  {"{view", PLACEHOLDER_VIEW, 1, 0},
-                 {"{time", PLACEHOLDER_TIME, -1, 'g'}, {"{isovalue", PLACEHOLDER_ISOVALUE, -1, 'g'},
-                 {"{name", PLACEHOLDER_NAME, 0, 't'},  {"{field", PLACEHOLDER_FIELD, 0, 't'}};
+    } known[] = {{"{cycle", PLACEHOLDER_CYCLE, 1, 0},          {"{view", PLACEHOLDER_VIEW, 1, 0},
+                 {"{plane", PLACEHOLDER_PLANE, 1, 0},          {"{time", PLACEHOLDER_TIME, -1, 'g'},
+                 {"{isovalue", PLACEHOLDER_ISOVALUE, -1, 'g'}, {"{name", PLACEHOLDER_NAME, 0, 't'},
+                 {"{field", PLACEHOLDER_FIELD, 0, 't'}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         const size_t length = strlen(known[i].word);
         if (strncmp(text, known[i].word, length) != 0) continue;
@@ -84,6 +86,7 @@ static int write_value(const placeholder *p, const scene_moment *moment, char *o
     switch (p->kind) {
     case PLACEHOLDER_CYCLE: return snprintf(out, size, "%0*lld", p->digits, moment->cycle);
     case PLACEHOLDER_VIEW: return snprintf(out, size, "%0*d", p->digits, moment->view);
+    case PLACEHOLDER_PLANE: return snprintf(out, size, "%0*d", p->digits, moment->plane);
     case PLACEHOLDER_NAME: return snprintf(out, size, "%s", moment->name);
     case PLACEHOLDER_FIELD: return snprintf(out, size, "%s", moment->field ? moment->field : "");
     case PLACEHOLDER_ISOVALUE: return write_number(p, moment->isovalue, 9, out, size);
@@ -124,12 +127,19 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
 /* Names what the image lacks for the placeholder; NULL: it lacks nothing. image is its path. */
 static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
 {
-    const bool is_view = kind == PLACEHOLDER_VIEW, is_value = kind == PLACEHOLDER_ISOVALUE;
-    char key[SCENE_PATH_SIZE + 32];
-    if (!is_view && !is_value && kind != PLACEHOLDER_FIELD) return NULL;
-    snprintf(key, sizeof key, "%s.%s", image, is_view ? "camera.orbit" : is_value ? "sweep.isovalues" : "sweep.fields");
-    if (scene_document_kind(d, key) != SCENE_NOTHING) return NULL;
-    return is_view ? "an orbit" : is_value ? "sweep: {isovalues: true}" : "sweep: {fields: ...}";
+    static const struct {
+        placeholder_kind kind;
+        const char *key, *lack;
+    } needs[] = {{PLACEHOLDER_VIEW, "camera.orbit", "an orbit"},
+                 {PLACEHOLDER_ISOVALUE, "sweep.isovalues", "sweep: {isovalues: true}"},
+                 {PLACEHOLDER_PLANE, "sweep.planes", "sweep: {planes: true}"},
+                 {PLACEHOLDER_FIELD, "sweep.fields", "sweep: {fields: ...}"}};
+    for (size_t i = 0; i < sizeof needs / sizeof *needs; i++) {
+        char key[SCENE_PATH_SIZE + 32];
+        snprintf(key, sizeof key, "%s.%s", image, needs[i].key);
+        if (kind == needs[i].kind && scene_document_kind(d, key) == SCENE_NOTHING) return needs[i].lack;
+    }
+    return NULL;
 }
 
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text)
@@ -140,7 +150,8 @@ insitu_status scene_check_placeholders(const scene_document *d, const char *path
         if (kind == PLACEHOLDER_NONE)
             return scene_bad(d, path, key,
                              "\"%.*s\" is unknown, expected {cycle}, {cycle:01} to {cycle:020}, {time}, {time:.0f} to "
-                             "{time:.17f} (or e, or g), {name}, {view} as {cycle}, {isovalue} as {time} or {field}",
+                             "{time:.17f} (or e, or g), {name}, {view} and {plane} as {cycle}, {isovalue} as {time} or "
+                             "{field}",
                              length, open);
         char image[SCENE_PATH_SIZE];
         snprintf(image, sizeof image, "%.*s", (int)strcspn(path, "."), path);
@@ -224,8 +235,8 @@ static const double sample_time = 0.5;
 
 scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time)
 {
-    return (scene_moment){image->name,         (long long)cycle, time,
-                          image->variant.view, image->isovalue,  image->swept_field};
+    const scene_variant *v = &image->variant;
+    return (scene_moment){image->name, (long long)cycle, time, v->view, v->plane, image->isovalue, image->swept_field};
 }
 
 /* An output's file, and its place among all. */
@@ -245,6 +256,7 @@ static int compare_files(const void *a, const void *b)
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
+    if (a->plane != b->plane) return "plane";
     return a->isovalue != b->isovalue ? "isovalue" : "field";
 }
 

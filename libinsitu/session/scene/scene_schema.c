@@ -94,8 +94,8 @@ DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 #define PLACEHOLDERS                                                                                                   \
     "`{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, `{time}` the time, `{time:.3f}` the " \
     "time as C's printf writes it (`f`, `e` or `g`), `{name}` the image's "                                            \
-    "name, `{view}` and `{view:03}` the number of an orbit's view, from 0, `{isovalue}` (formats as of the time) and " \
-    "`{field}` those of a `sweep`."
+    "name, `{view}` and `{view:03}` the number of an orbit's view, from 0, `{isovalue}` (formats as of the time), "    \
+    "`{plane}` (its number from 0, as `{view}`) and `{field}` those of a `sweep`."
 
 #define WORDS_KEYS(X)                                                                                                  \
     X(TEXT("text", REQUIRED, scene_file_words, text, 255), .help = "One line of text. " PLACEHOLDERS)                  \
@@ -180,7 +180,7 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
           "opacity count, 0 as well, and no volume hides them; it is infinite where there is none: volumes and the "   \
           "background have no depth. With `cinema`: a PNG in the database's folder.",                                  \
       .by_default = "required without `cinema`; with it `{name}_{cycle:06}.png`, and before the ending `_{view:03}`, " \
-                    "`_{isovalue}` and `_{field}` as far as the image has them")                                       \
+                    "`_{isovalue}`, `_{plane:02}` and `_{field}` as far as the image has them")                        \
     X(TEXT("cinema", OPTIONAL, scene_file_output, cinema, 511),                                                        \
       .help =                                                                                                          \
           "Folder of a Cinema database of Spec D, ending in `.cdb`, into which the pictures go: `data.csv` has a "     \

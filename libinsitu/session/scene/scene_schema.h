@@ -200,7 +200,7 @@ typedef struct scene_file_decorations {
 
 /* fields is read from the document. */
 typedef struct scene_file_sweep {
-    bool *isovalues;
+    bool *isovalues, *planes;
 } scene_file_sweep;
 
 typedef struct scene_file_output {

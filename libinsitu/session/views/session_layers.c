@@ -282,7 +282,7 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
 static void warn_of_plane(const session_layer_basis *basis, const scene_image *image, int surface, double low,
                           double high)
 {
-    const session_warning warning = {WARNING_PLANE, image->name, NULL, surface};
+    const session_warning warning = {WARNING_PLANE, image->name, NULL, surface + image->variant.plane};
     const double reach = SESSION_BORDER_SHARE * basis->half_diagonal;
     session_warn(basis->report, &warning, low <= high && (low > reach || high < -reach),
                  "image \"%s\": a plane of its slices meets no cell: cells are %g to %g from it, along its normal",

@@ -38,8 +38,9 @@ static insitu_status check_file(const scene_document *d, const char *path, const
 
 static const char *default_file(const scene_image *image, char file[96])
 {
-    snprintf(file, 96, "{name}_{cycle:06}%s%s%s.png", image->camera.orbit.view_count ? "_{view:03}" : "",
-             image->has_isovalue ? "_{isovalue}" : "", image->swept_field ? "_{field}" : "");
+    snprintf(file, 96, "{name}_{cycle:06}%s%s%s%s.png", image->camera.orbit.view_count ? "_{view:03}" : "",
+             image->has_isovalue ? "_{isovalue}" : "", image->has_plane ? "_{plane:02}" : "",
+             image->swept_field ? "_{field}" : "");
     return file;
 }
 
@@ -95,6 +96,7 @@ static void note_columns(scene_database *database, const scene_image *image)
     database->has_images = database->has_images || image->variant.source != database->first_image;
     database->has_orbits = database->has_orbits || image->camera.orbit.view_count > 0;
     database->has_isovalues = database->has_isovalues || image->has_isovalue;
+    database->has_planes = database->has_planes || image->has_plane;
     database->has_fields = database->has_fields || image->swept_field;
 }
 

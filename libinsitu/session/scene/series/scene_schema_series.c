@@ -113,6 +113,10 @@ EXPORT_MAPPING(camera, "camera", CAMERA_KEYS);
       .help = "A picture for each of the `values` of the image's isosurface, of which there is one layer, in place "   \
               "of all of them in one.",                                                                                \
       .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_BOOL_PTR("planes", OPTIONAL, scene_file_sweep, planes),                                              \
+      .help = "A picture for each of the planes of the image's slice, of which there is one layer, in place of all "   \
+              "of them in one: those of a list, of `offsets` or of a `count`, in turn.",                               \
+      .by_default = "`false`")                                                                                         \
     X(NAMES("fields"),                                                                                                 \
       .help = "Names of fields without `/`, a picture for each: it takes the place of the field in every layer that "  \
               "a field colours: slices, volumes, and `colour_by` of isosurfaces and surfaces, with their other keys "  \

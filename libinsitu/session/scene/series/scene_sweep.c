@@ -1,4 +1,5 @@
-/* Reads the keys that make several pictures of an image: its sweep's fields and isovalues, and its orbit's views. */
+/* Reads the keys that make several pictures of an image: its sweep's fields, isovalues and planes, and its orbit's
+ * views. */
 #include <stdio.h>
 #include <string.h>
 
@@ -10,16 +11,26 @@ static bool is_over_isovalues(const scene_file_image *in)
     return in->sweep && in->sweep->isovalues && *in->sweep->isovalues;
 }
 
-static const scene_file_isosurface *find_isosurface(const scene_file_image *in, int *count)
+static bool is_over_planes(const scene_file_image *in)
 {
-    const scene_file_isosurface *found = NULL;
-    *count = 0;
-    for (int i = 0; i < in->layers_count; i++) {
-        if (!in->layers[i].isosurface) continue;
-        if (!found) found = in->layers[i].isosurface;
-        ++*count;
-    }
-    return found;
+    return in->sweep && in->sweep->planes && *in->sweep->planes;
+}
+
+/* Finds the first isosurface or slice; returns how many there are. */
+static int find_isosurface(const scene_file_image *in, const scene_file_isosurface **found)
+{
+    int count = 0;
+    for (int i = 0; i < in->layers_count; i++)
+        if (in->layers[i].isosurface && count++ == 0) *found = in->layers[i].isosurface;
+    return count;
+}
+
+static int find_slice(const scene_file_image *in, const scene_file_slice **found)
+{
+    int count = 0;
+    for (int i = 0; i < in->layers_count; i++)
+        if (in->layers[i].slice && count++ == 0) *found = in->layers[i].slice;
+    return count;
 }
 
 static int list_fields(const scene_document *d, const char *path, const char *fields[SCENE_MAX_NAMES])
@@ -43,26 +54,34 @@ static insitu_status check_fields(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
+static insitu_status find_values(const scene_document *d, const char *path, const scene_file_image *in,
+                                 scene_series *out)
+{
+    const scene_file_isosurface *isosurface = NULL;
+    const scene_file_slice *slice = NULL;
+    const int isosurfaces = find_isosurface(in, &isosurface), slices = find_slice(in, &slice);
+    if (is_over_isovalues(in) && isosurfaces != 1)
+        return scene_bad(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one", isosurfaces);
+    if (is_over_planes(in) && slices != 1)
+        return scene_bad(d, path, "sweep.planes", "the image has %d slice layers, expected one", slices);
+    if (is_over_isovalues(in)) out->isovalues = isosurface->values_count;
+    if (is_over_planes(in)) out->planes = scene_count_planes(slice);
+    return INSITU_OK;
+}
+
 insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_series *out)
 {
-    int isosurfaces;
     char camera[SCENE_PATH_SIZE];
     const char *fields[SCENE_MAX_NAMES];
     const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
-    const scene_file_isosurface *isosurface = find_isosurface(in, &isosurfaces);
     snprintf(camera, sizeof camera, "%s.camera", path);
-    *out = (scene_series){field_count ? field_count : 1, 1, scene_count_views(d, camera, in->camera)};
+    *out = (scene_series){field_count ? field_count : 1, 1, 1, scene_count_views(d, camera, in->camera)};
     if (!in->sweep) return INSITU_OK;
-    if (!is_over_isovalues(in) && field_count == 0)
-        return scene_bad(d, path, "sweep", "holds nothing, expected isovalues: true, fields or both");
-    if (is_over_isovalues(in)) {
-        if (isosurfaces != 1)
-            return scene_bad(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one",
-                             isosurfaces);
-        out->isovalues = isosurface->values_count;
-    }
-    return check_fields(d, path, fields, field_count);
+    if (!is_over_isovalues(in) && !is_over_planes(in) && field_count == 0)
+        return scene_bad(d, path, "sweep", "holds nothing, expected isovalues: true, planes: true, fields or several");
+    const insitu_status status = find_values(d, path, in, out);
+    return status ? status : check_fields(d, path, fields, field_count);
 }
 
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count)
@@ -74,7 +93,7 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
         snprintf(path, sizeof path, "images[%d]", i);
         const insitu_status status = scene_find_series(d, path, &in->images[i], &s);
         if (status) return status;
-        sum += (int64_t)s.fields * s.isovalues * s.views;
+        sum += (int64_t)s.fields * s.isovalues * s.planes * s.views;
         if (sum > SCENE_MAX_PICTURES)
             return scene_bad(d, path, "", "%lld pictures a step up to here, by orbits and sweeps, expected at most %d",
                              (long long)sum, SCENE_MAX_PICTURES);
@@ -127,11 +146,20 @@ static void keep_value(scene_image *image, int index)
     image->isovalue = layer->values[0];
 }
 
+static void keep_plane(scene_image *image, int index)
+{
+    scene_slice *layer = &image->slices[0];
+    layer->planes[0] = layer->planes[index];
+    layer->plane_count = 1;
+    image->has_plane = true;
+}
+
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in, scene_image *out)
 {
     const char *fields[SCENE_MAX_NAMES];
     const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
     if (is_over_isovalues(in)) keep_value(out, out->variant.isovalue);
+    if (is_over_planes(in)) keep_plane(out, out->variant.plane);
     if (field_count == 0) return INSITU_OK;
     char key[SCENE_PATH_SIZE];
     int replaced;
