@@ -52,7 +52,7 @@ static double sphere_depth(const double base[3], const double direction[3])
 
 static double quadratic(const double p[3])
 {
-    return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.3 * p[2] - 0.2 * p[0] * p[2];
+    return 0.6 * p[0] - 0.4 * p[1] + 0.3 * p[2] + 0.1 * p[0] * p[0] - 0.08 * p[0] * p[2] + 0.06 * p[1] * p[1];
 }
 
 typedef struct lines_case {
@@ -69,14 +69,23 @@ typedef struct lines_case {
 } lines_case;
 
 /* A linear field is linear in every cell, and so is the distance from a plane: cells may be of any size. Of the others
- * the cells' interpolants are off by the square of their size, at most h^2 / 8 times the sum of the second derivatives
- * (for the quadratic 3, for the square of the radius 6): on 40 cubes 9e-4 and 2e-3, in places 1e-3 of the scene, by
- * slopes of 1 and more, or 0.04 of a pixel. */
+ * the cells' interpolants are off: on 40 cubes by an eighth of the second derivative along a tet's longest edge, 0.09,
+ * times its square: 4e-4 of the quadratic field, whose slope is 0.6 or more, and 2e-3 of the square of the radius,
+ * whose slope is 1.6. A pixel is 0.03 of the scene, so that lines are off by up to 0.02 and 0.04 of a pixel. */
 static const lines_case cases[] = {
     {"a linear field on a plane", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 1.5F, 4, 0.2, 3, {-0.3, 0, 0.25}},
     {"thin lines", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 0.7F, 4, 0.2, 2, {-0.1, 0.3}},
     {"wide lines", distance, plane_depth, test_linear, CAMERA_ORTHOGRAPHIC, 4, 4, 0.2, 2, {-0.3, 0.25}},
-    {"a quadratic field on a plane", distance, plane_depth, quadratic, CAMERA_OUTSIDE, 1.5F, 40, 0.1, 3, {0.2, 0.5, 1}},
+    {"a quadratic field on a plane",
+     distance,
+     plane_depth,
+     quadratic,
+     CAMERA_OUTSIDE,
+     1.5F,
+     40,
+     0.1,
+     3,
+     {-0.4, 0.1, 0.5}},
     {"a linear field on a sphere",
      square_radius,
      sphere_depth,

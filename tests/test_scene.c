@@ -82,15 +82,15 @@ static const char every_key[] =
     "      - isosurface:\n"
     "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
     "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
-    "            interpolate: vertex},\n"
+    "            interpolate: vertex}, lines: {field: q, component: x, values: [1, 2], width: 2, colour: [1, 0, 0]},\n"
     "           clip: {sphere: {centre: [1, -2, 3], radius: 2.5}, keep: outside}}\n"
     "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
     "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
     "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1},\n"
     "                {normal: [0, 1, 0], offsets: [1, 2]}, {normal: [0, 0, 1], count: 3}],\n"
-    "                clip: {box: [[0, 0, 0], [9, 9, 9]], keep: inside}}\n"
+    "                clip: {box: [[0, 0, 0], [9, 9, 9]], keep: inside}, lines: {count: 5}}\n"
     "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5,\n"
-    "                  edges: {width: 2, colour: [0, 0.5, 1]},\n"
+    "                  edges: {width: 2, colour: [0, 0.5, 1]}, lines: {field: q, values: [3]},\n"
     "                  clip: {box: [[0, 0, 0], [1, 2, 3]]}}\n"
     "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}, edges: {},\n"
     "                  threshold: {field: q, component: 1, from: 1, to: 2.5}}\n"
@@ -143,8 +143,8 @@ static const char every_key[] =
     "      orbit: {views: 4, axis: [0, 0, 2], elevation: [-10, 20.5], start: 45}\n"
     "    sweep: {isovalues: true, planes: true, fields: [p, r]}\n"
     "    layers:\n"
-    "      - isosurface: {field: q, values: [1, 2, 3], colour_by: {field: p}}\n"
     "      - slice: {field: p, planes: [{normal: x}]}\n"
+    "      - isosurface: {field: q, values: [1, 2, 3], colour_by: {field: p}}\n"
     "    outputs:\n"
     "      - {cinema: runs/all.cdb}\n"
     "      - {path: \"d{view:02}{isovalue:.1f}{field}.exr\"}\n"
@@ -593,6 +593,33 @@ static void slices_have_planes_of_unit_normals(void **state)
     assert_true(slice[1].opacity == 0.5F && slice[1].colour_map.range.high == 2 && slice[1].field.at_vertices);
     assert_true(slice[1].field.component == 0 && slice[1].field.mesh_count == 1);
     assert_true(slice[1].material.diffuse == 0.75F && slice[1].material.specular == 0);
+    scene_free(&s);
+}
+
+static void lines_are_of_what_colours_the_layer(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good("images:\n- name: a\n  size: [40, 1200]\n  sweep: {fields: [w]}\n  layers:\n"
+               "  - slice: {field: p, component: y, mesh: air, lines: {count: 7}}\n"
+               "  - isosurface: {field: q, values: [1], lines: {field: r, component: x, values: [3, -1, 2], width: 4,\n"
+               "                 colour: white}}\n"
+               "  - surface: {colour_by: {field: p}, lines: {values: 5}}\n"
+               "  - slice: {field: p}\n"
+               "  outputs: [{path: a.png}]\n",
+               &s);
+    const scene_lines *slice = &s.images[0].slices[0].lines, *iso = &s.images[0].isosurfaces[0].lines;
+    const scene_lines *outer = &s.images[0].surfaces[0].lines;
+    assert_true(slice->is_given && slice->is_of_colours && !slice->has_values && slice->count == 7);
+    assert_string_equal(slice->field.name, "w"); /* as the sweep has it */
+    assert_true(slice->field.component == 1 && slice->field.mesh_count == 1 && slice->field.at_vertices);
+    assert_true(slice->width == 2 && fabsf(slice->colours[20] - 0.0100228F) < 1e-6F); /* 0.1 in linear light */
+    assert_true(!iso->is_of_colours && iso->has_values && iso->count == 3 && iso->width == 4);
+    assert_string_equal(iso->field.name, "r");
+    assert_true(iso->values[0] == -1 && iso->values[1] == 2 && iso->values[2] == 3 && iso->field.component == 0);
+    assert_true(iso->colours[0] == 1 && iso->colours[8] == 1);
+    assert_true(outer->is_of_colours && outer->count == 1 && outer->values[0] == 5);
+    assert_false(s.images[0].slices[1].lines.is_given);
     scene_free(&s);
 }
 
@@ -1222,15 +1249,16 @@ static void scene_texts_have_their_placeholders_replaced(void **state)
                  {"{cycle:05}", -3, "-0003"},
                  {"{view} {view:02} {field}", 1, "3 03 p"},
                  {"{isovalue} {isovalue:.3f}", 1, "-0.5 -0.500"},
+                 {"{plane} {plane:03}", 1, "7 007"},
                  {"{", 1, "{"},
                  {"", 1, ""}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char *path = scene_expand(cases[i].pattern, &(scene_moment){"wave", cases[i].cycle, 0.125, 3, -0.5, "p"});
+        char *path = scene_expand(cases[i].pattern, &(scene_moment){"wave", cases[i].cycle, 0.125, 3, 7, -0.5, "p"});
         assert_string_equal(path, cases[i].path);
         base_free(path);
     }
     base_memory_fail_nth(1);
-    assert_null(scene_expand("a", &(scene_moment){"b", 1, 0, 0, 0, NULL}));
+    assert_null(scene_expand("a", &(scene_moment){"b", 1, 0, 0, 0, 0, NULL}));
     base_memory_fail_nth(0);
 }
 
@@ -1250,7 +1278,6 @@ static void check_mapping(const scene_mapping *mapping)
         const bool is_optional = field->value.flags & CYAML_FLAG_OPTIONAL;
         char in_file[64];
         snprintf(in_file, sizeof in_file, "%s:", field->key);
-                 {"{plane} {plane:03}", 1, "7 007"},
         if (!key->help || strlen(key->help) < 10) fail_msg("%s.%s has no help", mapping->title, field->key);
         if (is_optional == !key->by_default) fail_msg("%s.%s: default and optional differ", mapping->title, field->key);
         if (is_of_mappings(&field->value) == !key->child) fail_msg("%s.%s: child", mapping->title, field->key);
@@ -1355,6 +1382,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(planes_come_in_numbers),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
+        cmocka_unit_test(lines_are_of_what_colours_the_layer),
         cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(statistics_and_conditions_are_read),
         cmocka_unit_test(parameters_are_read_by_their_names),

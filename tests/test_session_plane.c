@@ -235,8 +235,7 @@ static void layers_that_show_nothing_are_told(void **state)
     (void)state;
     static const struct {
         const char *scene, *word;
-    } cases[] = {{IMAGE("", "{isosurface: {field: f, values: [1]}}"), "the isosurface of \"f\""},
-                 {IMAGE("", "{volume: {field: f}}"), "the volume of \"f\""},
+    } cases[] = {{IMAGE("", "{volume: {field: f}}"), "the volume of \"f\""},
                  {IMAGE("", "{slice: {field: f, planes: [{normal: [0, 0, 1]}]}}"), "the slice of \"f\""}};
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
@@ -246,6 +245,82 @@ static void layers_that_show_nothing_are_told(void **state)
         everywhere(strstr(warnings, cases[i].word) && strstr(warnings, "surface: {colour_by: {field: f}}"));
         insitu_destroy(&session);
     }
+}
+
+/* ---- lines ---------------------------------------------------------------------------------------------------- */
+
+#define LINES "{isosurface: {field: f, values: [3, 1], colours: [[1, 0, 0], [0, 1, 0]]}}"
+
+/* The share of a pixel that the line of a value covers, 1.5 pixels wide, in the middle of a field whose slope is that
+ * of linear(): so much of the box of a pixel as lies along the line. */
+static double line_share(double value, double level)
+{
+    const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
+    return fmin(fmax(1.25 - fabs(value - level) / (sqrt(5) * size), 0), 1);
+}
+
+/* Tells whether the picture has the two lines, the red one at 3 and the green one at 1, and on_grey: the map under
+ * them. Values in float are off by 1e-6 of 8, which is 4e-6 of a pixel of 0.094; light goes with the share. */
+static bool are_lines(const caught_picture *picture, bool on_grey)
+{
+    int hits = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        double x, y;
+        place_of(pixel, &x, &y);
+        const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
+        if (is_near_edge(x, right, NX) || is_near_edge(y, top, NY)) continue;
+        const bool is_in = x > 0 && x < right && y > 0 && y < top;
+        const double red = is_in ? line_share(linear(x, y), 3) : 0, green = is_in ? line_share(linear(x, y), 1) : 0;
+        const double code = 255 * (linear(x, y) + 2) / 8, share = red + green;
+        bool is_well = fabs((double)own[3] - (on_grey ? is_in : share)) < 1e-4;
+        is_well = is_well && (share == 0 || on_grey || fabs((double)own[0] - red) < 1e-4);
+        is_well = is_well && (share == 0 || on_grey || fabs((double)own[1] - green) < 1e-4);
+        is_well = is_well && (share < 0.9999 || fabs((double)own[0] - red) < 1e-4);
+        is_well = is_well && (share > 0 || !is_in || !on_grey || fabs(srgb_code(own[2]) - code) <= 1);
+        hits += share > 0;
+        if (is_well) continue;
+        fprintf(stderr, "pixel %d at (%g, %g): %g %g %g %g, expected %g of red, %g of green\n", pixel, x, y,
+                (double)own[0], (double)own[1], (double)own[2], (double)own[3], red, green);
+        return false;
+    }
+    return hits > 100;
+}
+
+/* Alone, over the plate itself, and where shadows have hits lit later. The same on all ranks and on one. */
+static void isosurfaces_are_contour_lines(void **state)
+{
+    (void)state;
+    static const char *const scenes[] = {IMAGE("", LINES), IMAGE("", LINES ", " MAP_OF("f")),
+                                         IMAGE("    shadows: true\n", MAP_OF("f") ", " LINES)};
+    for (plate_kind kind = 0; kind < PLATE_KINDS; kind++)
+        for (int i = 0; i < 3; i++) {
+            plate part, whole;
+            make_plate(kind, own_rank, rank_count, &part);
+            make_plate(kind, 0, 1, &whole);
+            const char *scene = write_scene(scenes[i]);
+            caught_picture ours = draw(MPI_COMM_WORLD, scene, &part, false), alone = {0};
+            bool is_well = true;
+            if (own_rank == 0) {
+                alone = draw(MPI_COMM_SELF, scene, &whole, true);
+                is_well = are_lines(&ours, i > 0) && are_same(&ours, &alone);
+            }
+            everywhere(is_well);
+            free_caught(&ours);
+            free_caught(&alone);
+        }
+}
+
+static void lines_beyond_the_field_are_told(void **state)
+{
+    (void)state;
+    plate part;
+    make_plate(TRIANGLES, own_rank, rank_count, &part);
+    const char *scene = write_scene(IMAGE("", "{isosurface: {field: f, values: [1, 20]}}"));
+    insitu_session *session = open_with(MPI_COMM_WORLD, scene, &part, false);
+    const char *warnings = insitu_last_report(session)->warnings;
+    everywhere(strstr(warnings, "the isosurface of \"f\" at 20 is empty: the field goes from -2 to 6") &&
+               !strstr(warnings, "at 1 is empty"));
+    insitu_destroy(&session);
 }
 
 static void solids_need_z(void **state)
@@ -417,6 +492,8 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_colour_map_of_the_field),
                                        cmocka_unit_test(what_the_scene_says_comes_first),
                                        cmocka_unit_test(layers_that_show_nothing_are_told),
+                                       cmocka_unit_test(isosurfaces_are_contour_lines),
+                                       cmocka_unit_test(lines_beyond_the_field_are_told),
                                        cmocka_unit_test(bars_say_what_they_show),
                                        cmocka_unit_test(solids_need_z),
                                        cmocka_unit_test(statistics_weigh_shells_by_area),

@@ -118,3 +118,11 @@ target_link_libraries(test_derived_accuracy PRIVATE insitu_flags test_meshes ins
   VTK::CommonDataModel VTK::CommonExecutionModel VTK::FiltersGeneral)
 insitu_add_split_test(derived_accuracy test_derived_accuracy)
 set_tests_properties(derived_accuracy PROPERTIES TIMEOUT 60)
+
+# Contour lines beside VTK's.
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore)
+add_executable(test_contour_points test_contour_points.c test_contour_vtk.cpp)
+target_link_libraries(test_contour_points PRIVATE test_render_support insitu_quick_flags VTK::CommonCore
+  VTK::CommonDataModel VTK::CommonExecutionModel VTK::FiltersCore)
+add_test(NAME contour_points COMMAND test_contour_points)
+set_tests_properties(contour_points PROPERTIES TIMEOUT 60)

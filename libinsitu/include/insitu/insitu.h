@@ -62,10 +62,11 @@ typedef enum insitu_cell_type {
     INSITU_WEDGE = 13,      /* 6 vertices: one triangle, then the other; either winding */
     INSITU_PYRAMID = 14,    /* 5 vertices: the quad around, then the apex */
     INSITU_POLYHEDRON = 42, /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
-    /* Shells: cells of two dimensions, alone or among others. Only layers of outer surfaces show them; a shell that
-     * lies on the face of another cell is shown instead of that face. Isosurfaces, volumes and slices pass shells over.
-     * Statistics weigh them by their area where a field is on shells alone, and else pass them over. When cell values
-     * are averaged at a vertex (insitu_centring), those of shells count too. */
+    /* Shells: cells of two dimensions, alone or among others. Layers of outer surfaces show them; a shell that lies on
+     * the face of another cell is shown instead of that face. An isosurface on a mesh of shells alone is its contour
+     * lines; beside cells with a volume isosurfaces pass shells over, and volumes and slices always do. Statistics
+     * weigh them by their area where a field is on shells alone, and else pass them over. When cell values are averaged
+     * at a vertex (insitu_centring), those of shells count too. */
     INSITU_TRIANGLE = 5, /* 3 vertices */
     INSITU_POLYGON = 7,  /* 3 vertices or more around it; offsets tell how many. It is drawn as triangles, which
                             cover it once, convex or not; it should be flat. */

@@ -54,6 +54,7 @@ typedef enum session_warning_kind {
     WARNING_CLIP,        /* clips leave nothing of a layer */
     WARNING_NO_CELLS,    /* no mesh has cells to draw */
     WARNING_APART,       /* a layer is on several meshes, and one has vertex ids */
+    WARNING_NO_LINES,    /* a mesh without the field of a layer's contour lines */
     WARNING_SHELLS,      /* a layer for cells with volume is on shells alone */
     WARNING_SAMPLES,     /* several volumes are sampled by default, to no error */
     WARNING_SCALE,       /* a field has no value that its logarithmic scale can show */

@@ -330,7 +330,7 @@ static void fill_bars(session_decorations *d, const scene_image *image, const se
     for (int i = 0; i < image->isosurface_count; i++)
         if (image->isosurfaces[i].has_colour_by)
             add_bar(d, &basis, &image->isosurfaces[i].colour_by, &image->isosurfaces[i].colour_map, &transfers[i]);
-    const int outer = image->isosurface_count, planes = outer + image->surface_count;
+    const int outer = given->layers->first_outer, planes = outer + image->surface_count;
     for (int i = 0; i < image->surface_count; i++)
         if (image->surfaces[i].has_colour_by)
             add_bar(d, &basis, &image->surfaces[i].colour_by, &image->surfaces[i].colour_map, &transfers[outer + i]);

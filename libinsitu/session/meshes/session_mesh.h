@@ -175,8 +175,9 @@ typedef struct session_mesh {
     bool is_geometry_stale;    /* the tree is of other coordinates */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count; /* shells are drawn and flat */
-    double size_sum; /* the sum of the cube roots of drawn cells' volumes */
-    uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
+    bool has_shells_alone; /* as session_catalogue_mesh.has_shells_alone: on all ranks */
+    double size_sum;       /* the sum of the cube roots of drawn cells' volumes */
+    uint64_t *flat;        /* NULL: no cell is flat; else as in cells */
 
     uint64_t apart; /* session_catalogue_mesh.apart */
     bool is_needed; /* an image of this step draws it */

@@ -81,11 +81,13 @@ static void add_numbers(surface_numbers *n, int layer, int surfaces)
     }
 }
 
-static surface_numbers number_surfaces(const scene_image *image)
+/* has_shells: isosurfaces have lines on shells, which count as one surface each. */
+static surface_numbers number_surfaces(const scene_image *image, bool has_shells)
 {
     surface_numbers out = {0};
     for (int i = 0; i < image->isosurface_count; i++)
         add_numbers(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
+    for (int i = 0; i < image->isosurface_count && has_shells; i++) add_numbers(&out, image->isosurfaces[i].number, 1);
     for (int i = 0; i < image->surface_count; i++) add_numbers(&out, image->surfaces[i].number, 1);
     for (int i = 0; i < image->slice_count; i++)
         add_numbers(&out, image->slices[i].number, image->slices[i].plane_count);
@@ -93,9 +95,9 @@ static surface_numbers number_surfaces(const scene_image *image)
 }
 
 /* Turns each pixel's numbers (value, isovalue's number, 0, opacity) into value, layer and surface. */
-static void name_surfaces(const scene_image *image, float *values, int threads)
+static void name_surfaces(const scene_image *image, bool has_shells, float *values, int threads)
 {
-    const surface_numbers numbers = number_surfaces(image);
+    const surface_numbers numbers = number_surfaces(image, has_shells);
     const int64_t pixels = (int64_t)image->width * image->height;
 #pragma omp parallel num_threads(threads)
     {
@@ -148,7 +150,9 @@ insitu_status session_draw_channels(const session_frame_target *target, const se
     }
     base_free(surfaces);
     if (!status && team->rank == 0) {
-        name_surfaces(image, out->values, team->threads);
+        int surfaces_given = image->isosurface_count + image->surface_count;
+        for (int i = 0; i < image->slice_count; i++) surfaces_given += image->slices[i].plane_count;
+        name_surfaces(image, job->surface_count > surfaces_given, out->values, team->threads);
         fill_items(out);
     }
     return status;

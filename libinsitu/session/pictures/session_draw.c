@@ -18,6 +18,7 @@
 #include "session_image.h"
 #include "session_layers.h"
 #include "session_lines.h"
+#include "session_shells.h"
 #include "session_view.h"
 
 /* Fragments that a rank makes at once for pixels in which cells overlap: 64 MiB. */
@@ -431,6 +432,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
                                  .team = d->team,
                                  .half_diagonal = extent->half_diagonal,
                                  .is_flat = session_flat_axis(extent) >= 0,
+                                 .has_shells = session_has_shells(d->catalogue),
                                  .report = d->report,
                                  .image = image};
     session_view view;

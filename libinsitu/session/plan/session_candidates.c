@@ -7,6 +7,7 @@
 #include "session_distances.h"
 #include "session_hash.h"
 #include "session_scalars.h"
+#include "session_shells.h"
 #include "session_thresholds.h"
 #include "session_transfer.h"
 
@@ -57,15 +58,6 @@ static bool add_volume(session_scalar *scalar, const scene_volume *layer)
     return scalar->needs_all || add_intervals(scalar, intervals, count);
 }
 
-static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
-{
-    session_scalar *scalar;
-    if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
-    if (!scalar) return true;
-    if (!add_surface(scalar, layer)) return false;
-    return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
-}
-
 static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
 {
     session_scalar *scalar;
@@ -84,8 +76,10 @@ static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const sessi
 
 static bool mark_slice(session_mesh *mesh, const scene_slice *layer, const session_extent *extent)
 {
-    session_scalar *colour;
+    session_scalar *colour, *lines;
     bool is_marked = session_mark_scalar(mesh, &layer->field, false, &colour);
+    if (colour && layer->lines.is_given)
+        is_marked = is_marked && session_mark_scalar(mesh, &layer->lines.field, false, &lines);
     for (int i = 0; i < layer->plane_count && is_marked && colour; i++)
         is_marked = mark_plane(mesh, &layer->planes[i], extent);
     return is_marked;
@@ -94,8 +88,23 @@ static bool mark_slice(session_mesh *mesh, const scene_slice *layer, const sessi
 static bool mark_outer(session_mesh *mesh, const scene_surface *layer)
 {
     session_scalar *scalar;
-    if (!scene_field_is_on(&layer->on, mesh->name)) return true;
+    if (!session_surface_is_on(layer, mesh)) return true;
     if (!session_mark_outer(mesh, &layer->threshold)) return false;
+    if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
+    return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
+}
+
+static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer, int height)
+{
+    session_scalar *scalar;
+    if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
+    if (!scalar) return true;
+    if (mesh->has_shells_alone) {
+        const scene_surface shells = session_shells_of(layer, height);
+        return mark_outer(mesh, &shells);
+    }
+    if (!add_surface(scalar, layer)) return false;
+    if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
@@ -103,7 +112,7 @@ static bool mark_image(session_mesh *mesh, const scene_image *image, const sessi
 {
     bool is_marked = true;
     for (int i = 0; i < image->isosurface_count && is_marked; i++)
-        is_marked = mark_surface(mesh, &image->isosurfaces[i]);
+        is_marked = mark_surface(mesh, &image->isosurfaces[i], image->height);
     for (int i = 0; i < image->volume_count && is_marked; i++) is_marked = mark_volume(mesh, &image->volumes[i]);
     for (int i = 0; i < image->surface_count && is_marked; i++) is_marked = mark_outer(mesh, &image->surfaces[i]);
     for (int i = 0; i < image->slice_count && is_marked; i++) is_marked = mark_slice(mesh, &image->slices[i], extent);

@@ -109,10 +109,12 @@ static void take_root(const session_mesh *mesh, const session_scalar *scalar, fi
     take((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-static void take_extent(const session_mesh *mesh, session_scalar *scalar, int threads, field_range *range)
+/* kind: of the cells. */
+static void take_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
+                        field_range *range)
 {
     double low, high;
-    session_scalar_extent(mesh, scalar, threads, SESSION_SOLID, &low, &high);
+    session_scalar_extent(mesh, scalar, threads, kind, &low, &high);
     take(low, high, range);
 }
 
@@ -132,8 +134,10 @@ static field_range own_range(const session_meshes *meshes, const planned_layer *
         session_scalar *scalar = session_find_scalar(mesh, field_of(layer));
         if (layer->surface && !of_all_cells)
             take_faces(mesh, layer->surface, &range);
+        else if (scalar && layer->isosurface && mesh->has_shells_alone)
+            take_extent(mesh, scalar, threads, SESSION_SEEN, &range); /* shells have no tree */
         else if (scalar && of_all_cells)
-            take_extent(mesh, scalar, threads, &range);
+            take_extent(mesh, scalar, threads, SESSION_SOLID, &range);
         else if (scalar)
             take_root(mesh, scalar, &range);
     }

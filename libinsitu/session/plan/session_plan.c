@@ -16,6 +16,7 @@
 #include "session_indexed.h"
 #include "session_recentre.h"
 #include "session_scalars.h"
+#include "session_shells.h"
 
 /* ---- can the image be drawn? --------------------------------------------------------------------------------- */
 
@@ -212,12 +213,20 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     }
 }
 
+/* on: has the meshes of the layer. */
+static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
+                                 base_error *error)
+{
+    return lines->is_given ? check_field(basis, &lines->field, on, error) : INSITU_OK;
+}
+
 static insitu_status check_surface(const session_plan_basis *basis, const scene_surface *layer, base_error *error)
 {
     insitu_status status = refuse_fault(find_hidden(basis, &layer->on), error);
     for (int i = 0; i < layer->on.mesh_count && !status; i++)
         status = check_named_mesh(basis, &layer->on, layer->on.meshes[i], error);
     if (!status && layer->threshold.is_given) status = check_field(basis, &layer->threshold.field, &layer->on, error);
+    if (!status) status = check_lines(basis, &layer->lines, &layer->on, error);
     return status || !layer->has_colour_by ? status : check_field(basis, &layer->colour_by, &layer->on, error);
 }
 
@@ -228,11 +237,14 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
         const scene_isosurface *layer = &image->isosurfaces[i];
         status = check_layer_field(basis, &layer->field, error);
         if (!status && layer->has_colour_by) status = check_field(basis, &layer->colour_by, &layer->field, error);
+        if (!status) status = check_lines(basis, &layer->lines, &layer->field, error);
     }
     for (int i = 0; i < image->volume_count && !status; i++)
         status = check_layer_field(basis, &image->volumes[i].field, error);
-    for (int i = 0; i < image->slice_count && !status; i++)
+    for (int i = 0; i < image->slice_count && !status; i++) {
         status = check_layer_field(basis, &image->slices[i].field, error);
+        if (!status) status = check_lines(basis, &image->slices[i].lines, &image->slices[i].field, error);
+    }
     for (int i = 0; i < image->surface_count && !status; i++) status = check_surface(basis, &image->surfaces[i], error);
     return status;
 }
@@ -332,6 +344,22 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     }
 }
 
+/* Warns of meshes that have the layer but not the field of its lines. on: the layer's meshes, and unless it is an outer
+ * surface its field. */
+static void warn_of_no_lines(const session_catalogue *catalogue, const scene_image *image, const scene_field *on,
+                             const scene_lines *lines, session_report *report)
+{
+    for (int m = 0; m < catalogue->mesh_count && lines->is_given && !lines->is_of_colours; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        const bool is_on = on->name ? find_shown(mesh, on) != NULL : scene_field_is_on(on, mesh->name);
+        const session_warning warning = {WARNING_NO_LINES, image->name, mesh->name, lines->field.line};
+        session_warn(report, &warning,
+                     mesh->first_rank >= 0 && is_on && !session_catalogue_find(mesh, lines->field.name),
+                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": a layer has no lines on it",
+                     image->name, mesh->name, lines->field.name);
+    }
+}
+
 /* Warns of a layer whose meshes have no cells but shells. */
 static void warn_of_shells(const session_catalogue *catalogue, const scene_image *image, const char *layer,
                            const scene_field *field, session_report *report)
@@ -376,7 +404,8 @@ static void warn_of_fields(const session_catalogue *catalogue, const scene_image
     scene_field_walk walk = {.image = image};
     for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
         const char *layer = scene_layer_word(walk.kind);
-        if (walk.role == SCENE_SHOWN) warn_of_shells(catalogue, image, layer, field, report);
+        if (walk.role == SCENE_SHOWN && walk.kind != SCENE_ISOSURFACE)
+            warn_of_shells(catalogue, image, layer, field, report);
         if (walk.role == SCENE_SHOWN) warn_of_apart(catalogue, image, layer, field, report);
     }
 }
@@ -387,6 +416,12 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
         if (image->isosurfaces[i].has_colour_by) warn_of_grey(catalogue, image, &image->isosurfaces[i], report);
     for (int i = 0; i < image->surface_count; i++)
         if (image->surfaces[i].has_colour_by) warn_of_grey_surface(catalogue, image, &image->surfaces[i], report);
+    for (int i = 0; i < image->isosurface_count; i++)
+        warn_of_no_lines(catalogue, image, &image->isosurfaces[i].field, &image->isosurfaces[i].lines, report);
+    for (int i = 0; i < image->surface_count; i++)
+        warn_of_no_lines(catalogue, image, &image->surfaces[i].on, &image->surfaces[i].lines, report);
+    for (int i = 0; i < image->slice_count; i++)
+        warn_of_no_lines(catalogue, image, &image->slices[i].field, &image->slices[i].lines, report);
 }
 
 static bool can_be_drawn(const session_plan_basis *basis, const scene_image *image, session_report *report,
@@ -432,6 +467,7 @@ static void take_images(const session_plan_basis *basis, session_report *report,
         if (image->variant.view > 0) continue;
         plan->slice_count += image->slice_count;
         plan->surface_count += image->surface_count;
+        if (session_has_shells(basis->catalogue)) plan->surface_count += image->isosurface_count;
     }
 }
 

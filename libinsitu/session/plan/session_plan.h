@@ -19,7 +19,8 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* that can be drawn */
     const scene_image **images;
-    int slice_count, surface_count; /* counts over all images, in which an orbit's views count once */
+    int slice_count, surface_count; /* counts over all images, in which an orbit's views count once; surfaces: outer
+                                       ones, and isosurfaces if there are meshes of shells alone */
     int recentring_count;
     session_recentring *recentrings;
     int *stale;         /* one for each, for session_recentre() */

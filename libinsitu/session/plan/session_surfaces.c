@@ -36,18 +36,31 @@ static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
     return count + 1;
 }
 
-/* Lists the outer surfaces of all layers and the meshes that they are on, in the same order on all ranks. Returns how
- * many. */
+/* Lists the outer surfaces of an image's layers and the meshes that they are on. Returns how many there are then. */
+static int list_image(const scene_image *image, const session_catalogue *catalogue, surface_wish *wishes, int count)
+{
+    static const scene_threshold none = {.is_given = false};
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        for (int n = 0; n < image->surface_count; n++) {
+            const surface_wish wish = {mesh, &image->surfaces[n].threshold};
+            if (scene_field_is_on(&image->surfaces[n].on, mesh->name)) count = add_wish(wishes, count, &wish);
+        }
+        for (int n = 0; n < image->isosurface_count && mesh->has_shells_alone; n++) {
+            const scene_field *field = &image->isosurfaces[n].field;
+            const bool is_on = scene_field_is_on(field, mesh->name) && session_catalogue_find(mesh, field->name);
+            if (is_on) count = add_wish(wishes, count, &(surface_wish){mesh, &none});
+        }
+    }
+    return count;
+}
+
+/* Lists those of all images, in the same order on all ranks. Returns how many. */
 static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_wish *wishes)
 {
     int count = 0;
     for (int i = 0; i < plan->image_count; i++)
-        for (int n = 0; n < plan->images[i]->surface_count && plan->images[i]->variant.view == 0; n++)
-            for (int m = 0; m < catalogue->mesh_count; m++) {
-                const scene_surface *layer = &plan->images[i]->surfaces[n];
-                const surface_wish wish = {&catalogue->meshes[m], &layer->threshold};
-                if (scene_field_is_on(&layer->on, wish.mesh->name)) count = add_wish(wishes, count, &wish);
-            }
+        if (plan->images[i]->variant.view == 0) count = list_image(plan->images[i], catalogue, wishes, count);
     return count;
 }
 
@@ -75,7 +88,8 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
 {
     session_mesh *mesh;
     session_outer *outer = find_own(meshes, wish, &mesh);
-    const insitu_status status = session_find_outer_faces(outer ? mesh : NULL, outer, &wish->mesh->homes, team, NULL, error);
+    const insitu_status status =
+        session_find_outer_faces(outer ? mesh : NULL, outer, &wish->mesh->homes, team, NULL, error);
     if (!status && outer) session_set_outer_fresh(mesh, outer);
     return status;
 }

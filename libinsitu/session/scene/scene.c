@@ -252,6 +252,7 @@ static void free_image(scene_image *image)
         scene_isosurface *surface = &image->isosurfaces[i];
         scene_free_field(&surface->field);
         scene_free_field(&surface->colour_by);
+        scene_free_field(&surface->lines.field);
         base_free(surface->values);
         base_free(surface->colours);
         free_colour_map(&surface->colour_map);
@@ -264,11 +265,13 @@ static void free_image(scene_image *image)
     for (int i = 0; i < image->surface_count; i++) {
         scene_free_field(&image->surfaces[i].on);
         scene_free_field(&image->surfaces[i].colour_by);
+        scene_free_field(&image->surfaces[i].lines.field);
         scene_free_field(&image->surfaces[i].threshold.field);
         free_colour_map(&image->surfaces[i].colour_map);
     }
     for (int i = 0; i < image->slice_count; i++) {
         scene_free_field(&image->slices[i].field);
+        scene_free_field(&image->slices[i].lines.field);
         base_free(image->slices[i].planes);
         free_colour_map(&image->slices[i].colour_map);
     }

@@ -124,6 +124,24 @@ typedef struct scene_material {
     float ambient, diffuse, specular, shininess;
 } scene_material;
 
+enum { SCENE_MAX_LINES = 64 };
+
+/* Contour lines on a layer's surface. */
+typedef struct scene_lines {
+    bool is_given; /* else there are none */
+    scene_field field;
+    bool is_of_colours;                 /* the field is that of the layer's colours */
+    bool has_values;                    /* else they cut a range into parts of equal width */
+    int count;                          /* 1 .. SCENE_MAX_LINES */
+    double values[SCENE_MAX_LINES];     /* rising */
+    float width;                        /* pixels */
+    float colours[3 * SCENE_MAX_LINES]; /* of each line, linear */
+    bool is_alone; /* nothing else is seen of the surface; its own colours are the lines' if a field colours it */
+} scene_lines;
+
+/* The width of lines where the scene gives none, in a picture of this height. */
+float scene_line_width(int height);
+
 typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES, SCENE_VERTEX } scene_normal;
 
 typedef struct scene_isosurface {
@@ -134,6 +152,7 @@ typedef struct scene_isosurface {
     bool has_colour_by;
     scene_field colour_by;
     scene_colour_map colour_map;
+    scene_lines lines;
     float opacity;
     scene_material material;
     scene_normal normals;
@@ -159,14 +178,16 @@ typedef struct scene_threshold {
 } scene_threshold;
 
 typedef struct scene_surface {
-    scene_field on;   /* the meshes; no field: name is NULL */
-    float colour[3];  /* linear */
-    float edge_width; /* pixels; 0: no edges are drawn */
+    scene_field on;    /* the meshes; no field: name is NULL */
+    bool is_of_shells; /* on meshes of shells alone; never of the file */
+    float colour[3];   /* linear */
+    float edge_width;  /* pixels; 0: no edges are drawn */
     float edge_colour[3];
     scene_threshold threshold;
     bool has_colour_by;
     scene_field colour_by;
     scene_colour_map colour_map;
+    scene_lines lines;
     float opacity;
     bool has_material; /* else flat data takes no light */
     scene_material material;
@@ -206,6 +227,7 @@ typedef struct scene_slice {
     int plane_count; /* 1 .. 64 */
     scene_plane *planes;
     scene_colour_map colour_map;
+    scene_lines lines;
     float opacity;
     scene_material material; /* no light by default: colours are those of the map */
     uint32_t clips;          /* a set of the image's */
@@ -368,6 +390,7 @@ typedef struct scene_image {
     scene_variant variant;
     bool has_isovalue; /* the sweep sets the isovalue */
     double isovalue;
+    bool has_plane;    /* the sweep sets the plane */
     char *swept_field; /* NULL: the sweep has no fields */
     int width, height; /* 1 .. 32768; 1280 × 720 by default */
     scene_camera camera;
@@ -390,7 +413,6 @@ typedef struct scene_image {
     uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */
     int occlusion_samples;        /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
     double occlusion_radius;      /* how far they go, in scene units; 0: by the bounds */
-    bool has_plane;               /* of a sweep: the variant has a plane of its own */
     scene_sampling_method method; /* default: one volume by segments, several by samples */
     double max_error; /* error bound of segments in a linear colour channel; 0: by step; default for one volume: 0.01 */
     bool has_default_samples; /* several volumes are sampled because the scene does not say how */
@@ -417,6 +439,7 @@ typedef enum scene_layer_kind { SCENE_ISOSURFACE, SCENE_VOLUME, SCENE_SLICE, SCE
 typedef enum scene_field_role {
     SCENE_SHOWN,    /* the layer is made of its values */
     SCENE_COLOURS,  /* it colours a surface */
+    SCENE_LINES,    /* contour lines on a surface are of it */
     SCENE_THRESHOLD /* it chooses cells */
 } scene_field_role;
 

@@ -101,6 +101,11 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
 insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
                                       scene_field *out, scene_colour_map *map);
 
+/* The contour lines of a layer, whose path is given; in: NULL where there are none. colours: the field that colours the
+ * layer, or NULL; height: of the picture. */
+insitu_status scene_convert_lines(const scene_document *d, const char *layer, const scene_file_lines *in,
+                                  const scene_field *colours, int height, scene_lines *out);
+
 /* NULL: a slight gloss. */
 scene_material scene_convert_material(const scene_file_material *in);
 
@@ -119,7 +124,7 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
                                     scene_surface *out);
 /* Counts the planes of all entries of its list. */
 int scene_count_planes(const scene_file_slice *in);
-insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
+insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in, int height,
                                   scene_slice *out);
 
 /* in: NULL where there is none; image: its path. */

@@ -82,11 +82,24 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 
 /* ---- walks ------------------------------------------------------------------------------------------------------- */
 
+/* The layer's contour lines; NULL: a volume has none. */
+static scene_lines *lines_of(const scene_image *image, scene_layer_kind kind, int layer)
+{
+    switch (kind) {
+    case SCENE_ISOSURFACE: return &image->isosurfaces[layer].lines;
+    case SCENE_SURFACE: return &image->surfaces[layer].lines;
+    case SCENE_SLICE: return &image->slices[layer].lines;
+    default: return NULL;
+    }
+}
+
 /* The layer's field of this role; NULL: it has none. */
 static scene_field *field_of(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
 {
     scene_isosurface *isosurface = kind == SCENE_ISOSURFACE ? &image->isosurfaces[layer] : NULL;
     scene_surface *surface = kind == SCENE_SURFACE ? &image->surfaces[layer] : NULL;
+    scene_lines *lines = role == SCENE_LINES ? lines_of(image, kind, layer) : NULL;
+    if (role == SCENE_LINES) return lines && lines->is_given ? &lines->field : NULL;
     if (role == SCENE_THRESHOLD) return surface && surface->threshold.is_given ? &surface->threshold.field : NULL;
     if (surface) return role == SCENE_COLOURS && surface->has_colour_by ? &surface->colour_by : NULL;
     if (role == SCENE_COLOURS) return isosurface && isosurface->has_colour_by ? &isosurface->colour_by : NULL;

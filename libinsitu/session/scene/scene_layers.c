@@ -60,7 +60,7 @@ static insitu_status convert_colours(const scene_document *d, const char *path, 
 }
 
 static insitu_status convert_isosurface(const scene_document *d, const char *path, const scene_file_isosurface *in,
-                                        int first_value, scene_isosurface *out)
+                                        int first_value, int height, scene_isosurface *out)
 {
     out->opacity = in->opacity ? (float)*in->opacity : 1;
     out->material = scene_convert_material(in->material);
@@ -78,7 +78,8 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     out->has_colour_by = in->colour_by != NULL;
     if (status == INSITU_OK && in->colour_by)
         status = scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);
-    return status;
+    if (status) return status;
+    return scene_convert_lines(d, path, in->lines, in->colour_by ? &out->colour_by : NULL, height, &out->lines);
 }
 
 static insitu_status convert_opacity(const scene_document *d, const char *path, const scene_file_volume *in,
@@ -194,10 +195,10 @@ static insitu_status convert_layer(const scene_document *d, const char *path, co
                                    scene_image *out)
 {
     if (in->volume) return convert_volume(d, path, in->volume, &out->volumes[out->volume_count++]);
-    if (in->slice) return scene_convert_slice(d, path, in->slice, &out->slices[out->slice_count++]);
+    if (in->slice) return scene_convert_slice(d, path, in->slice, out->height, &out->slices[out->slice_count++]);
     if (in->surface)
         return scene_convert_surface(d, path, in->surface, out->height, &out->surfaces[out->surface_count++]);
-    return convert_isosurface(d, path, in->isosurface, values, &out->isosurfaces[out->isosurface_count++]);
+    return convert_isosurface(d, path, in->isosurface, values, out->height, &out->isosurfaces[out->isosurface_count++]);
 }
 
 insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,

@@ -98,6 +98,14 @@ typedef struct scene_file_clip {
     int *keep; /* scene_keep */
 } scene_file_clip;
 
+typedef struct scene_file_lines {
+    char *field, *component;
+    double *values;
+    int values_count;
+    int *count;
+    double *width, *colour; /* colour: 3 */
+} scene_file_lines;
+
 typedef struct scene_file_isosurface {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
@@ -110,6 +118,7 @@ typedef struct scene_file_isosurface {
     scene_file_material *material;
     int *normals; /* scene_normal */
     double *difference;
+    scene_file_lines *lines;
     scene_file_clip *clip;
 } scene_file_isosurface;
 
@@ -139,6 +148,7 @@ typedef struct scene_file_surface {
     scene_file_threshold *threshold;
     double *opacity;
     scene_file_material *material;
+    scene_file_lines *lines;
     scene_file_clip *clip;
 } scene_file_surface;
 
@@ -150,6 +160,7 @@ typedef struct scene_file_slice {
     scene_file_colour_map colours;
     double *opacity;
     scene_file_material *material;
+    scene_file_lines *lines;
     scene_file_clip *clip;
 } scene_file_slice;
 

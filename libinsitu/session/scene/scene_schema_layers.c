@@ -189,6 +189,36 @@ DEFINE_MAPPING(material, "material", MATERIAL_KEYS);
       .by_default = "grey, `[0.6, 0.6, 0.6]`", .low = 0, .high = 1)
 DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
 
+#define LINES_KEYS(X)                                                                                                  \
+    X(TEXT("field", OPTIONAL, scene_file_lines, field, 255),                                                           \
+      .help = "Name of the field whose lines are drawn; at most 255 bytes. Meshes that do not have it have no lines, " \
+              "with a warning. Values in cells are taken to the vertices, as for an isosurface.",                      \
+      .by_default = "the field that colours the layer")                                                                \
+    X(TEXT("component", OPTIONAL, scene_file_lines, component, 16), .help = COMPONENT_HELP,                            \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CYAML_FIELD_SEQUENCE("values", POINTER, scene_file_lines, values, &number, 1, SCENE_MAX_LINES),                  \
+      .help = "The values at which lines are drawn, none twice. One of `values` and `count` is needed.",               \
+      .by_default = "by `count`")                                                                                      \
+    X(CYAML_FIELD_INT_PTR("count", OPTIONAL, scene_file_lines, count),                                                 \
+      .help = "So many lines, which cut the range into parts of equal width: that of the layer's colours, evenly "     \
+              "along their `scale`; with `field` the least and the greatest value on the meshes of the layer, over "   \
+              "all ranks, at each drawn step.",                                                                        \
+      .by_default = "by `values`", .low = 1, .high = SCENE_MAX_LINES)                                                  \
+    X(CYAML_FIELD_FLOAT_PTR("width", OPTIONAL, scene_file_lines, width),                                               \
+      .help = "Width of the lines, in pixels, whatever way the surface is turned. Lines less than two widths apart "   \
+              "fade, and are gone where they would touch.",                                                            \
+      .by_default = "a 600th of the picture's height, but at least 1.5", .low = 0.5, .high = 100)                      \
+    X(NUMBERS("colour", scene_file_lines, colour, 3),                                                                  \
+      .help = "Colour of the lines, sRGB, before light falls on it. They are as transparent as the layer.",            \
+      .by_default = "`[0.1, 0.1, 0.1]`", .low = 0, .high = 1)
+DEFINE_MAPPING(lines, "lines", LINES_KEYS);
+
+/* The key of a layer of the type. */
+#define LINES_KEY(X, type)                                                                                             \
+    X(CYAML_FIELD_MAPPING_PTR("lines", OPTIONAL, type, lines, lines_fields),                                           \
+      .help = "Contour lines: where a field has given values on the surface.", .by_default = "none",                   \
+      .child = &lines_mapping)
+
 #define ISOSURFACE_KEYS(X)                                                                                             \
     X(TEXT("field", REQUIRED, scene_file_isosurface, field, 255), .help = FIELD_HELP)                                  \
     X(TEXT("component", OPTIONAL, scene_file_isosurface, component, 16), .help = COMPONENT_HELP,                       \
@@ -222,6 +252,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
       .help = "Distance between the two samples of a difference, in sizes of the cell that is hit.",                   \
       .by_default = "`1`", .low = 0, .is_low_excluded = true, .high = 100)                                             \
+    LINES_KEY(X, scene_file_isosurface)                                                                                \
     CLIP_KEY(X, scene_file_isosurface, "")
 DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
 
@@ -268,6 +299,7 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_slice, material, material_fields),                      \
       .help = "How the planes take light, as an isosurface where it is given; `{}` for a slight gloss.",               \
       .by_default = "no light: the colours are those of the map", .child = &material_mapping)                          \
+    LINES_KEY(X, scene_file_slice)                                                                                     \
     CLIP_KEY(X, scene_file_slice, "")
 DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
 
@@ -314,12 +346,15 @@ DEFINE_MAPPING(threshold, "threshold", THRESHOLD_KEYS);
       .by_default = "a slight gloss; of flat data (see `automatic`), where the image gives no `lights`, the colours "  \
                     "as they are",                                                                                     \
       .child = &material_mapping)                                                                                      \
+    LINES_KEY(X, scene_file_surface)                                                                                   \
     CLIP_KEY(X, scene_file_surface, "")
 DEFINE_MAPPING(surface, "surface", SURFACE_KEYS);
 
 #define LAYER_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_MAPPING_PTR("isosurface", OPTIONAL, scene_file_layer, isosurface, isosurface_fields),                \
-      .help = "Surfaces on which a field has given values.", .by_default = "none", .child = &isosurface_mapping)       \
+      .help = "Surfaces on which a field has given values. On a mesh of triangles, quads and polygons alone its "      \
+              "contour lines, as wide as `lines` are by default; there each layer counts as one isovalue more.",       \
+      .by_default = "none", .child = &isosurface_mapping)                                                              \
     X(CYAML_FIELD_MAPPING_PTR("volume", OPTIONAL, scene_file_layer, volume, volume_fields),                            \
       .help = "A field as coloured mist. At most 4 in an image.", .by_default = "none", .child = &volume_mapping)      \
     X(CYAML_FIELD_MAPPING_PTR("slice", OPTIONAL, scene_file_layer, slice, slice_fields),                               \

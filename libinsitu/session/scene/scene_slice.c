@@ -84,7 +84,7 @@ static insitu_status convert_planes(const scene_document *d, const char *path, c
     return status;
 }
 
-insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
+insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in, int height,
                                   scene_slice *out)
 {
     out->opacity = in->opacity ? (float)*in->opacity : 1;
@@ -93,5 +93,6 @@ insitu_status scene_convert_slice(const scene_document *d, const char *path, con
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
     if (status == INSITU_OK) status = convert_planes(d, path, in, out);
+    if (status == INSITU_OK) status = scene_convert_lines(d, path, in->lines, &out->field, height, &out->lines);
     return status;
 }

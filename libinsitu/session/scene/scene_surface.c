@@ -40,6 +40,8 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
         return scene_bad(d, path, "colour", "given beside colour_by, expected one of the two");
     insitu_status status = scene_convert_meshes(d, path, &out->on);
     if (!status) status = convert_threshold(d, path, in->threshold, &out->threshold);
-    if (status || !in->colour_by) return status;
-    return scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);
+    if (!status && in->colour_by)
+        status = scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);
+    if (status) return status;
+    return scene_convert_lines(d, path, in->lines, in->colour_by ? &out->colour_by : NULL, height, &out->lines);
 }

@@ -159,7 +159,9 @@ insitu_status session_check_vertex_order(const session_meshes *meshes, session_c
                              "MPI_Allreduce");
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const int64_t *of_mesh = sums + m * CELL_SUMS;
+        session_mesh *own = session_find_mesh(meshes, catalogue->meshes[m].name);
         catalogue->meshes[m].has_shells_alone = of_mesh[DRAWN] == 0 && of_mesh[SHELLS] > 0;
+        if (own) own->has_shells_alone = catalogue->meshes[m].has_shells_alone;
         warn_of_order(report, catalogue->meshes[m].name, of_mesh);
     }
     base_free(sums);

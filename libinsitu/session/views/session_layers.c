@@ -8,10 +8,12 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_contours.h"
 #include "session_distances.h"
 #include "session_outer_mesh.h"
 #include "session_ranges.h"
 #include "session_scalars.h"
+#include "session_shells.h"
 #include "session_thresholds.h"
 
 static bool is_part(const session_mesh *mesh)
@@ -26,12 +28,15 @@ static int count_surfaces(const scene_image *image)
     return count;
 }
 
-static bool allocate_layers(const session_meshes *meshes, const scene_image *image, session_layers *out)
+static bool allocate_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out)
 {
-    const size_t surfaces = (size_t)count_surfaces(image), volumes = (size_t)image->volume_count;
+    const session_meshes *meshes = basis->meshes;
+    const int shells = basis->has_shells ? image->isosurface_count : 0;
+    const size_t surfaces = (size_t)(count_surfaces(image) + shells), volumes = (size_t)image->volume_count;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) out->part_count += is_part(walk.part);
-    const size_t fields = (size_t)out->part_count * (2 * surfaces + volumes);
+    const size_t fields = (size_t)out->part_count * (3 * surfaces + volumes);
     out->surface_count = (int)surfaces;
+    out->first_outer = image->isosurface_count + shells;
     out->parts = base_calloc((size_t)out->part_count, sizeof *out->parts);
     out->surfaces = base_calloc(surfaces, sizeof *out->surfaces);
     out->volumes = base_calloc(volumes, sizeof *out->volumes);
@@ -42,9 +47,10 @@ static bool allocate_layers(const session_meshes *meshes, const scene_image *ima
     out->gathered = base_calloc(fields, sizeof *out->gathered);
     out->gradients = base_calloc((size_t)out->part_count * (size_t)image->isosurface_count, sizeof *out->gradients);
     out->distances = base_calloc(surfaces, sizeof *out->distances);
+    out->contours = base_calloc(surfaces, sizeof *out->contours);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
     return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->gathered &&
-           out->gradients && out->distances && out->ranges;
+           out->gradients && out->distances && out->contours && out->ranges;
 }
 
 void session_layers_free(session_layers *layers)
@@ -59,6 +65,7 @@ void session_layers_free(session_layers *layers)
     base_free(layers->gathered);
     base_free(layers->gradients);
     base_free(layers->distances);
+    base_free(layers->contours);
     base_free(layers->ranges);
     *layers = (session_layers){0};
 }
@@ -161,6 +168,36 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     return INSITU_OK; /* lack of memory is left to the next agreement */
 }
 
+/* Returns the slot of the fields of a surface's lines. */
+static int lines_slot(const session_layers *layers, const scene_image *image, int surface)
+{
+    return 2 * layers->surface_count + image->volume_count + surface;
+}
+
+/* Makes the lines of a surface, whose colours' transfer function is there. Collective. */
+static insitu_status make_lines(const session_layer_basis *basis, const scene_lines *in, render_field field,
+                                int surface, session_layers *layers, base_error *error)
+{
+    session_contours *out = &layers->contours[surface];
+    if (!in->is_given) return INSITU_OK;
+    const render_transfer *colours = in->is_of_colours ? &layers->transfers[surface].transfer : NULL;
+    const insitu_status status = session_make_contours(basis->meshes, basis->team, in, colours, out, error);
+    out->lines.field = field;
+    if (in->is_alone && layers->surfaces[surface].colour_map) out->lines.colours = NULL;
+    if (out->lines.count) layers->surfaces[surface].lines = &out->lines;
+    return status;
+}
+
+/* As above, of a surface in the meshes' own cells. */
+static insitu_status place_lines(const session_layer_basis *basis, const scene_lines *in, int surface,
+                                 session_layers *layers, base_error *error)
+{
+    if (!in->is_given) return INSITU_OK;
+    const int slot = lines_slot(layers, basis->image, surface);
+    const render_field field = place_field(basis->meshes, layers, slot, &in->field, NULL, false);
+    return make_lines(basis, in, field, surface, layers, error);
+}
+
 /* An isosurface is as rough as its cells are: within one it bends, between two it breaks, and in polyhedra it juts out
  * at faces. Hits nearer than this share of a cell count as the surface itself, which does not shade itself. */
 #define CONTACT 0.5F
@@ -183,10 +220,13 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .contact = CONTACT,
                                   .clips = layer->clips};
     if (layer->normals == SCENE_VERTEX) out->gradients = place_gradients(basis->meshes, layers, index, &layer->field);
-    if (!layer->has_colour_by) return INSITU_OK;
-    out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, NULL, false);
-    out->colour_map = &layers->transfers[index].transfer;
-    return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
+    insitu_status status = INSITU_OK;
+    if (layer->has_colour_by) {
+        out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, NULL, false);
+        out->colour_map = &layers->transfers[index].transfer;
+        status = make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
+    }
+    return status ? status : place_lines(basis, &layer->lines, index, layers, error);
 }
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
@@ -194,7 +234,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 /* Returns whether the layer shows the outer faces that the part is made of. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
-    return walk->outer && scene_field_is_on(&layer->on, walk->whole->name) &&
+    return walk->outer && session_surface_is_on(layer, walk->whole) &&
            session_find_outer(walk->whole, &layer->threshold) == walk->outer;
 }
 
@@ -228,16 +268,15 @@ static bool gather(const session_mesh *whole, const session_outer *outer, const 
     return *values != NULL;
 }
 
-/* Gathers the field of the colours at the outer faces from the cells'. */
+/* Gathers a field at the outer faces from the cells'. */
 static bool place_gathered(const session_meshes *meshes, session_layers *layers, int slot, const scene_surface *layer,
-                           render_field *out)
+                           const scene_field *field, render_field *out)
 {
     ptrdiff_t at = (ptrdiff_t)slot * layers->part_count;
     *out = (render_field){layers->fields + at, layers->ranges + at};
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         if (!is_part(walk.part)) continue;
-        const session_scalar *scalar =
-            is_shown(&walk, layer) ? session_find_scalar(walk.whole, &layer->colour_by) : NULL;
+        const session_scalar *scalar = is_shown(&walk, layer) ? session_find_scalar(walk.whole, field) : NULL;
         layers->fields[at] = absent_field();
         if (scalar && !gather(walk.whole, walk.outer, scalar, &layers->gathered[at], &layers->fields[at])) return false;
         at++;
@@ -268,13 +307,20 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                   .is_of_faces = true,
                                   .clips = layer->clips};
     memcpy(out->edge_colour, layer->edge_colour, sizeof out->edge_colour);
-    if (!layer->has_colour_by) return INSITU_OK;
-    out->colour_map = &layers->transfers[surface].transfer;
-    if (!place_gathered(basis->meshes, layers, 2 * surface + 1, layer, &out->colour_field))
+    if (layer->has_colour_by) {
+        out->colour_map = &layers->transfers[surface].transfer;
+        if (!place_gathered(basis->meshes, layers, 2 * surface + 1, layer, &layer->colour_by, &out->colour_field))
+            session_no_memory(error, 1 << 10, "values at outer faces");
+    }
+    render_field field = {NULL, NULL};
+    const int slot = lines_slot(layers, basis->image, surface);
+    if (layer->lines.is_given && !place_gathered(basis->meshes, layers, slot, layer, &layer->lines.field, &field))
         session_no_memory(error, 1 << 10, "values at outer faces");
-    const insitu_status status = session_agree(basis->team->comm, error);
-    if (status) return status;
-    return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[surface], error);
+    if (!layer->has_colour_by && !layer->lines.is_given) return INSITU_OK;
+    insitu_status status = session_agree(basis->team->comm, error);
+    if (!status && layer->has_colour_by)
+        status = make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[surface], error);
+    return status ? status : make_lines(basis, &layer->lines, field, surface, layers, error);
 }
 
 /* ---- slices -------------------------------------------------------------------------------------------------- */
@@ -312,13 +358,13 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
         .material = {m->ambient, m->diffuse, m->specular, m->shininess},
         .normal = RENDER_GRADIENT,
         .clips = layer->clips};
-    return INSITU_OK;
+    return place_lines(basis, &layer->lines, surface, layers, error);
 }
 
 static insitu_status fill_slices(const session_layer_basis *basis, const scene_image *image, session_layers *layers,
                                  base_error *error)
 {
-    int surface = image->isosurface_count + image->surface_count;
+    int surface = layers->first_outer + image->surface_count;
     insitu_status status = INSITU_OK;
     for (int i = 0; i < image->slice_count; i++)
         for (int p = 0; p < image->slices[i].plane_count && !status; p++)
@@ -352,7 +398,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
                                   base_error *error)
 {
     session_layers layers = {0};
-    if (!error->status && !allocate_layers(basis->meshes, image, &layers))
+    if (!error->status && !allocate_layers(basis, image, &layers))
         session_no_memory(error, 1 << 10, "an image's layers");
     /* Where the scene asks for too much, the error is not one rank's. */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
@@ -361,8 +407,12 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
+    for (int i = image->isosurface_count; i < layers.first_outer && !status; i++) {
+        const scene_surface shells = session_shells_of(&image->isosurfaces[i - image->isosurface_count], image->height);
+        status = fill_outer(basis, &shells, i, &layers, error);
+    }
     for (int i = 0; i < image->surface_count && !status; i++)
-        status = fill_outer(basis, &image->surfaces[i], image->isosurface_count + i, &layers, error);
+        status = fill_outer(basis, &image->surfaces[i], layers.first_outer + i, &layers, error);
     if (!status) status = fill_slices(basis, image, &layers, error);
     for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(basis, image, i, &layers, error);
     if (status)

@@ -4,6 +4,7 @@
 
 #include "render.h"
 #include "scene.h"
+#include "session_contours.h"
 #include "session_mesh.h"
 #include "session_report.h"
 #include "session_run_ranges.h"
@@ -14,11 +15,13 @@ typedef struct session_layers {
     int part_count, transfer_count;
     render_part *parts;
     int surface_count;
-    render_surface_layer *surfaces; /* isosurfaces, outer surfaces, planes of slices */
+    int first_outer;                /* the place of the first outer surface */
+    render_surface_layer *surfaces; /* isosurfaces, their lines on shells if there are any, outer surfaces, planes */
     render_volume_layer *volumes;
     session_transfer *transfers; /* those of surfaces, then those of volumes */
     double *distances;           /* one for each surface: the isovalues of planes; 0 */
-    grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
+    session_contours *contours;  /* one for each surface */
+    grid_field *fields;          /* part_count a surface and its colour, in turns, a volume, and a surface's lines */
     int64_t field_count;
     render_vertex_gradients *gradients; /* part_count an isosurface */
     double **gathered;                  /* as the fields: values at outer faces; NULL where they are not such */
@@ -31,6 +34,7 @@ typedef struct session_layer_basis {
     const session_team *team;
     double half_diagonal; /* half the diagonal of the global bounds */
     bool is_flat;         /* session_flat_axis() found an axis */
+    bool has_shells;      /* session_has_shells() */
     session_report *report;
     session_image_ranges *run_ranges; /* NULL: no layer has one over the run */
     const scene_image *image;

@@ -114,23 +114,29 @@ static bool replace_field(scene_field *field, const char *name, int line)
     return true;
 }
 
+/* Lines of the field that colours a layer are of the one that takes its place. */
+static bool replace_colours(scene_field *field, scene_lines *lines, const char *name, int line)
+{
+    return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
+}
+
 /* Replaces the field in all layers that a field colours; *count is their number. */
 static bool replace_fields(scene_image *image, const char *name, int line, int *count)
 {
     bool is_done = true;
     *count = image->slice_count + image->volume_count;
     for (int i = 0; i < image->slice_count && is_done; i++)
-        is_done = replace_field(&image->slices[i].field, name, line);
+        is_done = replace_colours(&image->slices[i].field, &image->slices[i].lines, name, line);
     for (int i = 0; i < image->volume_count && is_done; i++)
         is_done = replace_field(&image->volumes[i].field, name, line);
     for (int i = 0; i < image->isosurface_count && is_done; i++) {
         if (!image->isosurfaces[i].has_colour_by) continue;
-        is_done = replace_field(&image->isosurfaces[i].colour_by, name, line);
+        is_done = replace_colours(&image->isosurfaces[i].colour_by, &image->isosurfaces[i].lines, name, line);
         ++*count;
     }
     for (int i = 0; i < image->surface_count && is_done; i++) {
         if (!image->surfaces[i].has_colour_by) continue;
-        is_done = replace_field(&image->surfaces[i].colour_by, name, line);
+        is_done = replace_colours(&image->surfaces[i].colour_by, &image->surfaces[i].lines, name, line);
         ++*count;
     }
     return is_done;
