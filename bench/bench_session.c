@@ -31,6 +31,12 @@ void session_check_words(const insitu_image *image, insitu_word_faults *out)
     *out = (insitu_word_faults){.font = ""};
 }
 
+insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
+{
+    (void)image, (void)place, (void)error;
+    return INSITU_OK;
+}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {

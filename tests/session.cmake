@@ -88,6 +88,8 @@ insitu_add_mpi_test(session_hanging test_session_hanging 1 3 WHOLE 2 TIMEOUT 120
 insitu_session_program(test_session_shells)
 insitu_add_mpi_test(session_shells test_session_shells 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_montage)
+insitu_add_mpi_test(session_montage test_session_montage 1 3 WHOLE 2 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_lines)
 insitu_add_mpi_test(session_lines test_session_lines 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_plane)

@@ -472,6 +472,33 @@ void pipe_in_the_picture_s_place_is_told(void **)
     assert_int_equal(count_files(in), 1);
 }
 
+/* A picture in its place in a larger one is over its background, as in a file of its own; around it nothing changes.
+ * Where it would not lie in the larger one's columns it is refused. */
+void pictures_are_put_into_places(void **)
+{
+    const int width = 7, height = 5, larger = 20, rows = 9, left = 4, top = 3;
+    const std::vector<float> own(static_cast<std::size_t>(4 * width * height), 0.25F);
+    insitu_decorations d{};
+    d.background[0] = d.background[1] = d.background[2] = 0.5F;
+    d.background[3] = 1;
+    d.size = 0.05;
+    const insitu_image image{width, height, own.data(), nullptr, &d, 0, nullptr, nullptr};
+    std::vector<float> all(static_cast<std::size_t>(4 * larger * rows), 0.125F);
+    const insitu_place place{all.data(), larger, left, top};
+    base_error error{};
+    assert_int_equal(session_place_image(&image, &place, &error), INSITU_OK);
+    for (int y = 0; y < rows; y++)
+        for (int x = 0; x < larger; x++)
+            for (int c = 0; c < 4; c++) {
+                const bool is_in = x >= left && x < left + width && y >= top && y < top + height;
+                const float is = all[static_cast<std::size_t>(4 * (y * larger + x) + c)];
+                assert_true(std::fabs(is - (!is_in ? 0.125F : c == 3 ? 1 : 0.25F + 0.75F * 0.5F)) < 1e-6F);
+            }
+    const insitu_place beside{all.data(), larger, larger - width + 1, 0};
+    assert_int_equal(session_place_image(&image, &beside, &error), INSITU_ERROR_ARGUMENT);
+    assert_string_equal(error.message, "no image, or no place for it");
+}
+
 void nonsense_is_refused(void **)
 {
     const picture p = make_picture(3, 2, true);
@@ -513,6 +540,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(planted_links_keep_their_victims),
         cmocka_unit_test(files_of_killed_runs_are_removed),
         cmocka_unit_test(pipe_in_the_picture_s_place_is_told),
+        cmocka_unit_test(pictures_are_put_into_places),
         cmocka_unit_test(nonsense_is_refused),
     };
     const int failures = cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -202,6 +202,28 @@ static void databases_have_the_columns_of_their_images(void **state)
     scene_free(&s);
 }
 
+static void grids_number_their_cells(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good("images:\n- name: a\n  size: [8, 6]\n  camera: {orbit: {views: 2}}\n  sweep: {fields: [p, r]}\n"
+               "  layers: [{volume: {field: p}}]\n"
+               "  outputs: [{path: \"all_{cycle:04}.png\", grid: [3, 2]}, {path: \"{field}_{view}.png\"}]\n"
+               "- name: b\n  size: [8, 6]\n  layers: [{volume: {field: p}}]\n"
+               "  outputs: [{path: \"all_{cycle}.png\", grid: [3, 2]}, {path: \"{name}.png\", grid: [1, 1]}]\n",
+               &s);
+    assert_int_equal(s.image_count, 5);
+    assert_int_equal(s.montage_count, 2);
+    assert_true(s.montages[0].columns == 3 && s.montages[0].rows == 2 && s.montages[0].cell_count == 5);
+    assert_true(s.montages[0].width == 8 && s.montages[0].height == 6 && s.montages[1].cell_count == 1);
+    for (int i = 0; i < 5; i++) {
+        const scene_output *output = &s.images[i].outputs[0];
+        assert_true(output->montage == 0 && output->first_cell + s.images[i].variant.view == i);
+    }
+    assert_true(s.images[0].outputs[1].montage == -1 && s.images[4].outputs[1].montage == 1);
+    scene_free(&s);
+}
+
 /* ---- paths ----------------------------------------------------------------------------------------------------- */
 
 static const char moving[] = "angle: 30, path: [{time: 1, position: [0, 0, 8], focal: [0, 0, 0]}, "
@@ -291,6 +313,7 @@ int main(void)
         cmocka_unit_test(orbits_have_their_defaults),
         cmocka_unit_test(sweeps_make_each_combination_once),
         cmocka_unit_test(sweeps_go_through_planes),
+        cmocka_unit_test(grids_number_their_cells),
         cmocka_unit_test(databases_have_the_columns_of_their_images),
         cmocka_unit_test(paths_go_through_their_places_and_stay_at_the_ends),
         cmocka_unit_test(paths_of_two_places_ease_in_and_out),

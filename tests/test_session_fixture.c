@@ -364,6 +364,15 @@ static void catch_bars(const insitu_decorations *decorations, char *out, size_t 
     }
 }
 
+insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
+{
+    (void)error;
+    for (int y = 0; y < image->height; y++)
+        memcpy(place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x),
+               image->rgba + 4 * (ptrdiff_t)y * image->width, 4 * (size_t)image->width * sizeof(float));
+    return INSITU_OK;
+}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {

@@ -241,6 +241,18 @@ void write(const insitu_image &image, insitu_image_format format, const std::str
     write_undecorated(finished, format, path);
 }
 
+void place(const insitu_image &image, const insitu_place &at)
+{
+    std::vector<float> rgba(image.rgba, image.rgba + 4 * pixel_count(image));
+    const std::size_t row = 4 * static_cast<std::size_t>(image.width);
+    if (image.decorations) decorate(image, rgba);
+    for (int y = 0; y < image.height; y++) {
+        const std::size_t to =
+            static_cast<std::size_t>(at.y + y) * static_cast<std::size_t>(at.width) + static_cast<std::size_t>(at.x);
+        std::copy_n(rgba.data() + static_cast<std::size_t>(y) * row, row, at.rgba + 4 * to);
+    }
+}
+
 insitu_status fail(insitu_status status, const char *path, const char *what, char *message, std::size_t size)
 {
     if (message && size) std::snprintf(message, size, "%s: cannot be written: %s", path ? path : "(no path)", what);
@@ -257,6 +269,22 @@ extern "C" insitu_status insitu_image_check_words(const insitu_image *image, ins
         return INSITU_OK;
     } catch (...) {
         *out = {};
+        return INSITU_ERROR_MEMORY;
+    }
+}
+
+extern "C" insitu_status insitu_image_place(const insitu_image *image, const insitu_place *at, char *message,
+                                            size_t size)
+{
+    const bool is_in = image && image->rgba && at && at->rgba && image->width > 0 && image->height > 0 && at->x >= 0 &&
+                       at->y >= 0 && at->width - at->x >= image->width;
+    if (message && size) std::snprintf(message, size, "%s", is_in ? "" : "no image, or no place for it");
+    if (!is_in) return INSITU_ERROR_ARGUMENT;
+    try {
+        place(*image, *at);
+        return INSITU_OK;
+    } catch (...) {
+        if (message && size) std::snprintf(message, size, "no memory for a picture beside others");
         return INSITU_ERROR_MEMORY;
     }
 }

@@ -68,6 +68,7 @@ static void free_session(insitu_session *session)
     session_drop_kept(&session->kept);
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
+    session_montages_free(&session->montages);
     session_news_free(&session->news);
     session_overwrites_free(&session->overwrites);
     session_report_free(&session->report);

@@ -9,6 +9,7 @@
 #include "session_cinema.h"
 #include "session_events.h"
 #include "session_mesh.h"
+#include "session_montage.h"
 #include "session_news.h"
 #include "session_overwrites.h"
 #include "session_parameters.h"
@@ -34,8 +35,9 @@ struct insitu_session {
     session_writer writer; /* rank 0 */
     session_kept_pictures kept;
     session_run_ranges run_ranges;
-    session_cinema cinema; /* rank 0 */
-    session_news news;     /* rank 0 */
+    session_cinema cinema;     /* rank 0 */
+    session_montages montages; /* rank 0 */
+    session_news news;         /* rank 0 */
     session_overwrites overwrites;
     session_events events;
     session_report report;

@@ -45,6 +45,7 @@ static void reload_scene(insitu_session *s)
     session_writer_drop_memory(&s->writer);
     session_run_ranges_free(&s->run_ranges);
     session_cinema_free(&s->cinema);
+    session_montages_free(&s->montages);
     session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
     s->catalogue.are_joined = s->catalogue.are_parts_known = false;
@@ -175,10 +176,22 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
                                 changes->is_filled,   s->kept.is_on};
     base_error of_events = {.status = INSITU_OK};
-    const session_drawing drawing = {
-        team,       s->scene_file.path, changes->cycle, &s->meshes,    &s->trees.parent,
-        &s->space,  &s->run_ranges,     &s->report,     &s->kept,      basis.scene,
-        &s->cinema, &s->overwrites,     &s->writer,     &s->catalogue, changes->writes_behind};
+    const session_drawing drawing = {team,
+                                     s->scene_file.path,
+                                     changes->cycle,
+                                     &s->meshes,
+                                     &s->trees.parent,
+                                     &s->space,
+                                     &s->run_ranges,
+                                     &s->report,
+                                     &s->kept,
+                                     basis.scene,
+                                     &s->cinema,
+                                     &s->montages,
+                                     &s->overwrites,
+                                     &s->writer,
+                                     &s->catalogue,
+                                     changes->writes_behind};
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, refused, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);

@@ -139,6 +139,20 @@ typedef insitu_status insitu_image_write_function(const insitu_image *image, ins
 
 INSITU_API insitu_image_write_function insitu_image_write;
 
+/* A place in a larger picture for a smaller one. */
+typedef struct insitu_place {
+    float *rgba; /* the larger picture's, as insitu_image has them; written */
+    int width;   /* the larger picture's */
+    int x, y;    /* of the smaller one's upper left pixel; all of it lies in the larger one */
+} insitu_place;
+
+/* Draw the image's decorations over its colours and put these into the place; the image stays as it is. On an error,
+ * message (size bytes) says what went wrong, and the place is as it was; otherwise it is empty. Local. Thread-safe. */
+typedef insitu_status insitu_image_place_function(const insitu_image *image, const insitu_place *place, char *message,
+                                                  size_t size);
+
+INSITU_API insitu_image_place_function insitu_image_place;
+
 /* Reasons why a picture's words are not drawn as they are given. Each text is empty, or one line. */
 typedef struct insitu_word_faults {
     char font[1024];    /* no font was found, so words are left out; or OPENIMAGEIO_FONTS names none that can be read */

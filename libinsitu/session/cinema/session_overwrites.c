@@ -81,6 +81,9 @@ void session_note_written(session_overwrites *all, const scene *scene, int image
     if (!has_room(all, scene)) return;
     const int first = outputs_before(scene, image);
     for (int i = 0; i < drawn->output_count; i++) {
+        const scene_output *output = &drawn->outputs[i];
+        if (output->montage >= 0 && output->first_cell + drawn->variant.view > 0)
+            continue; /* one file has many cells */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_of(path);

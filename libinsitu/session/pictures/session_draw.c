@@ -357,6 +357,7 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     }
     files->scene = d->scene;
     files->cinema = d->cinema;
+    files->montages = d->montages;
     files->has_picture = true;
     files->image = *image;
     files->moment = moment_of(d, image);
@@ -455,17 +456,19 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     return status;
 }
 
-/* Writes the tables of databases on rank 0, with the lines of all pictures of the step. Collective. */
+/* Writes the tables of databases on rank 0, with the lines of all pictures of the step, and pictures side by side.
+ * Collective. */
 static void write_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};
-    if (d->scene->database_count == 0) return;
+    if (d->scene->database_count == 0 && d->scene->montage_count == 0) return;
     if (d->team->rank == 0) {
         const double start = MPI_Wtime();
         session_files *files = base_calloc(1, sizeof *files);
         if (files) {
             files->scene = d->scene;
             files->cinema = d->cinema;
+            files->montages = d->montages;
             files->moment.cycle = d->cycle;
             session_writer_give(d->writer, files, &reason);
         } else

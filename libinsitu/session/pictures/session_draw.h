@@ -5,6 +5,7 @@
 #include "session_catalogue.h"
 #include "session_cinema.h"
 #include "session_mesh.h"
+#include "session_montage.h"
 #include "session_overwrites.h"
 #include "session_picture.h"
 #include "session_plan.h"
@@ -26,7 +27,8 @@ typedef struct session_drawing {
     session_report *report;
     session_kept_pictures *kept;
     const scene *scene;
-    session_cinema *cinema; /* rank 0's */
+    session_cinema *cinema;     /* rank 0's */
+    session_montages *montages; /* rank 0's */
     session_overwrites *overwrites;
     session_writer *writer; /* rank 0's */
     const session_catalogue *catalogue;

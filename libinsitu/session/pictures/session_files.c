@@ -45,6 +45,11 @@ static void write_output(session_files *files, const scene_output *output)
                                                  : output->has_decorations ? &decorations->all
                                                                            : &decorations->background};
     base_error reason = {0};
+    if (output->montage >= 0) {
+        if (session_add_cell(files->montages, files->scene, &files->image, output, &picture, path, &reason))
+            base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
+        return;
+    }
     if (session_write_image(&picture, format_of(output), path, &reason) != INSITU_OK)
         base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
     else if (output->database >= 0)
@@ -60,13 +65,22 @@ static double milliseconds(void)
     return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
 }
 
+/* What is behind a step's pictures. */
+static void write_tables(session_files *files)
+{
+    base_error reason = {0};
+    session_write_montages(files->montages, files->scene, &reason);
+    session_write_cinema(files->cinema, &files->error);
+    if (reason.status && !files->error.status) files->error = reason;
+}
+
 void session_write_files(session_files *files)
 {
     const double start = milliseconds();
     if (files->news)
         session_write_news(files->scene, files->news, &files->error);
     else if (!files->has_picture)
-        session_write_cinema(files->cinema, &files->error);
+        write_tables(files);
     for (int i = 0; files->has_picture && i < files->image.output_count; i++)
         write_output(files, &files->image.outputs[i]);
     files->ms = milliseconds() - start;

@@ -10,6 +10,7 @@
 #include "session_channels.h"
 #include "session_cinema.h"
 #include "session_decorations.h"
+#include "session_montage.h"
 #include "session_picture.h"
 #include "session_report.h"
 
@@ -18,8 +19,10 @@ typedef struct session_files {
     struct session_files *next; /* in a list of the writer's (session_writer.h) */
     const scene *scene;         /* the image's scene: it stays until this is written */
     session_cinema *cinema;
-    bool has_picture;  /* else this is news, or else the tables of databases, written after a step's pictures */
-    char *news;        /* owned: report.json's text (session_news.h); NULL: there are none */
+    session_montages *montages;
+    bool has_picture; /* else this is news, or else the tables of databases and pictures side by side, which are written
+                         after a step's pictures */
+    char *news;       /* owned: report.json's text (session_news.h); NULL: there are none */
     scene_image image; /* its camera is that of the step, its lists are the scene's */
     scene_moment moment;
     image frame;

@@ -26,7 +26,8 @@
 static const char library[] = "libinsitu_image.so";
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static insitu_image_write_function *loaded_writer;
-static insitu_image_check_words_function *loaded_checker; /* NULL: not loaded, or of another version */
+static insitu_image_place_function *loaded_placer;        /* NULL: not loaded, or of another version */
+static insitu_image_check_words_function *loaded_checker; /* likewise */
 
 static void *open_library(const char *path, char *why, size_t size)
 {
@@ -120,6 +121,8 @@ static insitu_status load(base_error *error)
                          library);
     }
     memcpy(&loaded_writer, &symbol, sizeof symbol);
+    symbol = dlsym(handle, "insitu_image_place");
+    if (symbol) memcpy(&loaded_placer, &symbol, sizeof symbol);
     symbol = dlsym(handle, "insitu_image_check_words");
     if (symbol) memcpy(&loaded_checker, &symbol, sizeof symbol);
     return INSITU_OK;
@@ -168,4 +171,17 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     const insitu_status written = write(image, format, path, message, sizeof message);
     if (written != INSITU_OK) return base_fail(error, written, "%s", message);
     return INSITU_OK;
+}
+
+insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
+{
+    insitu_image_write_function *write;
+    const insitu_status status = load_once(error, &write);
+    if (status != INSITU_OK) return status;
+    if (!loaded_placer)
+        return base_fail(error, INSITU_ERROR_IO, "%s has no insitu_image_place, expected the one of this version",
+                         library);
+    char message[sizeof error->message / 2] = "";
+    const insitu_status placed = loaded_placer(image, place, message, sizeof message);
+    return placed ? base_fail(error, placed, "%s", message) : INSITU_OK;
 }

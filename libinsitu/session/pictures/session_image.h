@@ -12,6 +12,9 @@
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
 
+/* Put the image with its decorations into its place in a larger picture (image_output.h). Local. Thread-safe. */
+insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error);
+
 /* Load the library ahead of the first picture, whose write reports an error. Returns the milliseconds that it took, 0
  * where it was there. Local. Thread-safe. */
 double session_load_image_library(void);

@@ -166,6 +166,7 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
     if (!out->images) return scene_no_memory(d);
     for (int i = 0; i < in->images_count && !status; i++) status = convert_layers_in_turn(d, in, i, out);
     if (!status) status = scene_find_databases(d, out);
+    if (!status) status = scene_find_montages(d, out);
     if (!status) add_views(out, count);
     return status;
 }
@@ -304,5 +305,7 @@ void scene_free(scene *s)
     base_free(s->parameters);
     for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
     base_free(s->databases);
+    for (int i = 0; i < s->montage_count; i++) base_free(s->montages[i].name);
+    base_free(s->montages);
     *s = (scene){0};
 }

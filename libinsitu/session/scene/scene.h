@@ -346,7 +346,19 @@ typedef struct scene_output {
     bool is_deep;         /* an EXR of all that lies behind each other in a pixel */
     int database;         /* index of the scene's, in which the picture is a line; -1: none */
     int folder_bytes;     /* bytes of path that are the database's folder and its slash; 0 without a database */
+    int columns, rows;    /* of pictures side by side; 0: the picture has a file of its own */
+    int montage;          /* index of the scene's; -1: none */
+    int first_cell;       /* of the first view */
 } scene_output;
+
+/* A file of pictures side by side. */
+typedef struct scene_montage {
+    char *name; /* by which pictures belong together: the path as it comes out at one cycle and time */
+    int columns, rows;
+    int width, height; /* of each picture */
+    scene_format format;
+    int cell_count; /* of pictures in a step, at most columns × rows */
+} scene_montage;
 
 /* A Cinema database of Spec D: a folder of pictures, and a table of what they show. */
 typedef struct scene_database {
@@ -507,6 +519,8 @@ typedef struct scene {
     scene_image *images;
     int database_count;
     scene_database *databases;
+    int montage_count;
+    scene_montage *montages;
     int statistics_count; /* 0 .. 64 */
     scene_statistics *statistics;
     int parameter_count; /* 0 .. 64, of different names */

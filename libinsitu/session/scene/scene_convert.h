@@ -48,6 +48,8 @@ void scene_place_view(scene_camera *camera, int view);
 /* The path of an output that goes into a database. */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
                                    const scene_image *image, scene_output *out);
+/* List the pictures of several images, and number their cells; views are still to be made. */
+insitu_status scene_find_montages(const scene_document *d, scene *s);
 /* List the databases of all images; views are still to be made. */
 insitu_status scene_find_databases(const scene_document *d, scene *s);
 

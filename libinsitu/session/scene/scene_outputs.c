@@ -194,6 +194,18 @@ static insitu_status convert_deep(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
+static insitu_status convert_grid(const scene_document *d, const char *path, const scene_file_output *in,
+                                  scene_output *out)
+{
+    out->montage = -1;
+    if (!in->grid) return INSITU_OK;
+    if (out->format == SCENE_EXR) return scene_bad(d, path, "grid", "given for an EXR, expected for a PNG only");
+    if (in->cinema) return scene_bad(d, path, "grid", "given beside cinema, expected one of the two");
+    out->columns = in->grid[0];
+    out->rows = in->grid[1];
+    return INSITU_OK;
+}
+
 static insitu_status convert_output(const scene_document *d, const char *path, const scene_file_output *in,
                                     const scene_image *image, scene_output *out)
 {
@@ -205,6 +217,7 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     if (out->has_data && out->format != SCENE_EXR)
         return scene_bad(d, path, "data", "given for a PNG, expected for an EXR only");
     status = convert_deep(d, path, in, out);
+    if (!status) status = convert_grid(d, path, in, out);
     if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (in->cinema) return scene_convert_cinema(d, path, in, image, out);
@@ -275,12 +288,18 @@ static insitu_status refuse_file(const scene_document *d, const scene *s, const 
                      word);
 }
 
-/* The first output whose file another before it has. files: sorted. */
+static const scene_output *output_of(const scene *s, const written_file *file)
+{
+    return &s->images[file->image].outputs[file->output];
+}
+
+/* The first output whose file another before it has, unless they are cells of one picture. files: sorted. */
 static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
 {
     int found = -1;
     for (int i = 1; i < count; i++) {
         if (strcmp(files[i - 1].path, files[i].path) != 0) continue;
+        if (output_of(s, &files[i - 1])->montage >= 0 && output_of(s, &files[i])->montage >= 0) continue;
         if (found < 0 || files[i].number < files[found].number) found = i;
     }
     return found < 0 ? INSITU_OK : refuse_file(d, s, &files[found - 1], &files[found]);

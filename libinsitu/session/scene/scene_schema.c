@@ -188,6 +188,14 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
           "one. A run that begins in a folder which has one drops the lines of its first cycle and of later ones, "    \
           "and goes on.",                                                                                              \
       .by_default = "none")                                                                                            \
+    X(CYAML_FIELD_SEQUENCE_FIXED("grid", POINTER, scene_file_output, grid, &whole_number, 2),                          \
+      .help =                                                                                                          \
+          "Columns and rows of a PNG in which pictures stand side by side: all those of a step whose outputs have "    \
+          "the same file, row by row, in the order of the images, of each its sweep's pictures, and of these the "     \
+          "views of its orbit. They have one size, each with its own decorations, and all say the same `grid`. A "     \
+          "cell whose picture is not due stays transparent. Not with `cinema`. 16 bytes a pixel of the whole are "     \
+          "held on rank 0 while a step's pictures are written.",                                                       \
+      .by_default = "none", .low = 1, .high = 16)                                                                      \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help =                                                                                                          \
           "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats: R, G, B (linear, times A), A, and the "   \

@@ -216,6 +216,7 @@ typedef struct scene_file_sweep {
 
 typedef struct scene_file_output {
     char *path, *cinema;
+    int *grid; /* 2 */
     int *bits;
     bool *decorations, *data, *deep;
 } scene_file_output;

@@ -1,0 +1,99 @@
+/* Outputs with a grid: which pictures are cells of one file. Cells are numbered in the order in which pictures are
+ * drawn: images as they stand in the scene, of each its sweep, and of each of these the views of its orbit. */
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+
+/* Names are compared as they come out at one cycle and time (scene_outputs.c). */
+static char *name_at_sample(const scene_image *image, const scene_output *output, int view)
+{
+    scene_moment moment = scene_moment_of(image, 123456789012345678, 0.5);
+    moment.view = view;
+    return scene_expand(output->path, &moment);
+}
+
+static insitu_status check_views(const scene_document *d, const char *path, const scene_image *image,
+                                 const scene_output *output, const char *name)
+{
+    char *other = name_at_sample(image, output, 1);
+    if (!other) return scene_no_memory(d);
+    const bool differs = strcmp(other, name) != 0;
+    base_free(other);
+    if (!differs) return INSITU_OK;
+    return scene_bad(d, path, "path", "\"%.100s\" is another file for each view, expected one for all cells of a grid",
+                     output->path);
+}
+
+/* The montage of this name; a new one if there is none yet. -1: no memory. */
+static int find_montage(scene *s, const scene_image *image, const scene_output *output, char *name)
+{
+    for (int i = 0; i < s->montage_count; i++)
+        if (strcmp(s->montages[i].name, name) == 0) {
+            base_free(name);
+            return i;
+        }
+    scene_montage *items = base_realloc(s->montages, (size_t)(s->montage_count + 1) * sizeof *items);
+    if (!items) {
+        base_free(name);
+        return -1;
+    }
+    s->montages = items;
+    items[s->montage_count] = (scene_montage){.name = name,
+                                              .columns = output->columns,
+                                              .rows = output->rows,
+                                              .width = image->width,
+                                              .height = image->height,
+                                              .format = output->format};
+    return s->montage_count++;
+}
+
+static insitu_status check_cells(const scene_document *d, const char *path, const scene_image *image,
+                                 const scene_output *output, const scene_montage *m)
+{
+    if (output->columns != m->columns || output->rows != m->rows)
+        return scene_bad(d, path, "grid", "[%d, %d] differs from that of the file's first picture, expected [%d, %d]",
+                         output->columns, output->rows, m->columns, m->rows);
+    if (image->width != m->width || image->height != m->height)
+        return scene_bad(d, path, "grid",
+                         "this picture has %d x %d pixels, that of the file's first cell %d x %d, expected one size",
+                         image->width, image->height, m->width, m->height);
+    if (output->format != m->format)
+        return scene_bad(d, path, "bits", "differs from that of the file's first picture, expected the same");
+    if (m->cell_count > m->columns * m->rows)
+        return scene_bad(d, path, "grid", "[%d, %d] has %d cells for %d pictures up to here, expected no fewer",
+                         m->columns, m->rows, m->columns * m->rows, m->cell_count);
+    return INSITU_OK;
+}
+
+static insitu_status place_output(const scene_document *d, scene *s, scene_image *image, int index)
+{
+    scene_output *output = &image->outputs[index];
+    char path[64], *name = output->columns ? name_at_sample(image, output, 0) : NULL;
+    const int views =
+        image->camera.orbit.view_count ? image->camera.orbit.view_count * image->camera.orbit.circle_count : 1;
+    output->montage = -1;
+    if (!output->columns) return INSITU_OK;
+    if (!name) return scene_no_memory(d);
+    snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
+    const insitu_status status = views > 1 ? check_views(d, path, image, output, name) : INSITU_OK;
+    if (status) {
+        base_free(name);
+        return status;
+    }
+    output->montage = find_montage(s, image, output, name);
+    if (output->montage < 0) return scene_no_memory(d);
+    scene_montage *m = &s->montages[output->montage];
+    output->first_cell = m->cell_count;
+    m->cell_count += views;
+    return check_cells(d, path, image, output, m);
+}
+
+insitu_status scene_find_montages(const scene_document *d, scene *s)
+{
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < s->image_count && !status; i++)
+        for (int o = 0; o < s->images[i].output_count && !status; o++) status = place_output(d, s, &s->images[i], o);
+    return status;
+}

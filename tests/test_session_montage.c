@@ -1,0 +1,97 @@
+/* Pictures side by side: each cell has the bits of the picture that a file of its own gets, on any ranks. */
+#include <stdio.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 32, HEIGHT = 24, COLUMNS = 3, ROWS = 2 };
+
+static const char scene[] = "images:\n"
+                            "  - name: a\n    size: [32, 24]\n"
+                            "    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
+                            "    outputs: [{path: \"all_{cycle}.png\", grid: [3, 2]}, {path: a.png}]\n"
+                            "  - name: b\n    size: [32, 24]\n    camera: {orbit: {views: 2}}\n"
+                            "    layers: [{surface: {}}]\n"
+                            "    outputs: [{path: \"b{view}.png\"}, {path: \"all_{cycle}.png\", grid: [3, 2]}]\n"
+                            "  - name: c\n    size: [32, 24]\n    every: 2\n"
+                            "    layers: [{slice: {field: f}}]\n"
+                            "    outputs: [{path: c.png}, {path: \"all_{cycle}.png\", grid: [3, 2]}]\n";
+
+static const caught_picture *find(const char *path)
+{
+    for (int i = 0; i < caught_count; i++)
+        if (strcmp(caught[i].path, path) == 0) return &caught[i];
+    return NULL;
+}
+
+/* Tells whether the cell has the picture's pixels; picture NULL: it is transparent. */
+static bool is_in_cell(const caught_picture *whole, int cell, const caught_picture *picture)
+{
+    static const float nothing[4 * WIDTH];
+    bool is_in = true;
+    for (int y = 0; y < HEIGHT; y++) {
+        const ptrdiff_t row = cell / COLUMNS * HEIGHT + y, column = (ptrdiff_t)(cell % COLUMNS) * WIDTH;
+        const float *own = picture ? picture->rgba + 4 * (ptrdiff_t)y * WIDTH : nothing;
+        is_in = is_in && memcmp(whole->rgba + 4 * (row * COLUMNS * WIDTH + column), own, sizeof nothing) == 0;
+    }
+    return is_in;
+}
+
+/* On rank 0, after a step: with_c tells whether the third image was due. */
+static bool is_montage(int cycle, bool with_c)
+{
+    char path[32];
+    snprintf(path, sizeof path, "all_%d.png", cycle);
+    const caught_picture *whole = find(path);
+    const char *const names[COLUMNS * ROWS] = {"a.png", "b0.png", "b1.png", with_c ? "c.png" : "-", "-", "-"};
+    if (caught_count != (with_c ? 5 : 4) || !whole) return false;
+    if (whole->width != COLUMNS * WIDTH || whole->height != ROWS * HEIGHT) return false;
+    for (int cell = 0; cell < COLUMNS * ROWS; cell++) {
+        const caught_picture *picture = find(names[cell]);
+        if ((*names[cell] != '-') != (picture != NULL) || !is_in_cell(whole, cell, picture)) return false;
+    }
+    return true;
+}
+
+static void cells_have_the_pictures_of_a_step(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    for (int cycle = 0; cycle < 3; cycle++) {
+        forget_pictures();
+        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
+        everywhere(!strstr(insitu_last_report(session)->warnings, "all_"));
+        everywhere(own_rank != 0 || is_montage(cycle, cycle % 2 == 0));
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+    forget_pictures();
+}
+
+static void files_that_cannot_be_written_are_told(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    forget_pictures();
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    unwritable = "all_0";
+    const insitu_status status = insitu_step(session, 0, 0);
+    unwritable = NULL;
+    told_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
+    everywhere(own_rank != 0 || (caught_count == 4 && find("a.png") && find("c.png")));
+    insitu_destroy(&session);
+    input_free(&in);
+    forget_pictures();
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(cells_have_the_pictures_of_a_step),
+                                       cmocka_unit_test(files_that_cannot_be_written_are_told)};
+    return run_session_tests(argc, argv, tests, NULL, NULL);
+}
