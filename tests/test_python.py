@@ -129,6 +129,8 @@ def what_cannot_be_borrowed_is_refused():
             (dict(connectivity=hexes[:, :7]), ValueError, "has 7 columns, expected 8"),
             (dict(connectivity=numpy.zeros((64, 27), "i4")[:, :8], offsets=8 * numpy.arange(65)), ValueError, "gaps"),
             (dict(vertex_order=7), insitu.Error, "vertex_order is 7"),
+            (dict(vertex_order="vtk"), TypeError, "vertex_order: is 'vtk', expected insitu.ORDER_VTK, "),
+            (dict(cell_type="hex"), TypeError, "cell_type: is 'hex', expected insitu.TET, insitu.HEX"),
             (dict(ghosts=numpy.zeros(63, "u1")), ValueError, "63 elements, expected 64"),
             (dict(ghosts=numpy.broadcast_to(numpy.uint8(0), 64)), ValueError, "repeats one element"),
         ]:
@@ -143,6 +145,7 @@ def what_cannot_be_borrowed_is_refused():
         for cycle in (2**64 + 5, 2**63, -2**63 - 1):
             raises(ValueError, f"cycle: is {cycle}, expected a whole number of 64 bits", s.step, cycle, 0.0)
         raises(TypeError, "", s.step, 0.5, 0.0)
+        raises(TypeError, "centring: is 'cell', expected insitu.VERTEX, insitu.CELL", s.set_field, "m", "f", f, centring="cell")
         raises(insitu.Error, "", s.set_field, "m", "f", f[:-1])
         raises(insitu.Error, "rank", s.step, 0, 0.0)
         s.set_field("m", "f", f)

@@ -231,6 +231,13 @@ def _encoded(what, text):
     return encoded
 
 
+def _constant(what, given, names):
+    """One of this file's numbers, which a word is not."""
+    if isinstance(given, str):
+        raise TypeError(f"{what}: is {given!r}, expected {names}")
+    return given
+
+
 def _view(what, given, dimensions):
     """The caller's array, or a view of its memory. Lists and the like would be copied: they are refused."""
     is_array = isinstance(given, numpy.ndarray) or hasattr(given, "__array_interface__")
@@ -550,6 +557,8 @@ class Session:
         connectivity, cell_type, cell_types and offsets; boundary_faces, boundary_face_offsets and boundary_owner, if
         the boundary's faces are in a list of their own, and halo_cell_count, if owner and neighbour name cells of a
         halo."""
+        _constant("cell_type", cell_type, "insitu.TET, insitu.HEX and so on")
+        _constant("vertex_order", vertex_order, "insitu.ORDER_VTK, insitu.ORDER_LEXICOGRAPHIC or insitu.ORDER_DMPLEX")
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
         axes, mesh.vertex_count, held = _axes(coordinates)
@@ -651,7 +660,8 @@ class Session:
         all ranks in the same order. Local."""
         field, held, borrowed = _Field(), [], _Array()
         _library.insitu_field_defaults(ctypes.byref(field))
-        field.name, field.centring, field.changed = _encoded("name", name), centring, changed
+        field.centring = _constant("centring", centring, "insitu.VERTEX, insitu.CELL or insitu.CORNER")
+        field.name, field.changed = _encoded("name", name), changed
         if index is not None:
             borrowed, _, corner_row, array = self._index(mesh, index, centring, corner_row)
             held.append(array)
