@@ -1,7 +1,8 @@
-/* Faces that two cells share cancel. A face's key is made of its vertices' hashes in no order: their first three power
- * sums. All faces' keys are put into slots by exclusive or, so that shared faces leave nothing behind. A second pass
- * takes the faces whose slots are not empty, mostly outer ones, and counts them exactly. So memory is needed for the
- * slots and the outer faces, not for all faces.
+/* Faces that two cells share cancel at their vertices: each face has a hash of its vertices' hashes in no order, and
+ * each vertex the exclusive or of those of its faces. A vertex that is left with nothing is inside of the mesh, and a
+ * face is an outer one only if none of its vertices is. The few faces that so may be are counted exactly, by keys: the
+ * first three power sums of their vertices' hashes. So memory is needed for vertices and outer faces, not for all
+ * faces, and most cells are seen twice and no more.
  *
  * Shells are faces that are always kept. One that lies on a cell's outer face replaces it, so that only one is drawn
  * there.
@@ -10,6 +11,7 @@
  * for all. */
 #include "session_outer_faces.h"
 
+#include <omp.h>
 #include <string.h>
 
 #include "memory.h"
@@ -19,17 +21,21 @@
 #include "session_neighbours.h"
 #include "session_thresholds.h"
 
-enum { LEAST_SLOTS = 1 << 10, MOST_SLOTS = 1 << 22 };
+/* Threads that have a word of their own for each vertex. */
+enum { MOST_TABLES = 4 };
 
 typedef struct face_search {
     const session_mesh *mesh;
     int threads;
     unsigned char *is_hidden; /* a byte a cell, not 0 for those beyond the threshold; NULL: there is no threshold */
     uint64_t *hashes;         /* one for each vertex of the mesh */
-    uint64_t *slots;
+    int table_count;          /* threads beyond these share them */
+    uint64_t *rests;          /* what is left of faces at each vertex, in as many tables, */
+    uint64_t *slots;          /* and at all vertices with the same hash */
     uint64_t mask;
+    unsigned char *is_open; /* a byte a vertex: something is left there */
     int64_t count;
-    session_face *faces; /* whose slots are not empty */
+    session_face *faces; /* that may be outer ones, in the order of cells */
     session_key *keys;
     int64_t *groups; /* faces with equal keys share a group */
     int64_t *sizes;  /* the number of faces in each group */
@@ -39,7 +45,9 @@ static void search_free(face_search *s)
 {
     base_free(s->is_hidden);
     base_free(s->hashes);
+    base_free(s->rests);
     base_free(s->slots);
+    base_free(s->is_open);
     base_free(s->faces);
     base_free(s->keys);
     base_free(s->groups);
@@ -48,16 +56,23 @@ static void search_free(face_search *s)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* Makes a face's key; false where it has fewer than three vertices. A vertex that it has twice counts once: a quad with
- * two corners in one place is a triangle. */
+/* Tells whether the face's i-th vertex is not there before. One that it has twice counts once: a quad with two corners
+ * in one place is a triangle. */
+static inline bool is_new(const face_search *s, const session_face_loop *loop, int64_t i)
+{
+    const uint64_t hash = s->hashes[session_face_vertex(loop, i)];
+    for (int64_t k = 0; k < i; k++)
+        if (s->hashes[session_face_vertex(loop, k)] == hash) return false;
+    return true;
+}
+
+/* Makes a face's key; false where it has fewer than three vertices. */
 static bool make_key(const face_search *s, const session_face_loop *loop, session_key *key)
 {
     uint64_t sums[3] = {0, 0, 0}, vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
         const uint64_t h = s->hashes[session_face_vertex(loop, i)];
-        bool is_new = true;
-        for (int64_t k = 0; k < i && is_new; k++) is_new = s->hashes[session_face_vertex(loop, k)] != h;
-        if (!is_new) continue;
+        if (!is_new(s, loop, i)) continue;
         vertices++;
         sums[0] += h;
         sums[1] += h * h;
@@ -90,67 +105,209 @@ static void hash_vertices(face_search *s, bool by_id)
     }
 }
 
+/* Where a thread leaves what faces have: in words of its own, or in some that it shares with others. */
+typedef struct leaver {
+    const face_search *search;
+    uint64_t *rests; /* one for each vertex */
+    bool is_shared;
+} leaver;
+
+static inline void leave(uint64_t *where, uint64_t rest, bool is_shared)
+{
+    if (!is_shared) {
+        *where ^= rest;
+        return;
+    }
+#pragma omp atomic
+    *where ^= rest;
+}
+
+/* Leaves the face's hash at its vertices. */
+static void leave_face(const leaver *l, const session_face_loop *loop)
+{
+    const face_search *s = l->search;
+    uint64_t sum = 0;
+    int64_t vertices = 0;
+    for (int64_t i = 0; i < loop->size; i++) {
+        if (!is_new(s, loop, i)) continue;
+        sum += s->hashes[session_face_vertex(loop, i)];
+        vertices++;
+    }
+    if (vertices < 3) return;
+    for (int64_t i = 0; i < loop->size; i++)
+        if (is_new(s, loop, i)) leave(&l->rests[session_face_vertex(loop, i)], session_mix(sum), l->is_shared);
+}
+
+/* The same of all faces of a cell of a type, at once; false where two of its vertices are one. */
+static inline bool leave_cell(const leaver *l, const session_face_table *table, const int64_t *vertices, int count)
+{
+    uint64_t hashes[GRID_MAX_CELL_VERTICES], rests[GRID_MAX_CELL_VERTICES] = {0};
+    bool has_twins = false;
+    for (int i = 0; i < count; i++) {
+        hashes[i] = l->search->hashes[vertices[i]];
+        for (int k = 0; k < i; k++) has_twins |= hashes[k] == hashes[i];
+    }
+    if (has_twins) return false;
+    for (int f = 0; f < table->count; f++) {
+        const signed char *places = table->vertices[f];
+        const bool is_quad = places[3] >= 0;
+        const uint64_t sum = hashes[(int)places[0]] + hashes[(int)places[1]] + hashes[(int)places[2]];
+        const uint64_t hash = session_mix(is_quad ? sum + hashes[(int)places[3]] : sum);
+        for (int i = 0; i < 3; i++) rests[(int)places[i]] ^= hash;
+        if (is_quad) rests[(int)places[3]] ^= hash;
+    }
+    for (int i = 0; i < count; i++) leave(&l->rests[vertices[i]], rests[i], l->is_shared);
+    return true;
+}
+
+static void leave_faces(const leaver *l, int64_t cell)
+{
+    const grid *g = &l->search->mesh->cells;
+    const int type = grid_cell_type(g, cell);
+    const session_face_table *table = session_faces_of_type(type);
+    if (!has_faces(l->search, cell)) return;
+    if (table->count) {
+        int64_t vertices[GRID_MAX_CELL_VERTICES];
+        const int count = grid_cell_vertices(g, cell, vertices);
+        const bool is_tet = type == GRID_TET; /* with constants the compiler unrolls all of it */
+        if (is_tet ? leave_cell(l, session_faces_of_type(GRID_TET), vertices, 4)
+                   : leave_cell(l, table, vertices, count))
+            return;
+    }
+    const session_cell_faces faces = session_faces_of_cell(g, cell);
+    for (int64_t f = 0; f < faces.count; f++) {
+        const session_face_loop loop = session_face_of(&faces, f);
+        leave_face(l, &loop);
+    }
+}
+
+/* Takes what threads have left at the vertex to all those with its hash. */
+static void unite_rests(const face_search *s, int64_t vertex)
+{
+    uint64_t rest = 0;
+    for (int i = 0; i < s->table_count; i++) rest ^= s->rests[i * s->mesh->cells.vertex_count + vertex];
+    leave(&s->slots[s->hashes[vertex] & s->mask], rest, s->threads > 1);
+}
+
+/* Finds the vertices at which something is left of the faces. */
 static void cancel_faces(face_search *s)
 {
     const grid *g = &s->mesh->cells;
 #pragma omp parallel num_threads(s->threads)
     {
+        const leaver l = {s, s->rests + omp_get_thread_num() % s->table_count * g->vertex_count,
+                          omp_get_num_threads() > s->table_count};
         region_enter();
+#pragma omp for schedule(static)
+        for (int64_t cell = 0; cell < g->cell_count; cell++) leave_faces(&l, cell);
+#pragma omp for schedule(static)
+        for (int64_t v = 0; v < g->vertex_count; v++) unite_rests(s, v);
 #pragma omp for schedule(static) nowait
-        for (int64_t cell = 0; cell < g->cell_count; cell++) {
-            if (!has_faces(s, cell)) continue;
-            const session_cell_faces faces = session_faces_of_cell(g, cell);
-            for (int64_t f = 0; f < faces.count; f++) {
-                const session_face_loop loop = session_face_of(&faces, f);
-                session_key key;
-                if (!make_key(s, &loop, &key)) continue;
-                const uint64_t hash = session_key_hash(&key);
-                uint64_t *slot = &s->slots[hash & s->mask];
-#pragma omp atomic
-                *slot ^= hash;
-            }
-        }
+        for (int64_t v = 0; v < g->vertex_count; v++) s->is_open[v] = s->slots[s->hashes[v] & s->mask] != 0;
         region_leave();
     }
 }
 
-/* Counts the faces of one cell whose slots are not empty, and lists them where faces is given. */
-static int64_t take_faces(const face_search *s, int64_t cell, session_face *faces, session_key *keys)
+/* Faces of some of the cells. */
+typedef struct face_list {
+    int64_t count, room;
+    session_face *faces;
+    session_key *keys;
+    bool is_lost; /* memory ran out */
+} face_list;
+
+static void face_list_free(face_list *list)
 {
+    base_free(list->faces);
+    base_free(list->keys);
+}
+
+static bool face_list_reserve(face_list *list)
+{
+    if (list->count < list->room) return true;
+    const int64_t room = list->room * 2 + 1024;
+    session_face *faces = base_realloc(list->faces, (size_t)room * sizeof *faces);
+    if (faces) list->faces = faces;
+    session_key *keys = base_realloc(list->keys, (size_t)room * sizeof *keys);
+    if (keys) list->keys = keys;
+    list->is_lost = !faces || !keys;
+    if (!list->is_lost) list->room = room;
+    return !list->is_lost;
+}
+
+static bool is_open_face(const face_search *s, const session_face_loop *loop)
+{
+    for (int64_t i = 0; i < loop->size; i++)
+        if (!s->is_open[session_face_vertex(loop, i)]) return false;
+    return true;
+}
+
+/* Tells whether the cell may have an outer face, as far as vertices tell. */
+static bool has_open_vertices(const face_search *s, int64_t cell)
+{
+    const grid *g = &s->mesh->cells;
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    int open = 0;
+    if (!session_faces_of_type(grid_cell_type(g, cell))->count) return true;
+    const int count = grid_cell_vertices(g, cell, vertices);
+    for (int i = 0; i < count; i++) open += s->is_open[vertices[i]];
+    return open >= 3;
+}
+
+/* Lists the cell's faces that may be outer ones. */
+static void take_faces(const face_search *s, int64_t cell, face_list *out)
+{
+    if (!has_faces(s, cell) || !has_open_vertices(s, cell)) return;
     const session_cell_faces of_cell = session_faces_of_cell(&s->mesh->cells, cell);
-    int64_t count = 0;
-    if (!has_faces(s, cell)) return 0;
     for (int64_t f = 0; f < of_cell.count; f++) {
         const session_face_loop loop = session_face_of(&of_cell, f);
         session_key key;
-        if (!make_key(s, &loop, &key)) continue;
-        if (!of_cell.size && !s->slots[session_key_hash(&key) & s->mask]) continue;
-        if (faces) {
-            faces[count] = (session_face){cell, f};
-            keys[count] = key;
-        }
-        count++;
+        if (!(of_cell.size || is_open_face(s, &loop)) || !make_key(s, &loop, &key)) continue;
+        if (!face_list_reserve(out)) return;
+        out->faces[out->count] = (session_face){cell, f};
+        out->keys[out->count++] = key;
     }
-    return count;
+}
+
+/* Puts the lists together. */
+static bool join_lists(face_search *s, const face_list *lists, int count)
+{
+    int64_t total = 0;
+    for (int i = 0; i < count; i++) {
+        if (lists[i].is_lost) return false;
+        total += lists[i].count;
+    }
+    s->faces = base_alloc((size_t)total * sizeof *s->faces);
+    s->keys = base_alloc((size_t)total * sizeof *s->keys);
+    if (!s->faces || !s->keys) return false;
+    for (int i = 0; i < count; i++) {
+        if (lists[i].count == 0) continue;
+        memcpy(s->faces + s->count, lists[i].faces, (size_t)lists[i].count * sizeof *s->faces);
+        memcpy(s->keys + s->count, lists[i].keys, (size_t)lists[i].count * sizeof *s->keys);
+        s->count += lists[i].count;
+    }
+    return true;
 }
 
 static bool collect_faces(face_search *s)
 {
     const int64_t cells = s->mesh->cells.cell_count;
-    int64_t count = 0;
+    const int parts = s->threads;
+    face_list *lists = base_calloc((size_t)parts, sizeof *lists);
+    if (!lists) return false;
 #pragma omp parallel num_threads(s->threads)
     {
         region_enter();
-#pragma omp for schedule(static) reduction(+ : count) nowait
-        for (int64_t cell = 0; cell < cells; cell++) count += take_faces(s, cell, NULL, NULL);
+#pragma omp for schedule(static, 1) nowait
+        for (int part = 0; part < parts; part++)
+            for (int64_t cell = cells * part / parts; cell < cells * (part + 1) / parts; cell++)
+                take_faces(s, cell, &lists[part]);
         region_leave();
     }
-    s->faces = base_alloc((size_t)count * sizeof *s->faces);
-    s->keys = base_alloc((size_t)count * sizeof *s->keys);
-    if (!s->faces || !s->keys) return false;
-    for (int64_t cell = 0; cell < cells; cell++)
-        s->count += take_faces(s, cell, s->faces + s->count, s->keys + s->count);
-    return true;
+    const bool is_done = join_lists(s, lists, parts);
+    for (int i = 0; i < parts; i++) face_list_free(&lists[i]);
+    base_free(lists);
+    return is_done;
 }
 
 /* Counts the groups of equal keys, and their sizes. */
@@ -194,18 +351,22 @@ static insitu_status search_own(face_search *s, const session_outer *outer, bool
         if (!s->is_hidden) return session_no_memory(error, s->mesh->cells.cell_count, "cells of a threshold");
     }
     const grid *g = &s->mesh->cells;
-    uint64_t slots = LEAST_SLOTS;
-    while (slots < MOST_SLOTS && slots < (uint64_t)g->cell_count) slots *= 2;
+    uint64_t slots = 1;
+    while (slots < (uint64_t)g->vertex_count) slots *= 2;
     s->mask = slots - 1;
     s->hashes = base_alloc((size_t)g->vertex_count * sizeof *s->hashes);
+    s->table_count = s->threads < MOST_TABLES ? s->threads : MOST_TABLES;
+    s->rests = base_calloc((size_t)(g->vertex_count * s->table_count), sizeof *s->rests);
     s->slots = base_calloc(slots, sizeof *s->slots);
-    bool is_done = s->hashes && s->slots;
+    s->is_open = base_alloc((size_t)g->vertex_count);
+    bool is_done = s->hashes && s->rests && s->slots && s->is_open;
     if (is_done) {
         hash_vertices(s, by_id);
         cancel_faces(s);
     }
     is_done = is_done && collect_faces(s) && count_keys(s->keys, s->count, &s->groups, &s->sizes);
-    if (!is_done) return session_no_memory(error, g->vertex_count * 8 + (int64_t)slots * 8, "outer faces");
+    if (!is_done)
+        return session_no_memory(error, g->vertex_count * (9 + 8 * s->table_count) + (int64_t)slots * 8, "outer faces");
     keep_single_faces(s);
     return INSITU_OK;
 }

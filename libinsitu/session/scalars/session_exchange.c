@@ -7,17 +7,9 @@
 #include "memory.h"
 #include "session_agree.h"
 
-static uint64_t mix(uint64_t x)
-{
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-}
-
 uint64_t session_key_hash(const session_key *key)
 {
-    return mix(key->words[0] ^ mix(key->words[1] ^ mix(key->words[2])));
+    return session_mix(key->words[0] ^ session_mix(key->words[1] ^ session_mix(key->words[2])));
 }
 
 bool session_keys_create(session_key_table *table, int64_t most)

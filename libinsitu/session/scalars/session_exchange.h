@@ -13,6 +13,15 @@ typedef struct session_key {
     uint64_t words[3];
 } session_key;
 
+/* Spreads the bits of a word over all of it. */
+static inline uint64_t session_mix(uint64_t x)
+{
+    x += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
 uint64_t session_key_hash(const session_key *key);
 
 /* Keys numbered 0, 1, ... in the order of their first appearance. */
