@@ -7,7 +7,7 @@
 
 static int64_t bin_along(const session_bins *b, double place, int axis)
 {
-    const double at = (place - b->lower[axis]) / b->size;
+    const double at = (place - b->lower[axis]) * b->per_place;
     return at < 0 ? 0 : at >= (double)b->counts[axis] ? b->counts[axis] - 1 : (int64_t)at;
 }
 
@@ -37,9 +37,9 @@ static int64_t size_bins(session_bins *b, const double *places, int64_t stride, 
     }
     const double across = fmin(fmax(sqrt((double)count) / 2, 1), 128);
     int64_t bins = 1;
-    b->size = widest > 0 ? widest / across : 1;
+    b->per_place = widest > 0 ? across / widest : 1;
     for (int axis = 0; axis < 3; axis++) {
-        b->counts[axis] = count ? (int64_t)((upper[axis] - b->lower[axis]) / b->size) + 1 : 1;
+        b->counts[axis] = count ? (int64_t)((upper[axis] - b->lower[axis]) * b->per_place) + 1 : 1;
         bins *= b->counts[axis];
     }
     return bins;

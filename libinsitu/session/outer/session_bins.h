@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct session_bins {
-    double lower[3], size;
+    double lower[3], per_place; /* bins to a unit of length */
     int64_t counts[3];
     int64_t *starts, *items; /* the points of bin b are items[starts[b]] .. items[starts[b + 1] - 1] */
 } session_bins;

@@ -72,6 +72,53 @@ static double side_of(const grid *g, int64_t cell, const session_coarse_face *f)
     return (along > 0) - (along < 0);
 }
 
+bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out)
+{
+    const session_cell_faces faces = session_faces_of_cell(g, face->cell);
+    const session_face_loop loop = session_face_of(&faces, face->face);
+    session_box *box = &out->box;
+    if (loop.size < 3 || loop.size > 4 || faces.size) return false;
+    out->count = (int)loop.size;
+    for (int i = 0; i < out->count; i++) {
+        double *place = out->places[i];
+        out->vertices[i] = session_face_vertex(&loop, i);
+        grid_vertex(g, out->vertices[i], place);
+        for (int axis = 0; axis < 3; axis++) {
+            box->lower[axis] = i && box->lower[axis] < place[axis] ? box->lower[axis] : place[axis];
+            box->upper[axis] = i && box->upper[axis] > place[axis] ? box->upper[axis] : place[axis];
+        }
+    }
+    out->reach = session_place_distance(box->lower, box->upper);
+    return true;
+}
+
+/* Tells whether the place is beyond all corners along the direction, or before all, by more than slack. */
+static bool is_beyond(const session_face_outline *f, const double place[3], const double direction[3], double slack)
+{
+    const double at = vector3_dot(direction, place), most = slack * sqrt(vector3_dot(direction, direction));
+    double low = vector3_dot(direction, f->places[0]), high = low;
+    for (int i = 1; i < f->count; i++) {
+        const double corner = vector3_dot(direction, f->places[i]);
+        low = fmin(low, corner);
+        high = fmax(high, corner);
+    }
+    return at < low - most || at > high + most;
+}
+
+bool session_may_hold(const session_face_outline *f, const double place[3], double slack)
+{
+    double edges[4][3], normal[3], across[3];
+    for (int i = 0; i < f->count; i++)
+        for (int axis = 0; axis < 3; axis++) edges[i][axis] = f->places[(i + 1) % f->count][axis] - f->places[i][axis];
+    vector3_cross(edges[0], edges[1], normal);
+    if (is_beyond(f, place, normal, slack)) return false;
+    for (int i = 0; i < f->count; i++) {
+        vector3_cross(normal, edges[i], across);
+        if (is_beyond(f, place, across, slack)) return false;
+    }
+    return true;
+}
+
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4])
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);

@@ -2,6 +2,7 @@
 #ifndef SESSION_COARSE_FACE_H
 #define SESSION_COARSE_FACE_H
 
+#include "session_homes.h"
 #include "session_mesh.h"
 
 typedef struct session_coarse_face {
@@ -14,6 +15,21 @@ typedef struct session_coarse_face {
 } session_coarse_face;
 
 enum { SESSION_FACE_WORDS = 13 };
+
+/* A triangle or quad of a cell, as little of it as tells where it is not. */
+typedef struct session_face_outline {
+    int count;
+    int64_t vertices[4]; /* in the cell's order */
+    double places[4][3];
+    session_box box;
+    double reach; /* no two corners are farther apart */
+} session_face_outline;
+
+/* False where the face is no triangle or quad of a cell. */
+bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
+/* Tells whether the place, in the outline's box, may be within slack of the face: it is not beyond all of the face's
+ * corners, along its normal or across one of its edges. */
+bool session_may_hold(const session_face_outline *outline, const double place[3], double slack);
 
 /* Reads a face and its vertices, in the order of its places. False where it is no triangle or quad of a cell, or has no
  * area. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_bins.h"
 #include "session_coarse_face.h"
@@ -51,8 +52,9 @@ typedef struct contact {
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    int64_t face_count, own_count, candidate_count;
-    searched_face *faces; /* this rank's, then received ones */
+    unsigned char *states; /* a face_state for each face of the borders */
+    int64_t face_count, own_count, candidate_count, face_room;
+    searched_face *faces; /* this rank's that were read at first, then received ones, then this rank's others */
     candidate *candidates;
     double rounding; /* the rounding of coordinates */
     int64_t contact_count, contact_room;
@@ -62,6 +64,7 @@ typedef struct hanging_search {
 
 static void search_free(hanging_search *s)
 {
+    base_free(s->states);
     base_free(s->faces);
     base_free(s->candidates);
     base_free(s->contacts);
@@ -126,91 +129,6 @@ insitu_status session_update_borders(session_joint *joint, const session_mesh *c
     return status;
 }
 
-/* ---- faces ---------------------------------------------------------------------------------------------------- */
-
-static bool read_faces(hanging_search *s)
-{
-    const session_hanging_basis *basis = s->basis;
-    const session_border *borders = basis->joint->hanging.borders;
-    int64_t most = 0, vertices[4];
-    for (int m = 0; m < basis->joint->count; m++) most += borders[m].face_count;
-    s->faces = base_alloc((size_t)(most + 1) * sizeof *s->faces);
-    if (!s->faces) return false;
-    for (int m = 0; m < basis->joint->count; m++)
-        for (int64_t i = 0; i < borders[m].face_count; i++) {
-            searched_face *f = &s->faces[s->own_count];
-            if (!session_read_coarse_face(&basis->meshes[m]->cells, &borders[m].faces[i], &f->face, vertices)) continue;
-            for (int k = 0; k < 4; k++) f->groups[k] = basis->of_vertex[basis->firsts[m] + vertices[k]];
-            f->source = s->team->rank;
-            s->own_count++;
-        }
-    s->face_count = s->own_count;
-    return true;
-}
-
-static bool does_meet(const session_coarse_face *f, const session_box *box, double margin)
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (!(f->lower[axis] - margin <= box->upper[axis] && box->lower[axis] - margin <= f->upper[axis])) return false;
-    return true;
-}
-
-static double slack_of(const hanging_search *s, const session_coarse_face *f)
-{
-    return place_slack * f->width + s->rounding;
-}
-
-/* Lists the faces for each rank whose box they meet; counts words where there is no room. */
-static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
-{
-    const session_homes *homes = s->basis->joint->homes;
-    mail->total = 0;
-    for (int n = 0; n < homes->near_count; n++) {
-        const int64_t first = mail->total;
-        for (int64_t i = 0; i < s->own_count && homes->near[n] != s->team->rank; i++) {
-            const session_coarse_face *f = &s->faces[i].face;
-            if (!does_meet(f, &homes->boxes[n], slack_of(s, f))) continue;
-            if (mail->words) {
-                session_pack_coarse_face(f, mail->words + mail->total);
-                sent[mail->total / SESSION_FACE_WORDS] = i;
-            }
-            mail->total += SESSION_FACE_WORDS;
-        }
-        mail->counts[homes->near[n]] = mail->total - first;
-    }
-}
-
-/* sent: which face each of the mail is. */
-static bool pack_faces(const hanging_search *s, session_mail *mail, int64_t **sent)
-{
-    mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
-    if (!mail->counts) return false;
-    send_faces(s, mail, NULL);
-    mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
-    *sent = base_alloc((size_t)(mail->total / SESSION_FACE_WORDS + 1) * sizeof **sent);
-    if (!mail->words || !*sent) return false;
-    send_faces(s, mail, *sent);
-    return true;
-}
-
-static bool take_faces(hanging_search *s, const session_mail *in)
-{
-    const int64_t count = in->total / SESSION_FACE_WORDS;
-    searched_face *faces = base_realloc(s->faces, (size_t)(s->own_count + count + 1) * sizeof *faces);
-    if (!faces) return false;
-    s->faces = faces;
-    int64_t at = 0;
-    for (int rank = 0; rank < s->team->ranks; rank++)
-        for (int64_t number = 0; number < in->counts[rank] / SESSION_FACE_WORDS; number++, at++) {
-            searched_face *f = &faces[s->face_count++];
-            session_unpack_coarse_face(in->words + SESSION_FACE_WORDS * at, &f->face);
-            for (int i = 0; i < 4; i++) f->groups[i] = -1;
-            f->source = rank;
-            f->number = number;
-        }
-    return true;
-}
-
 /* ---- candidates ----------------------------------------------------------------------------------------------- */
 
 static bool list_candidates(hanging_search *s)
@@ -241,6 +159,181 @@ static bool list_candidates(hanging_search *s)
 static bool bin_candidates(hanging_search *s)
 {
     return session_bins_create(&s->bins, s->candidates->place, (int64_t)sizeof *s->candidates, s->candidate_count);
+}
+
+/* ---- faces: most outlines tell enough, so that they are read only if they may matter -------------
+ */
+
+typedef enum face_state {
+    FACE_UNREAD,
+    FACE_WANTED, /* a candidate that is none of its corners is near, or another rank's box */
+    FACE_READ
+} face_state;
+
+static bool does_meet(const session_box *a, const session_box *b, double margin)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (!(a->lower[axis] - margin <= b->upper[axis] && b->lower[axis] - margin <= a->upper[axis])) return false;
+    return true;
+}
+
+static bool is_own(const hanging_search *s, int m, const session_face_outline *f, const candidate *c)
+{
+    for (int i = 0; i < f->count; i++)
+        if (s->basis->of_vertex[s->basis->firsts[m] + f->vertices[i]] == c->group) return true;
+    return false;
+}
+
+static bool is_in(const session_box *box, const double place[3], double slack)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (!(box->lower[axis] - slack <= place[axis] && place[axis] <= box->upper[axis] + slack)) return false;
+    return true;
+}
+
+/* Tells whether a candidate may be on the face: is_hit, one that lies on a face; else, one that is none of its corners.
+ */
+static bool has_candidate(const hanging_search *s, int m, const session_face_outline *f, double slack, bool is_hit)
+{
+    session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, slack);
+    int64_t near;
+    while (session_next_binned(&walk, &near)) {
+        const candidate *c = &s->candidates[near];
+        if (!is_in(&f->box, c->place, slack)) continue;
+        if ((is_hit ? c->hits >= 0 : !is_own(s, m, f, c)) && session_may_hold(f, c->place, slack)) return true;
+    }
+    return false;
+}
+
+static bool meets_rank(const hanging_search *s, const session_box *box, double slack)
+{
+    const session_homes *homes = s->basis->joint->homes;
+    for (int n = 0; n < homes->near_count; n++)
+        if (homes->near[n] != s->team->rank && does_meet(box, &homes->boxes[n], slack)) return true;
+    return false;
+}
+
+static bool is_wanted(const hanging_search *s, int m, const session_face *face, bool is_hit)
+{
+    session_face_outline f;
+    if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
+    const double slack = place_slack * f.reach + s->rounding; /* at least slack_of() */
+    return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && meets_rank(s, &f.box, slack));
+}
+
+/* Adds a face to those that were read, if it is a triangle or quad. */
+static bool read_face(hanging_search *s, int m, const session_face *face)
+{
+    int64_t vertices[4];
+    if (s->face_count == s->face_room) {
+        const int64_t room = s->face_room * 2 + 64;
+        searched_face *faces = base_realloc(s->faces, (size_t)room * sizeof *faces);
+        if (!faces) return false;
+        s->faces = faces;
+        s->face_room = room;
+    }
+    searched_face *f = &s->faces[s->face_count];
+    if (!session_read_coarse_face(&s->basis->meshes[m]->cells, face, &f->face, vertices)) return true;
+    for (int k = 0; k < 4; k++) f->groups[k] = s->basis->of_vertex[s->basis->firsts[m] + vertices[k]];
+    f->source = s->team->rank;
+    s->face_count++;
+    return true;
+}
+
+/* Reads the faces of this rank that may bear a candidate or are near other ranks; or, is_hit, those that are left near
+ * candidates that lie on faces. */
+static bool read_faces(hanging_search *s, bool is_hit)
+{
+    const session_border *borders = s->basis->joint->hanging.borders;
+    unsigned char *states = s->states;
+    bool is_done = true;
+    for (int m = 0; m < s->basis->joint->count; m++) {
+        const session_border *border = &borders[m];
+#pragma omp parallel num_threads(border->face_count > REGION_ITEMS ? s->team->threads : 1)
+        {
+            region_enter();
+#pragma omp for schedule(dynamic, REGION_ITEMS) nowait
+            for (int64_t i = 0; i < border->face_count; i++)
+                if (states[i] == FACE_UNREAD && is_wanted(s, m, &border->faces[i], is_hit)) states[i] = FACE_WANTED;
+            region_leave();
+        }
+        for (int64_t i = 0; i < border->face_count && is_done; i++) {
+            if (states[i] != FACE_WANTED) continue;
+            is_done = read_face(s, m, &border->faces[i]);
+            states[i] = FACE_READ;
+        }
+        states += border->face_count;
+    }
+    return is_done;
+}
+
+/* Reads this rank's faces that matter at first. */
+static bool read_own_faces(hanging_search *s)
+{
+    int64_t count = 0;
+    for (int m = 0; m < s->basis->joint->count; m++) count += s->basis->joint->hanging.borders[m].face_count;
+    s->states = base_calloc((size_t)count + 1, 1);
+    if (!s->states || !read_faces(s, false)) return false;
+    s->own_count = s->face_count;
+    return true;
+}
+
+static double slack_of(const hanging_search *s, const session_coarse_face *f)
+{
+    return place_slack * f->width + s->rounding;
+}
+
+/* Lists the faces for each rank whose box they meet; counts words where there is no room. */
+static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
+{
+    const session_homes *homes = s->basis->joint->homes;
+    mail->total = 0;
+    for (int n = 0; n < homes->near_count; n++) {
+        const int64_t first = mail->total;
+        for (int64_t i = 0; i < s->own_count && homes->near[n] != s->team->rank; i++) {
+            const session_coarse_face *f = &s->faces[i].face;
+            const session_box box = {{f->lower[0], f->lower[1], f->lower[2]}, {f->upper[0], f->upper[1], f->upper[2]}};
+            if (!does_meet(&box, &homes->boxes[n], slack_of(s, f))) continue;
+            if (mail->words) {
+                session_pack_coarse_face(f, mail->words + mail->total);
+                sent[mail->total / SESSION_FACE_WORDS] = i;
+            }
+            mail->total += SESSION_FACE_WORDS;
+        }
+        mail->counts[homes->near[n]] = mail->total - first;
+    }
+}
+
+/* sent: which face each of the mail is. */
+static bool pack_faces(const hanging_search *s, session_mail *mail, int64_t **sent)
+{
+    mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
+    if (!mail->counts) return false;
+    send_faces(s, mail, NULL);
+    mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
+    *sent = base_alloc((size_t)(mail->total / SESSION_FACE_WORDS + 1) * sizeof **sent);
+    if (!mail->words || !*sent) return false;
+    send_faces(s, mail, *sent);
+    return true;
+}
+
+static bool take_faces(hanging_search *s, const session_mail *in)
+{
+    const int64_t count = in->total / SESSION_FACE_WORDS;
+    searched_face *faces = base_realloc(s->faces, (size_t)(s->own_count + count + 1) * sizeof *faces);
+    if (!faces) return false;
+    s->faces = faces;
+    s->face_room = s->own_count + count + 1;
+    int64_t at = 0;
+    for (int rank = 0; rank < s->team->ranks; rank++)
+        for (int64_t number = 0; number < in->counts[rank] / SESSION_FACE_WORDS; number++, at++) {
+            searched_face *f = &faces[s->face_count++];
+            session_unpack_coarse_face(in->words + SESSION_FACE_WORDS * at, &f->face);
+            for (int i = 0; i < 4; i++) f->groups[i] = -1;
+            f->source = rank;
+            f->number = number;
+        }
+    return true;
 }
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
@@ -320,7 +413,7 @@ static void choose_face(const hanging_search *s, candidate *c)
 static bool find_contacts(hanging_search *s)
 {
     bool is_done = try_faces(s, try_hit);
-    if (s->contact_count) is_done = is_done && try_faces(s, try_corner);
+    if (s->contact_count) is_done = is_done && read_faces(s, true) && try_faces(s, try_corner);
     for (int64_t i = 0; i < s->candidate_count && is_done; i++) choose_face(s, &s->candidates[i]);
     return is_done;
 }
@@ -431,7 +524,7 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
     if (joint->hanging.places == joint->places) return INSITU_OK;
     for (int i = 0; i < joint->count; i++)
         search.rounding = fmax(search.rounding, session_place_rounding(basis->meshes[i]));
-    if ((!read_faces(&search) || !list_candidates(&search) || !bin_candidates(&search)))
+    if (!list_candidates(&search) || !bin_candidates(&search) || !read_own_faces(&search))
         session_no_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
     insitu_status status = find_shared(&search, &found, error);
     search_free(&search);
