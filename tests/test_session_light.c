@@ -1,7 +1,7 @@
 /* Shadows and ambient occlusion. Shadows have outlines in closed form: a ball's worth of a slice throws an ellipse on
  * another, and an isosurface that is a plane darkens what is behind it. Ambient occlusion in a corner of two planes is
- * a segment of a disk, and ray by ray what planes in double say; of an isosurface in tets, what all cells asked one by
- * one in double say, for the same rays. And all of it is the same to the bit on any partition, of all kinds of cells.
+ * a segment of a disk, and ray by ray what planes in double say; so it is in a valley of an isosurface. And all of it
+ * is the same to the bit on any partition, of all kinds of cells.
  */
 #include <math.h>
 #include <stdio.h>
@@ -52,11 +52,11 @@ static void normal_at(const caught_picture *picture, int pixel, double out[3])
 }
 
 /* A mesh of its own on every rank's session: the whole of it on one rank, or dealt. */
-static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind dealt, int rank,
-                      int count)
+static void make_jittered(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
+                          test_partition_kind dealt, int rank, int count)
 {
     test_mesh whole;
-    test_mesh_lattice(kind, SIDE, 0.2, f, &whole);
+    test_mesh_lattice(kind, SIDE, jitter, f, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
     test_partition(&whole, dealt, SIDE, count, owners);
@@ -64,6 +64,12 @@ static void make_part(session_input *in, test_mesh_kind kind, test_function *f, 
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
+}
+
+static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind dealt, int rank,
+                      int count)
+{
+    make_jittered(in, kind, 0.2, f, dealt, rank, count);
 }
 
 /* ---- shadows in closed form ---------------------------------------------------------------------------------- */
@@ -187,30 +193,35 @@ static void what_casts_no_shadow_casts_none(void **context)
 #define DARK "    lights: [{direction: [0, 0, 1], intensity: 0}]\n"
 
 /* Two planes at right angles in the cube. */
-static const struct {
-    double normal[3], distance;
-} planes[2] = {{{0, 0.8, 0.6}, -0.4}, {{0.8, -0.36, 0.48}, -0.3}};
+typedef struct corner {
+    struct {
+        double normal[3], distance;
+    } planes[2];
+    double least; /* what is met nearer than this may count or not */
+} corner;
+
+static const corner slices = {{{{0, 0.8, 0.6}, -0.4}, {{0.8, -0.36, 0.48}, -0.3}}, 0};
 static const double radius = 0.4;
 
-static double above(int plane, const double place[3])
+static double above(const corner *c, int plane, const double place[3])
 {
-    const double *n = planes[plane].normal;
-    return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - planes[plane].distance;
+    const double *n = c->planes[plane].normal;
+    return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - c->planes[plane].distance;
 }
 
-/* Tells whether something is met within the radius: 1, 0, or -1 where rounding decides. */
-static int corner_blocks(const double from[3], const double d[3])
+/* Tells whether something is met within the radius: 1, 0, or -1 where rounding decides, or the corner's least. */
+static int corner_blocks(const corner *c, const double from[3], const double d[3])
 {
     for (int i = 0; i < 2; i++) {
         const double ahead[3] = {from[0] + d[0], from[1] + d[1], from[2] + d[2]};
-        const double height = above(i, from), way = height / (height - above(i, ahead));
+        const double height = above(c, i, from), way = height / (height - above(c, i, ahead));
         double most = 0;
         if (fabs(height) < 1e-5) continue; /* it begins there */
         if (fabs(way - radius) < 1e-4) return -1;
         if (!(way > 0 && way < radius)) continue;
         for (int a = 0; a < 3; a++) most = fmax(most, fabs(from[a] + way * d[a]));
         if (fabs(most - 1) < 1e-4) return -1;
-        if (most < 1) return 1;
+        if (most < 1) return way < c->least ? -1 : 1;
     }
     return 0;
 }
@@ -220,8 +231,8 @@ typedef struct sky {
     double sum; /* of the shares that are open, as drawn */
 } sky;
 
-/* Everything by AO alone: the picture is the unoccluded one times the share. wanted: of which pixels. */
-static sky judge_sky(const caught_picture *drawn, const caught_picture *plain)
+/* Everything by AO alone: the picture is the unoccluded one times the share. */
+static sky judge_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
 {
     sky out = {0};
     for (int p = 0; p < PIXELS; p++) {
@@ -232,7 +243,7 @@ static sky judge_sky(const caught_picture *drawn, const caught_picture *plain)
         normal_at(drawn, p, n);
         for (int k = 0; k < SAMPLES; k++) {
             test_hemisphere((uint32_t)p, WIDTH, SAMPLES, k, n, d);
-            const int blocked = corner_blocks(place, d);
+            const int blocked = corner_blocks(c, place, d);
             open += blocked == 0;
             unsure += blocked < 0;
         }
@@ -262,7 +273,7 @@ static void corners_are_as_dark_as_disk_segments(void **context)
         caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = judge_sky(&drawn, &plain);
+            const sky s = judge_sky(&slices, &drawn, &plain);
             double expected = 0;
             int count = 0;
             for (int p = 0; p < PIXELS; p++) {
@@ -270,7 +281,7 @@ static void corners_are_as_dark_as_disk_segments(void **context)
                 if (!isfinite(drawn.depth[p])) continue;
                 place_at(p, (double)drawn.depth[p], at);
                 /* The angle is taken from the plane that the place is not on. */
-                const double ratio = fmax(fabs(above(0, at)), fabs(above(1, at))) / radius;
+                const double ratio = fmax(fabs(above(&slices, 0, at)), fabs(above(&slices, 1, at))) / radius;
                 expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
                 count++;
             }
@@ -283,6 +294,53 @@ static void corners_are_as_dark_as_disk_segments(void **context)
             if (!is_right)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, mean off by %g\n", test_mesh_kind_name(kind),
                         s.pixels, s.wrong, s.unsure, off);
+        }
+        free_caught(&drawn);
+        free_caught(&plain);
+        input_free(&in);
+        everywhere(is_right);
+    }
+}
+
+#define VALLEY "      - isosurface: {field: f, values: [-0.3], " BARE "}\n"
+
+/* A valley along y whose ground lies between cells: every cell's field is linear, of most kinds of cells, and the
+ * isosurface is two planes. */
+static double valley_field(const double p[3])
+{
+    return p[2] - fabs(p[0]);
+}
+
+/* Cells are up to half a unit wide. Of an isosurface, what is nearer than a fifth of its cell need not hide anything
+ * (session_layers.c), and all else does: so too where the other side is just beyond that, in the pixels that are
+ * counted as near. */
+static void valleys_are_dark_to_the_ground(void **context)
+{
+    static const double root = 0.70710678118654752;
+    const corner valley = {{{{-root, 0, root}, -0.3 * root}, {{root, 0, root}, -0.3 * root}}, 0.2 * 2.0 / SIDE};
+    (void)context;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input in = {0};
+        if (kind == TEST_POLYHEDRA) continue; /* some of these lie on both sides of the ground */
+        make_jittered(&in, kind, 0, valley_field, TEST_RANDOM, own_rank, rank_count);
+        caught_picture drawn =
+            draw(MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", VALLEY), &in);
+        caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, VALLEY), &in);
+        bool is_right = true;
+        if (own_rank == 0) {
+            const sky s = judge_sky(&valley, &drawn, &plain);
+            int near = 0;
+            for (int p = 0; p < PIXELS; p++) {
+                double at[3];
+                if (!isfinite(drawn.depth[p])) continue;
+                place_at(p, (double)drawn.depth[p], at);
+                const double height = fmax(above(&valley, 0, at), above(&valley, 1, at));
+                near += height > valley.least && height < 2 * valley.least;
+            }
+            is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.unsure < s.pixels / 10;
+            if (!is_right)
+                fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, %d near\n", test_mesh_kind_name(kind), s.pixels,
+                        s.wrong, s.unsure, near);
         }
         free_caught(&drawn);
         free_caught(&plain);
@@ -372,6 +430,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(disks_throw_ellipses),
         cmocka_unit_test(what_casts_no_shadow_casts_none),
         cmocka_unit_test(corners_are_as_dark_as_disk_segments),
+        cmocka_unit_test(valleys_are_dark_to_the_ground),
         cmocka_unit_test(lit_pictures_are_the_same_on_any_partition),
         cmocka_unit_test(ghost_cells_cast_nothing),
     };

@@ -306,15 +306,16 @@ static const cyaml_schema_value_t statistics = {
           "and volumes cast none, and volumes have none. A layer that takes no light, as slices by default, has "      \
           "none either. What `clip` cuts away casts none, what the camera does not see casts its own. Of "             \
           "isosurfaces, "                                                                                              \
-          "what is nearer to a hit than half the size of its cell casts none.",                                        \
+          "what is nearer to a hit than a fifth of the size of its cell casts none.",                                  \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_MAPPING_PTR("ambient_occlusion", OPTIONAL, scene_file_image, ambient_occlusion, occlusion_fields),   \
       .help =                                                                                                          \
           "Darken what is hidden from the open sky, in corners and hollows: of rays from each hit into the "           \
           "hemisphere above it, spread as the cosine, the share that meets no opaque layer within `radius` is a "      \
           "factor on its ambient and diffuse light. By what casts shadows, on what has them. Which rays a pixel has "  \
-          "does not change from step to step. Of isosurfaces, what is nearer to a hit than half the size of its cell " \
-          "hides nothing: `radius` is to be several cells. A core asks some 7 million rays a second in tetrahedra, 4 " \
+          "does not change from step to step. Of isosurfaces, what is nearer to a hit than a fifth of its "            \
+          "cell's size hides nothing: `radius` is to be several cells. A core asks some 7 million rays a second in "   \
+          "tetrahedra, 4 "                                                                                             \
           "million in hexahedra. `{}` takes all its defaults.",                                                        \
       .by_default = "none", .child = &occlusion_mapping)                                                               \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, scene_file_image, clip, scene_clip_fields),                            \

@@ -199,8 +199,10 @@ static insitu_status place_lines(const session_layer_basis *basis, const scene_l
 }
 
 /* An isosurface is as rough as its cells are: within one it bends, between two it breaks, and in polyhedra it juts out
- * at faces. Hits nearer than this share of a cell count as the surface itself, which does not shade itself. */
-#define CONTACT 0.5F
+ * at faces. Hits nearer than this share of a cell count as the surface itself, which does not shade itself: no less
+ * than keeps polyhedra's facets from specks, as more takes the shade from hollows
+ * (docs/development/decisions/surface.md). */
+#define CONTACT 0.2F
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
                                   session_layers *layers, base_error *error)
