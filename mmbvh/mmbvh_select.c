@@ -267,7 +267,7 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
         uint64_t meeting = row_bits(s, &r), finite = packed_bits(r.is_finite), drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
-            drawn |= (uint64_t) !((g->ghosts && g->ghosts[cell * g->ghosts_stride]) || grid_is_flat(g, cell)) << n;
+            drawn |= (uint64_t) !((g->ghosts && grid_is_flagged(g, cell)) || grid_is_flat(g, cell)) << n;
         }
         if (!g->ghosts && !g->flat) drawn = r.count < WORD_CELLS ? (UINT64_C(1) << r.count) - 1 : ~UINT64_C(0);
         unusable += __builtin_popcountll(drawn & ~finite);

@@ -88,7 +88,7 @@ void test_view_create(const test_mesh *mesh, test_layout layout, test_view *out)
     out->storage[5] = test_allocate(mesh->cell_count, 1);
     if (mesh->cell_count) memcpy(out->storage[5], mesh->ghosts, (size_t)mesh->cell_count);
     g->ghosts = out->storage[5];
-    g->ghosts_stride = 1;
+    g->ghosts_stride = g->ghosts_bytes = 1;
 }
 
 void test_view_free(test_view *view)

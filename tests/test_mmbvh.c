@@ -202,6 +202,7 @@ static void ghosts_are_not_in_the_tree(void **state)
     }
     l.g.ghosts = l.ghosts;
     l.g.ghosts_stride = 3;
+    l.g.ghosts_bytes = 1;
     mmbvh tree = build_by(&l, &l.field, 2);
     assert_int_equal(tree.cell_count, l.g.cell_count - ghosts);
     assert_proved(&tree, &l.g, &l.field);

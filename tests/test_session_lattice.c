@@ -38,6 +38,7 @@ typedef struct block {
     double *axes[3], *f, *c;
     float *narrow_axes[3];
     unsigned char *ghosts;
+    int32_t *wide_ghosts; /* nonzero ones have a first byte of 0 */
     int64_t hex_count, *hexes;
     int64_t *hex_cells; /* the number of each hex's cell in the block */
     double *hex_values;
@@ -174,10 +175,13 @@ static void make_block(block *b, place_form form, array_order order, bool layers
     b->f = room(b->vertex_count, sizeof(double));
     b->c = room(b->cell_count, sizeof(double));
     b->ghosts = room(b->cell_count, 1);
+    b->wide_ghosts = room(b->cell_count, sizeof(int32_t));
     b->hexes = room(8 * b->cell_count, sizeof(int64_t));
     b->hex_values = room(b->cell_count, sizeof(double));
     fill_vertices(b);
     fill_cells(b, blanking);
+    for (int64_t cell = 0; cell < b->cell_count; cell++)
+        b->wide_ghosts[cell] = b->ghosts[cell] ? 0x100 << cell % 23 : 0;
     for (int axis = 0; axis < 3; axis++) {
         b->lattice.cells[axis] = b->cells[axis];
         if (order != PACKED) b->lattice.vertex_strides[axis] = b->vertex_strides[axis];
@@ -207,6 +211,7 @@ static void free_block(block *b)
     free(b->f);
     free(b->c);
     free(b->ghosts);
+    free(b->wide_ghosts);
     free(b->hexes);
     free(b->hex_values);
 }
@@ -242,7 +247,9 @@ static bool set_lattice(insitu_session *session, const block *b, bool blanking)
     mesh.cell_count = b->cell_count;
     mesh.lattice = &b->lattice;
     if (b->form >= CURVILINEAR) give_places(b, &mesh);
-    if (blanking) mesh.ghosts = (insitu_array){b->ghosts, INSITU_UINT8, 0};
+    if (blanking)
+        mesh.ghosts =
+            b->form % 2 ? (insitu_array){b->wide_ghosts, INSITU_INT32, 0} : (insitu_array){b->ghosts, INSITU_UINT8, 0};
     return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, b, b->c, b->cell_count);
 }
 

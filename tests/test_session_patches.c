@@ -308,7 +308,7 @@ static void part_lists(part_input *in)
     test_view view;
     test_view_create(&in->part, (test_layout){true, true, true, false, true}, &view);
     view.cells.ghosts = (const char *)in->part.ghosts;
-    view.cells.ghosts_stride = 1;
+    view.cells.ghosts_stride = view.cells.ghosts_bytes = 1;
     list_by_cells(in, &view.cells);
     test_view_free(&view);
 }

@@ -89,6 +89,7 @@ typedef struct grid {
     int64_t face_count;
     grid_array face_offsets;      /* face_count + 1 */
     grid_array face_connectivity; /* the faces' vertices around */
+    int ghosts_bytes;             /* 1, 4 or 8: the size of a flag in ghosts */
 } grid;
 
 /* One scalar per vertex or per cell, out of a field of several components. */
@@ -274,9 +275,17 @@ static inline void grid_vertex(const grid *g, int64_t vertex, double position[3]
     for (int axis = 0; axis < 3; axis++) position[axis] = grid_array_number(&g->coordinates[axis], vertex);
 }
 
+/* Tells whether the flag of a cell is not 0. There are flags. */
+static inline bool grid_is_flagged(const grid *g, int64_t cell)
+{
+    const char *p = g->ghosts + cell * g->ghosts_stride;
+    if (g->ghosts_bytes == 1) return *p != 0;
+    return g->ghosts_bytes == 4 ? *(const int32_t *)(const void *)p != 0 : *(const int64_t *)(const void *)p != 0;
+}
+
 static inline bool grid_is_ghost(const grid *g, int64_t cell)
 {
-    if (g->ghosts && g->ghosts[cell * g->ghosts_stride] != 0) return true;
+    if (g->ghosts && grid_is_flagged(g, cell)) return true;
     return g->lattice && g->lattice->has_ghosts && !grid_lattice_draws(g->lattice, cell);
 }
 

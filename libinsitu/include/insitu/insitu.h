@@ -154,7 +154,8 @@ typedef struct insitu_mesh {
     int64_t face_connectivity_count; /* elements in face_connectivity */
     insitu_array face_connectivity;  /* int32 or int64, face_connectivity_count: the faces' vertex indices from
                                         index_base, at least 3 a face, around it from any vertex in either direction */
-    insitu_array ghosts;             /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
+    insitu_array ghosts;             /* optional, uint8, int32 or int64, cell_count: cells with a nonzero flag are not
+                                        drawn */
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
     int index_base;                  /* 0 by default, or 1, as Fortran counts: the index of the first vertex, face, cell
                                         and element in connectivity, offsets, face_offsets, face_connectivity,

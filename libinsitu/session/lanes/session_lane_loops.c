@@ -23,6 +23,7 @@ typedef struct lane_source {
     int64_t connectivity_stride, ghosts_stride, stride;
     int64_t base, last; /* bounds of the indices */
     int type, count;    /* count: the number of vertices */
+    int ghosts_bytes;
     bool wide_index, wide_number;
 } lane_source;
 
@@ -79,6 +80,7 @@ LANE_INLINE lane_source source_of(const lane_cells *cells, const int type, const
                      .wide_number = wide_number};
     if (g->ghosts) s.ghosts = g->ghosts + cells->first * g->ghosts_stride;
     s.ghosts_stride = g->ghosts_stride;
+    s.ghosts_bytes = g->ghosts_bytes;
     for (int axis = 0; axis < 3; axis++)
         s.axes[axis] = (uintptr_t)g->coordinates[axis].data - (uintptr_t)(s.base * s.stride);
     return s;
@@ -140,7 +142,8 @@ LANE_INLINE bool are_vertices(const lane_source *s, const char *indices)
 LANE_INLINE bool has_ghost(const lane_source *s, int64_t cell)
 {
     char any = 0;
-    for (int lane = 0; lane < LANES; lane++) any = (char)(any | s->ghosts[(cell + lane) * s->ghosts_stride]);
+    for (int lane = 0; lane < LANES; lane++)
+        for (int i = 0; i < s->ghosts_bytes; i++) any = (char)(any | s->ghosts[(cell + lane) * s->ghosts_stride + i]);
     return any != 0;
 }
 

@@ -103,7 +103,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         {"cell types", cells, integers | bytes | optional, 1},
         {"connectivity indices", mesh->connectivity_count, integers, 1},
         {"offsets", cells, integers | optional | end, 1},
-        {"ghost flags", cells, bytes | optional, 1},
+        {"ghost flags", cells, integers | bytes | optional, 1},
         {"face offsets", faces, integers | end | (has_lists ? optional : 0), 1},
         {"face sizes", faces, integers | (has_lists ? 0 : optional), 1},
         {"owners of faces", faces, integers | optional, 1},

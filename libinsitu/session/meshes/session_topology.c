@@ -47,8 +47,10 @@ static grid as_grid(const insitu_mesh *mesh)
         g.cell_types_bytes = (int)session_type_size(mesh->cell_types.type);
     }
     if (mesh->ghosts.data) {
-        g.ghosts = mesh->ghosts.data;
-        g.ghosts_stride = mesh->ghosts.stride_bytes ? mesh->ghosts.stride_bytes : 1;
+        const grid_array ghosts = session_grid_array(&mesh->ghosts);
+        g.ghosts = ghosts.data;
+        g.ghosts_stride = ghosts.stride;
+        g.ghosts_bytes = (int)session_type_size(mesh->ghosts.type);
     }
     return g;
 }
