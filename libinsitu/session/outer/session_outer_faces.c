@@ -195,9 +195,9 @@ static void cancel_faces(face_search *s)
     const grid *g = &s->mesh->cells;
 #pragma omp parallel num_threads(s->threads)
     {
+        region_enter();
         const leaver l = {s, s->rests + omp_get_thread_num() % s->table_count * g->vertex_count,
                           omp_get_num_threads() > s->table_count};
-        region_enter();
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < g->cell_count; cell++) leave_faces(&l, cell);
 #pragma omp for schedule(static)
