@@ -196,7 +196,9 @@ static void make_bundle(bundle *b, int64_t n)
     const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
     memset(b, 0, sizeof *b);
     aim_all(b, kind >= 4);
+    /* Those of kind 3 mostly rise along the rays, so that many are known to be monotone. */
     for (int i = 0; i < 8; i++) b->values[i] = uniform(-1, 1) + (kind == 1 ? 0.6 : 0);
+    for (int i = 0; i < 8 && kind == 3; i++) b->values[i] = 0.2 * b->values[i] + (i < 4 ? -0.7 : 0.7);
     if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
     if (kind == 6 || kind == 7) make_triple_root(b, uniform(0.2, 0.8), kind == 6 ? fabs(small) : 0);
     normalize(b->values);
