@@ -453,13 +453,12 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     }
     kernel_lanes_corners(&slopes, type, w, &most);
     const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
-    const kernel_half_mask is_regular = b.is_solid & (kernel_half_mask)(theta < 0.9);
+    const kernel_half_mask bends_little = (kernel_half_mask)(theta < 0.9), is_regular = b.is_solid & bends_little;
     const kernel_half stretch =
-        kernel_half_select((kernel_half_mask)(theta < 0.9), kernel_half_rounded(1 / (1 - theta)), kernel_half_all(10));
+        kernel_half_select(bends_little, kernel_half_rounded(1 / (1 - theta)), kernel_half_all(10));
     const kernel_half slope = kernel_half_rounded(kernel_half_sqrt(most.df)), slant = kernel_half_sqrt(most.steep);
     kernel_half_limits(&b, type, stretch, slope, half, out);
-    length = kernel_half_sqrt(length);
-    off = kernel_half_sqrt(off);
+    length = kernel_half_sqrt(length), off = kernel_half_sqrt(off);
     const kernel_half whole = slant * stretch * (length + off);
     const kernel_half apart =
         kernel_half_sqrt(most.along) +
