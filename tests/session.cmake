@@ -11,6 +11,9 @@ endfunction()
 insitu_session_program(test_session_input)
 insitu_add_mpi_test(session_input test_session_input 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_types)
+insitu_add_mpi_test(session_types test_session_types 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_faces)
 insitu_add_mpi_test(session_faces test_session_faces 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -49,7 +49,7 @@ end module test_fortran_maker
 
 program test_fortran
     use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr
-    use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32, real64, error_unit
+    use, intrinsic :: iso_fortran_env, only: int8, int16, int32, int64, real32, real64, error_unit
     use mpi_f08
     use insitu
     use test_fortran_maker
@@ -124,6 +124,7 @@ program test_fortran
     call same(picture('corner_index', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(unknowns), at_corner=2), &
         'values at corners by an index')
     call planes_go_without_z()
+    call components_may_be_apart()
     call patches_have_values()
     call parameters_are_read()
     call procedures_make_values()
@@ -432,6 +433,45 @@ contains
         call expect(status == INSITU_ERROR_ARGUMENT .and. index(session%error(), 'character 0') > 0, session%error())
         call session%destroy(status)
     end subroutine parameters_are_read
+
+    ! Components in arrays of their own, and corners of cells in two bytes: the picture of tuples.
+    subroutine components_may_be_apart()
+        integer(int16), target :: whole(vertices), hexes_2(8, cells)
+        real(real32), target :: single(2*vertices)
+        real(real64), target :: tuples(3, vertices)
+        integer :: i
+        whole = [(int(mod(i, 7), int16), i=1, vertices)]
+        single = -1
+        single(1:2*vertices:2) = [(real(mod(i, 3), real32), i=1, vertices)]
+        tuples(1, :) = real(whole, real64)
+        tuples(2, :) = real(single(1:2*vertices:2), real64)
+        tuples(3, :) = pressure
+        hexes_2 = int(hexes, int16)
+        call expect(components_picture(insitu_borrow(hexes_2), [insitu_borrow(whole), insitu_borrow(single(1:2*vertices:2)), &
+            insitu_borrow(pressure)]) == components_picture(insitu_borrow(hexes), [insitu_borrow(tuples)]), &
+            'components apart draw the picture of tuples')
+    end subroutine components_may_be_apart
+
+    ! parts: tuples, or an array for each component.
+    function components_picture(connectivity, parts) result(out)
+        type(insitu_array), intent(in) :: connectivity, parts(:)
+        character(:), allocatable :: out
+        type(insitu_session) :: session
+        call session%create_from_text(MPI_COMM_WORLD, scene_of('parts', 'magnitude'), status)
+        call session%set_mesh('m', insitu_points(xyz), connectivity, status, cell_type=INSITU_HEX)
+        if (size(parts) == 1) then
+            call session%set_field('m', 'p', parts(1), status)
+        else
+            call session%set_components('m', 'p', parts, status)
+        end if
+        call expect(status == INSITU_OK, session%error())
+        call session%step(0, 0.0_real64, status)
+        call expect(status == INSITU_OK, session%error())
+        call session%set_components('m', 'p', [parts(1), insitu_borrow(pressure(2:))], status)
+        call refused(session, 'components are ')
+        call session%destroy(status)
+        out = file_of('parts')
+    end function components_picture
 
     subroutine procedures_make_values()
         type(insitu_session), pointer :: session

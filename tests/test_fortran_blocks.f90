@@ -305,12 +305,12 @@ contains
         call refused(s, 'y has the shape (5, 4, 5), expected (5, 5, 5) for the vertices of the block')
         call s%set_block('m', cells, status, x=insitu_borrow(x), y=insitu_borrow(y), z=insitu_borrow(wide_z(1:n, 1:n, :)))
         call refused(s, 'z has strides of (8, 64, 448) bytes, which are as (1, 8, 56), expected as (1, 5, 25)')
-        call s%set_block('m', cells, status, x=insitu_borrow(x), y=insitu_borrow(places), z=insitu_borrow(z))
-        call refused(s, 'y coordinates are of element type 3')
+        call s%set_block('m', cells, status, spacing=spacing, ghosts=insitu_borrow(c))
+        call refused(s, 'ghost flags are of element type 2')
         call s%set_block('m', cells, status, x=insitu_borrow(x), y=insitu_borrow(y), z=insitu_borrow(z(n:1:-1, :, :)))
         call refused(s, 'z has strides of (-8, 40, 200) bytes, expected positive ones')
         call s%step(0, 0.0_real64, status)
-        call refused(s, 'coordinates are of element type 3')
+        call refused(s, 'ghost flags are of element type 2')
         call s%destroy(status)
     end subroutine wrong_blocks_are_refused
 

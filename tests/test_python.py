@@ -97,6 +97,38 @@ def layouts_draw_the_same_picture():
     everywhere(picture("ghosts", xyz, hexes, f, ghosts=numpy.zeros(64, bool)) == plain, "ghosts of type bool")
 
 
+SPEED = """images: [{name: a, size: [48, 32], layers: [
+  {isosurface: {field: u, component: magnitude, values: [2.5], colour_by: {field: u, component: 2}}}]}]"""
+
+
+def components_and_indices_of_any_type_are_the_same():
+    xyz, hexes, _ = lattice()
+    tuples = numpy.stack([xyz[:, 1], xyz[:, 2], (xyz[:, 0] * 3 + xyz[:, 1]) % 4], axis=-1)
+    packed = numpy.zeros(len(xyz), numpy.dtype([("mark", "i1"), ("w", "f8")]))
+    packed["w"] = tuples[:, 2]
+    apart = [tuples[:, 0].astype("i2"), tuples[:, 1].astype("u1"), packed["w"]]
+    types, numbers = numpy.full(64, insitu.HEX, "u1"), numpy.full(64, 3, "i2")
+    offsets, table = numpy.arange(65) * 8, [0, 0, 0, insitu.HEX]
+    pictures = []
+    for values, cells in [
+        (tuples, dict(connectivity=hexes, cell_type=insitu.HEX)),
+        (apart, dict(connectivity=hexes.astype("u1"), cell_type=insitu.HEX)),
+        (apart, dict(connectivity=hexes.astype("u8").ravel(), cell_types=types, offsets=offsets.astype("u4"))),
+        (tuples, dict(connectivity=hexes.ravel(), cell_types=numbers, offsets=offsets[:-1], open_offsets=True,
+                      cell_type_map=table)),
+    ]:
+        with insitu.Session(comm, scene_text=SPEED) as session:
+            session.keep_pictures()
+            session.set_mesh("m", coordinates=xyz, **cells)
+            session.set_field("m", "u", values)
+            session.step(0, 0.0)
+            pictures.append(session.pictures[0].rgba if comm.rank == 0 else numpy.ones(1))
+            raises(ValueError, "values[1]: has 124 values, values[0] has 125", session.set_field, "m", "u",
+                   [apart[0], apart[1][:-1]])
+    everywhere(pictures[0].any(), "the speed shows something")
+    everywhere(all((other == pictures[0]).all() for other in pictures), "arrays of any type draw the same picture")
+
+
 def planes_go_without_z():
     n = 5
     xyz, hexes, f = lattice()
@@ -123,7 +155,7 @@ def what_cannot_be_borrowed_is_refused():
             (dict(coordinates=xyz[:, :1]), ValueError, "vertices x 3 (or x 2)"),
             (dict(coordinates=xyz[:, :2]), insitu.Error, "z coordinates are not given"),
             (dict(coordinates=[axis.reshape(5, 5, -1) for axis in xyz.T]), ValueError, "reshape(-1) makes a list"),
-            (dict(connectivity=hexes.astype("uint64")), TypeError, "uint64"),
+            (dict(connectivity=hexes.astype("complex64")), TypeError, "complex64"),
             (dict(connectivity=numpy.asfortranarray(hexes)), ValueError, "rows that follow one another"),
             (dict(connectivity=hexes[:, :7].copy()), ValueError, "expected 8"),
             (dict(connectivity=hexes[:, :7]), ValueError, "has 7 columns, expected 8"),
@@ -366,12 +398,11 @@ def wrong_blocks_are_refused():
             (dict(uniform, interior_first=(1, 1, 1), interior_end=(5, 4, 4)), insitu.Error, "the interior along i is 1..5"),
             (dict(uniform, ghosts=flags[1:]), ValueError, "ghosts: has the shape (3, 4, 4), expected (4, 4, 4) for the cells"),
             (dict(uniform, ghosts=flags.reshape(-1)[1:]), ValueError, "ghosts: is a list of 63, expected one of 64"),
-            (dict(uniform, ghosts=c), insitu.Error, "ghost flags are of element type 2, not uint8"),
+            (dict(uniform, ghosts=c), insitu.Error, "ghost flags are of element type 2, not an integer type"),
             (dict(uniform, ghosts=flags.copy("F"), cell_layout=c), ValueError, "ghosts: has strides of (1, 4, 16) bytes, which "
              "are as (1, 4, 16), expected as (16, 4, 1)"),
             (dict(axes, coordinates=(axis, axis[1:], axis)), ValueError, "coordinates[1]: has 4 elements, expected 5"),
             (dict(axes, coordinates=(axis, axis)), ValueError, "coordinates: are along 2 axes, expected 3"),
-            (dict(curved, coordinates=(f, f.astype(int), f)), insitu.Error, "y coordinates are of element type 4"),
             (dict(curved, coordinates=(f, f)), ValueError, "are 2 for each vertex, expected x, y and z"),
             (dict(curved, coordinates=(f, f[:-1], f)), ValueError, "coordinates[1]: has the shape (4, 5, 5), expected (5, 5, 5)"),
             (dict(curved, coordinates=(f, f, f[::-1])), ValueError, "coordinates[2]: has strides of (-200, 40, 8) bytes, expected "
@@ -725,6 +756,7 @@ if comm.rank == 0:
     os.makedirs(folder, exist_ok=True)
 comm.Barrier()
 layouts_draw_the_same_picture()
+components_and_indices_of_any_type_are_the_same()
 planes_go_without_z()
 what_cannot_be_borrowed_is_refused()
 parameters_are_numbers()

@@ -45,14 +45,6 @@ static void float_face_vertices(session_input *in)
 {
     in->mesh.face_connectivity.type = INSITU_FLOAT32;
 }
-static void byte_face_offsets(session_input *in)
-{
-    in->mesh.face_offsets.type = INSITU_UINT8;
-}
-static void face_stride_odd(session_input *in)
-{
-    in->mesh.face_offsets.stride_bytes = 12;
-}
 static void one_type_without_offsets(session_input *in)
 {
     in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
@@ -169,13 +161,7 @@ static const spoilt_case at_once[] = {
      float_face_vertices,
      INSITU_ERROR_ARGUMENT,
      true,
-     {"face vertex indices are of element type", "not int32 or int64"}},
-    {"byte offsets",
-     byte_face_offsets,
-     INSITU_ERROR_ARGUMENT,
-     true,
-     {"face offsets are of element type", "not int32 or int64"}},
-    {"odd stride", face_stride_odd, INSITU_ERROR_MESH, true, {"face offsets have a stride of 12 bytes"}},
+     {"face vertex indices are of element type", "not an integer type"}},
     {"no cell offsets",
      one_type_without_offsets,
      INSITU_ERROR_MESH,

@@ -180,11 +180,8 @@ SPOIL(first_least, b->lattice.first[1] = INT64_MIN)
 SPOIL(nothing_given, b->lattice.spacing[0] = b->lattice.spacing[1] = b->lattice.spacing[2] = 0)
 SPOIL(axis_missing, (make_rectilinear(b), b->lattice.axes[1].data = NULL))
 SPOIL(axis_nan, (make_rectilinear(b), b->axes[2][3] = (double)NAN))
-SPOIL(axis_of_bytes, (make_rectilinear(b), b->lattice.axes[0].type = INSITU_UINT8))
 SPOIL(axis_of_no_type, (make_rectilinear(b), b->lattice.axes[0].type = (insitu_type)77))
-SPOIL(axis_unaligned, (make_rectilinear(b), b->lattice.axes[0].data = (const char *)b->lattice.axes[0].data + 1))
 SPOIL(axis_stride, (make_rectilinear(b), b->lattice.axes[0].stride_bytes = (int64_t)1 << 60))
-SPOIL(axis_odd_stride, (make_rectilinear(b), b->lattice.axes[0].stride_bytes = 12))
 SPOIL(spacing_and_axes, b->lattice.axes[0] = doubles(b->axes[0]))
 SPOIL(coordinates_and_spacing, b->mesh.coordinates[2] = doubles(b->places[2]))
 SPOIL(coordinates_and_axes, (make_rectilinear(b), b->mesh.coordinates[0] = doubles(b->places[0])))
@@ -245,12 +242,8 @@ static const wrong_block wrong_blocks[] = {
     {WRONG(nothing_given, true, "lattice: neither spacing nor axes nor coordinates are given")},
     {WRONG(axis_missing, true, "coordinates along j are not given")},
     {WRONG(axis_nan, false, "lattice: coordinate 3 along k is not finite: nan")},
-    {"axis_of_bytes", axis_of_bytes, true, "coordinates along i are of element type 5, not float32 or float64",
-     INSITU_ERROR_ARGUMENT},
     {"axis_of_no_type", axis_of_no_type, true, "coordinates along i are of element type 77", INSITU_ERROR_ARGUMENT},
-    {WRONG(axis_unaligned, true, "coordinates along i are not aligned to their 8 bytes")},
     {WRONG(axis_stride, true, "coordinates along i have a stride of 1152921504606846976 bytes")},
-    {WRONG(axis_odd_stride, true, "coordinates along i have a stride of 12 bytes, no multiple of their 8")},
     {WRONG(spacing_and_axes, true, "lattice: spacing and axes are given: give coordinates by one of them")},
     {WRONG(coordinates_and_spacing, true, "lattice: spacing and coordinates of vertices are given")},
     {WRONG(coordinates_and_axes, true, "lattice: axes and coordinates of vertices are given")},

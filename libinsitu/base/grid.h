@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 
 enum {
     GRID_NO_TYPE = 0,
@@ -50,13 +51,32 @@ typedef struct grid_axis {
     int axis;
 } grid_axis;
 
+/* Elements that are read one by one, at any address. Only values of fields and axes are; whoever makes a grid copies
+ * other arrays of such elements. */
+typedef enum grid_odd {
+    GRID_NOT_ODD = 0, /* aligned, and double, float, int64 or int32 */
+    GRID_ODD_FLOAT32,
+    GRID_ODD_FLOAT64,
+    GRID_ODD_INT32,
+    GRID_ODD_INT64,
+    GRID_ODD_UINT8,
+    GRID_ODD_INT8,
+    GRID_ODD_INT16,
+    GRID_ODD_UINT16,
+    GRID_ODD_UINT32,
+    GRID_ODD_UINT64
+} grid_odd;
+
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
 typedef struct grid_array {
     const char *data;
     int64_t stride; /* bytes; 0: one element stands for all */
     bool is_wide;
-    bool is_integer;
+    bool is_integer;       /* or odd: not to be read as float or double */
+    unsigned char odd;     /* a grid_odd */
     int64_t base;          /* for indices and offsets: the entry that counts as 0 */
+    int64_t open_count;    /* for offsets without the last entry: how many there are, else 0; */
+    int64_t open_end;      /* and that entry, from 0 */
     const grid_axis *axis; /* NULL, or what computes the numbers, coordinates by vertex; there is no data then */
 } grid_array;
 
@@ -96,6 +116,7 @@ typedef struct grid {
 typedef struct grid_field {
     grid_array values; /* stride from tuple to tuple */
     int64_t component_stride;
+    const grid_array *apart; /* NULL, or for a magnitude the components, each an array of its own */
     int component_count;
     int component; /* 0 .. component_count - 1, or -1 for the magnitude */
     bool is_cell_centred;
@@ -103,11 +124,47 @@ typedef struct grid_field {
                                      own is not finite has none */
 } grid_field;
 
+#define GRID_READ_ODD(type)                                                                                            \
+    {                                                                                                                  \
+        type value;                                                                                                    \
+        memcpy(&value, p, sizeof value);                                                                               \
+        return (double)value;                                                                                          \
+    }
+
+static inline double grid_odd_number(int odd, const char *p)
+{
+    switch (odd) {
+    case GRID_ODD_FLOAT32: GRID_READ_ODD(float)
+    case GRID_ODD_FLOAT64: GRID_READ_ODD(double)
+    case GRID_ODD_INT32: GRID_READ_ODD(int32_t)
+    case GRID_ODD_INT64: GRID_READ_ODD(int64_t)
+    case GRID_ODD_UINT8: GRID_READ_ODD(uint8_t)
+    case GRID_ODD_INT8: GRID_READ_ODD(int8_t)
+    case GRID_ODD_INT16: GRID_READ_ODD(int16_t)
+    case GRID_ODD_UINT16: GRID_READ_ODD(uint16_t)
+    case GRID_ODD_UINT32: GRID_READ_ODD(uint32_t)
+    case GRID_ODD_UINT64: GRID_READ_ODD(uint64_t)
+    default: return 0;
+    }
+}
+
+static inline int64_t grid_element_bytes(const grid_array *a)
+{
+    switch (a->odd) {
+    case GRID_ODD_UINT8:
+    case GRID_ODD_INT8: return 1;
+    case GRID_ODD_INT16:
+    case GRID_ODD_UINT16: return 2;
+    default: return a->is_wide ? 8 : 4;
+    }
+}
+
 static inline double grid_array_number(const grid_array *a, int64_t i)
 {
     if (a->axis) return a->axis->places[grid_index_along(a->axis->vertices, a->axis->axis, i)];
     const char *p = a->data + i * a->stride;
     if (!a->is_integer) return a->is_wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
+    if (a->odd) return grid_odd_number(a->odd, p);
     return a->is_wide ? (double)*(const int64_t *)(const void *)p : (double)*(const int32_t *)(const void *)p;
 }
 
@@ -116,6 +173,12 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
     const char *p = a->data + i * a->stride;
     const int64_t index = a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
     return (int64_t)((uint64_t)index - (uint64_t)a->base); /* whatever the index is */
+}
+
+/* Returns where the i-th cell or face ends, by an array of offsets. */
+static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
+{
+    return i + 1 == offsets->open_count ? offsets->open_end : grid_array_index(offsets, i + 1);
 }
 
 /* 0 for polyhedra and polygons, whose cells differ in it, and for numbers that are no type. */
@@ -211,14 +274,14 @@ static inline bool grid_has_faces(const grid *g)
 static inline void grid_cell_faces(const grid *g, int64_t cell, int64_t *first, int64_t *end)
 {
     *first = grid_array_index(&g->offsets, cell);
-    *end = grid_array_index(&g->offsets, cell + 1);
+    *end = grid_offset_end(&g->offsets, cell);
 }
 
 /* A face's vertices: entries [*first, *end) of face_connectivity. */
 static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *first, int64_t *end)
 {
     *first = grid_array_index(&g->face_offsets, face);
-    *end = grid_array_index(&g->face_offsets, face + 1);
+    *end = grid_offset_end(&g->face_offsets, face);
 }
 
 /* A walk over the vertices of a cell of any type. A polyhedron's vertex comes once for each of its faces that has it.
@@ -248,7 +311,7 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
         return w;
     }
     w.next = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
-    w.end = type == GRID_POLYGON ? grid_array_index(&g->offsets, cell + 1) : w.next + count;
+    w.end = type == GRID_POLYGON ? grid_offset_end(&g->offsets, cell) : w.next + count;
     return w;
 }
 
@@ -317,17 +380,23 @@ static inline bool grid_is_seen(const grid *g, int64_t cell)
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));
 }
 
+/* One component of the field, from tuple to tuple. */
+static inline grid_array grid_field_component(const grid_field *f, int component)
+{
+    grid_array a = f->apart ? f->apart[component] : f->values;
+    if (!f->apart) a.data += component * f->component_stride;
+    return a;
+}
+
 static inline double grid_field_value(const grid_field *f, int64_t i)
 {
     if (f->component >= 0) {
-        grid_array a = f->values;
-        a.data += f->component * f->component_stride;
+        const grid_array a = grid_field_component(f, f->component);
         return grid_array_number(&a, i);
     }
     double sum = 0;
     for (int c = 0; c < f->component_count; c++) {
-        grid_array a = f->values;
-        a.data += c * f->component_stride;
+        const grid_array a = grid_field_component(f, c);
         const double v = grid_array_number(&a, i);
         sum += v * v;
     }

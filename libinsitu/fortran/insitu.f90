@@ -13,7 +13,7 @@
 ! Indices count from 1. insitu.h tells more about each argument; docs/fortran.md is the page about this file.
 module insitu
     use, intrinsic :: iso_c_binding
-    use, intrinsic :: iso_fortran_env, only: int32, int64, int8, real32, real64
+    use, intrinsic :: iso_fortran_env, only: int16, int32, int64, int8, real32, real64
     use mpi_f08, only: MPI_Comm
     implicit none
     private
@@ -28,7 +28,8 @@ module insitu
     integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2
     integer, parameter, public :: INSITU_ORDER_VTK = 0, INSITU_ORDER_LEXICOGRAPHIC = 1, INSITU_ORDER_DMPLEX = 2
 
-    integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 5
+    integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 6, &
+        integer16 = 7
 
     ! A borrowed array: elements one after the other, in so many rows of equal length; or of up to four dimensions, as
     ! those of a block.
@@ -94,6 +95,8 @@ module insitu
         integer(c_int64_t) :: boundary_face_connectivity_count
         type(c_array) :: boundary_face_connectivity, boundary_owner
         integer(c_int64_t) :: halo_cell_count
+        integer(c_int) :: open_offsets, cell_type_map_count
+        type(c_ptr) :: cell_type_map
     end type c_mesh
 
     type, bind(C) :: c_patch
@@ -118,6 +121,7 @@ module insitu
         type(c_ptr) :: fill_data
         integer(c_int) :: patch_count
         type(c_ptr) :: patches
+        type(c_ptr) :: components
     end type c_field
 
     ! Report of the last step on this rank: as insitu_report in insitu.h.
@@ -205,7 +209,8 @@ module insitu
         generic :: create_from_text => text_integer, text_f08             ! (comm, scene_text, status)
         procedure, private :: set_faces_by_offsets, set_faces_by_lists
         generic :: set_mesh_of_faces => set_faces_by_offsets, set_faces_by_lists
-        procedure :: set_mesh, set_block, remove_mesh, set_field, set_filled_field, step, report, error, destroy
+        procedure :: set_mesh, set_block, remove_mesh, set_field, set_components, set_filled_field, step, report, error
+        procedure :: destroy
         procedure :: keep_pictures, pictures
         procedure :: parameter => read_parameter
     end type insitu_session
@@ -214,8 +219,8 @@ module insitu
     ! matrix: connectivity (corners, cells), values (components, tuples). Of blocks also arrays (i, j, k), and of fields
     ! with components, (components, i, j, k) or (i, j, k, components).
     interface insitu_borrow
-        module procedure borrow_r4, borrow_r8, borrow_i1, borrow_i4, borrow_i8
-        module procedure borrow_r4_2, borrow_r8_2, borrow_i1_2, borrow_i4_2, borrow_i8_2
+        module procedure borrow_r4, borrow_r8, borrow_i1, borrow_i2, borrow_i4, borrow_i8
+        module procedure borrow_r4_2, borrow_r8_2, borrow_i1_2, borrow_i2_2, borrow_i4_2, borrow_i8_2
         module procedure borrow_r4_3, borrow_r8_3, borrow_i1_3, borrow_i4_3, borrow_i8_3
         module procedure borrow_r4_4, borrow_r8_4, borrow_i4_4, borrow_i8_4
     end interface insitu_borrow
@@ -355,6 +360,13 @@ contains
         if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
     end function borrow_i1
 
+    function borrow_i2(a) result(out)
+        integer(int16), intent(in), target :: a(:)
+        type(insitu_array) :: out
+        out = array_of(integer16, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1)), c_loc(a(min(2, size(a))))])
+    end function borrow_i2
+
     function borrow_i4(a) result(out)
         integer(int32), intent(in), target :: a(:)
         type(insitu_array) :: out
@@ -392,6 +404,14 @@ contains
         if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
             c_loc(a(1, min(2, size(a, 2))))])
     end function borrow_i1_2
+
+    function borrow_i2_2(a) result(out)
+        integer(int16), intent(in), target :: a(:, :)
+        type(insitu_array) :: out
+        out = array_of(integer16, shape(a))
+        if (size(a) > 0) call put_memory(out, [c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2))))])
+    end function borrow_i2_2
 
     function borrow_i4_2(a) result(out)
         integer(int32), intent(in), target :: a(:, :)
@@ -1342,6 +1362,51 @@ contains
         end if
         call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
     end subroutine set_field
+
+    ! Hand over this rank's part of a field whose components are arrays of their own, of any types:
+    ! call pictures%set_components('domain', 'velocity', [insitu_borrow(u), insitu_borrow(v), insitu_borrow(w)], status).
+    ! Local.
+    subroutine set_components(self, mesh, name, components, status, centring, changed)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: mesh, name
+        type(insitu_array), intent(in) :: components(:)
+        integer, intent(out) :: status
+        integer, intent(in), optional :: centring, changed
+        type(c_array), target :: table(max(1, size(components)))
+        type(block_shape) :: block
+        type(block_array) :: laid
+        character(kind=c_char), target :: c_name(len_trim(name) + 1)
+        type(c_field) :: field
+        real(real64), target :: nothing
+        character(:), allocatable :: fault
+        integer :: i
+        nothing = 0
+        c_name = as_c_text(name)
+        call c_field_defaults(field)
+        field%name = c_loc(c_name)
+        if (present(centring)) field%centring = centring
+        if (present(changed)) field%changed = changed
+        fault = find_zero(name, mesh)
+        if (size(components) == 0) fault = 'components are none'
+        block = block_of(self%sizes, mesh, field%centring)
+        do i = 1, size(components)
+            if (block%dimensions > 0) then
+                call borrow_for(block, 'components', field%centring + 1, .false., laid, fault, nothing, components(i))
+                table(i) = laid%array
+                field%count = laid%count
+            else
+                if (components(i)%dimensions > 1) fault = 'components are matrices, expected a list each'
+                if (components(i)%columns /= components(1)%columns) fault = 'components are of different lengths'
+                table(i) = as_c(components(i), nothing)
+                field%count = components(1)%columns
+            end if
+        end do
+        status = INSITU_ERROR_ARGUMENT
+        if (is_refused(self, fault)) return
+        field%component_count = size(components)
+        field%components = c_loc(table)
+        call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
+    end subroutine set_components
 
     subroutine put_block_values(block, field, values, nothing, fault)
         type(block_shape), intent(inout) :: block

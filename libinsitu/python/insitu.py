@@ -26,7 +26,8 @@ CHANGED_NOTHING, CHANGED_TOPOLOGY, CHANGED_GEOMETRY, CHANGED_VALUES, CHANGED_ALL
 VERTEX, CELL, CORNER = 0, 1, 2
 ORDER_VTK, ORDER_LEXICOGRAPHIC, ORDER_DMPLEX = 0, 1, 2
 
-_TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5}
+_TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5, "int8": 6,
+          "int16": 7, "uint16": 8, "uint32": 9, "uint64": 10}
 _CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5, TRIANGLE: 3, QUAD: 4}
 _MPI_Comm = ctypes.c_void_p if MPI._sizeof(MPI.Comm) == ctypes.sizeof(ctypes.c_void_p) else ctypes.c_int
 
@@ -90,6 +91,9 @@ class _Mesh(ctypes.Structure):
         ("boundary_face_connectivity", _Array),
         ("boundary_owner", _Array),
         ("halo_cell_count", ctypes.c_int64),
+        ("open_offsets", ctypes.c_int),
+        ("cell_type_map_count", ctypes.c_int),
+        ("cell_type_map", ctypes.POINTER(ctypes.c_int)),
     ]
 
 
@@ -125,6 +129,7 @@ _Field._fields_ = [
     ("fill_data", ctypes.c_void_p),
     ("patch_count", ctypes.c_int),
     ("patches", ctypes.POINTER(_Patch)),
+    ("components", ctypes.POINTER(_Array)),
 ]
 
 
@@ -247,8 +252,8 @@ def _view(what, given, dimensions):
     if array.ndim not in dimensions:
         hint = "; reshape(-1) makes a list of a C-contiguous array, and no copy" if array.ndim > max(dimensions) else ""
         raise ValueError(f"{what}: has {array.ndim} dimensions, expected {' or '.join(map(str, dimensions))}{hint}")
-    if array.dtype.name not in _TYPES or not array.dtype.isnative or not array.flags.aligned:
-        raise TypeError(f"{what}: is of type {array.dtype}, expected one of {', '.join(_TYPES)}, native and aligned")
+    if array.dtype.name not in _TYPES or not array.dtype.isnative:
+        raise TypeError(f"{what}: is of type {array.dtype}, expected one of {', '.join(_TYPES)}, native")
     return array
 
 
@@ -462,7 +467,26 @@ def _put_coordinates(block, given, mesh, lattice):
     return [held]
 
 
+def _put_components(field, given, block):
+    """Values of a component each, in arrays of their own: any types and strides."""
+    arrays, held = [], []
+    for i, one in enumerate(given):
+        part = _Field(centring=field.centring)
+        held.append(_put_values(part, one, block))
+        if part.component_count != 1:
+            raise ValueError(f"values[{i}]: has {part.component_count} components, expected 1")
+        if i and part.count != field.count:
+            raise ValueError(f"values[{i}]: has {part.count} values, values[0] has {field.count}")
+        field.count = part.count
+        arrays.append(part.values)
+    table = (_Array * len(arrays))(*arrays)
+    field.component_count, field.components, field.values = len(arrays), table, _Array()
+    return [table, held]
+
+
 def _put_values(field, given, block=None):
+    if isinstance(given, (tuple, list)) and given and all(isinstance(one, numpy.ndarray) for one in given):
+        return _put_components(field, given, block)
     if block is not None and field.centring in (VERTEX, CELL):
         field.count = block.count(field.centring)
         field.values, field.component_count, field.component_stride_bytes, array = block.borrow(
@@ -550,13 +574,15 @@ class Session:
     def set_mesh(self, name, *, coordinates, connectivity=None, cell_type=TET, cell_types=None, offsets=None, faces=None,
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
                  keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL, boundary_faces=None,
-                 boundary_face_offsets=None, boundary_owner=None, halo_cell_count=0):
+                 boundary_face_offsets=None, boundary_owner=None, halo_cell_count=0, open_offsets=False,
+                 cell_type_map=None):
         """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h),
         or a list of arrays, one a face, without face_offsets. For cells of one type, connectivity may be the first
         columns of a table: nodes[:, :8]. Finite-volume codes may give owner, neighbour and cell_count instead of
         connectivity, cell_type, cell_types and offsets; boundary_faces, boundary_face_offsets and boundary_owner, if
         the boundary's faces are in a list of their own, and halo_cell_count, if owner and neighbour name cells of a
-        halo."""
+        halo. open_offsets: offsets and face_offsets have no last entry. cell_type_map: the types of the numbers in
+        cell_types, where these are the code's own: a list, 0 for numbers that are no type."""
         _constant("cell_type", cell_type, "insitu.TET, insitu.HEX and so on")
         _constant("vertex_order", vertex_order, "insitu.ORDER_VTK, insitu.ORDER_LEXICOGRAPHIC or insitu.ORDER_DMPLEX")
         mesh, held = _Mesh(), []
@@ -581,7 +607,15 @@ class Session:
                 borrowed, counts[key], array = _list(key, given)
                 setattr(mesh, key, borrowed)
                 held.append(array)
+        mesh.open_offsets = 1 if open_offsets else 0
+        for key in ("offsets", "face_offsets"):
+            if open_offsets and key in counts:
+                counts[key] += 1  # as if the last entry were there
         mesh.face_count = max(counts.get("face_offsets", 0) - 1, 0)
+        if cell_type_map is not None:
+            types = (ctypes.c_int * max(len(cell_type_map), 1))(*cell_type_map)
+            mesh.cell_type_map_count, mesh.cell_type_map = len(cell_type_map), types
+            held.append(types)
         if isinstance(faces, (list, tuple)):
             mesh.face_count = len(faces)
             mesh.face_sizes, mesh.face_lists, arrays = _lists("faces", faces)
@@ -651,7 +685,8 @@ class Session:
 
     def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
                   patches=(), changed=CHANGED_ALL):
-        """Hand over this rank's part of a field: values of n tuples, or n x components; on a block [i, j, k], or with
+        """Hand over this rank's part of a field: values of n tuples, or n x components, or a list of arrays, one for each
+        component, of any types; on a block [i, j, k], or with
         components before or after. index: the tuple that each vertex, cell or corner has, from the mesh's index_base on; for corners it may be the first columns of a table:
         dofs[:, :8]. corner_row, for corners: values (or entries of index) from one cell's first to the next one's.
         patches, for cells: the values on the boundary, each a Patch.

@@ -16,7 +16,7 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     for (int axis = 0; axis < 3; axis++) bytes += array_bytes(&m->coordinates[axis], m->vertex_count);
     bytes += array_bytes(&m->vertex_ids, m->vertex_count);
     bytes += array_bytes(&m->cell_types, m->cell_count);
-    bytes += array_bytes(&m->face_offsets, m->face_count + 1);
+    bytes += array_bytes(&m->face_offsets, m->face_count + (m->open_offsets ? 0 : 1));
     bytes += array_bytes(&m->face_connectivity, m->face_connectivity_count);
     bytes += array_bytes(&m->face_sizes, m->face_count);
     if (m->face_lists.data) bytes += m->face_count * (int64_t)sizeof(void *);
@@ -26,7 +26,7 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     bytes += array_bytes(&m->boundary_face_connectivity, m->boundary_face_connectivity_count);
     bytes += array_bytes(&m->boundary_owner, m->boundary_face_count);
     bytes += array_bytes(&m->connectivity, m->connectivity_count);
-    bytes += array_bytes(&m->offsets, m->offsets.data ? m->cell_count + 1 : 0);
+    bytes += array_bytes(&m->offsets, m->cell_count + (m->open_offsets ? 0 : 1));
     for (int axis = 0; m->lattice && axis < 3; axis++)
         bytes += array_bytes(&m->lattice->axes[axis], m->lattice->cells[axis] + 1);
     return bytes + array_bytes(&m->ghosts, m->cell_count);
@@ -51,6 +51,14 @@ static bool is_field_in_use(const session_mesh *mesh, int field)
     return false;
 }
 
+static int64_t value_bytes(const insitu_field *field)
+{
+    int64_t bytes = array_bytes(&field->values, field->count) * field->component_count;
+    for (int c = 0; field->components && c < field->component_count; c++)
+        bytes += array_bytes(&field->components[c], field->count);
+    return bytes;
+}
+
 static void report_field(session_report *out, const session_mesh *mesh, int index)
 {
     const insitu_field *field = &mesh->fields[index].given;
@@ -64,7 +72,7 @@ static void report_field(session_report *out, const session_mesh *mesh, int inde
                                                         : "at the corners of a torn mesh",
                          (long long)copied);
     if (is_field_in_use(mesh, index))
-        out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count +
+        out->numbers.bytes_borrowed += value_bytes(field) +
                                        array_bytes(&field->index, session_field_places(&mesh->given, field)) +
                                        patch_bytes(field);
     else if (out->numbers.images)
@@ -132,6 +140,12 @@ static void report_topology(session_report *out, const session_mesh *mesh)
     if (face_bytes)
         session_text_add(&out->copied_why, "mesh \"%s\": its faces' vertices, out of lists: %lld bytes", mesh->name,
                          face_bytes);
+    if (mesh->conformed.bytes) {
+        out->numbers.bytes_copied += mesh->conformed.bytes;
+        session_text_add(&out->copied_why,
+                         "mesh \"%s\": arrays that are not aligned or of types that are not read in place: %lld bytes",
+                         mesh->name, (long long)mesh->conformed.bytes);
+    }
     if (mesh->lattice.bytes) {
         out->numbers.bytes_copied += mesh->lattice.bytes;
         session_text_add(&out->copied_why, "mesh \"%s\": coordinates along the axes of its lattice: %lld bytes",
@@ -150,7 +164,7 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
     insitu_report *report = &out->numbers;
     int64_t unusable = 0;
     report->cells += session_cell_count(mesh);
-    report->bytes_borrowed += mesh_bytes(&mesh->given);
+    report->bytes_borrowed += mesh_bytes(&mesh->original);
     report_topology(out, mesh);
     if (!mesh->is_check_stale) {
         report->cells_ghost += mesh->ghost_count;

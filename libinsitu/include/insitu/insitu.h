@@ -43,16 +43,29 @@ typedef enum insitu_type {
     INSITU_FLOAT64 = 2,
     INSITU_INT32 = 3,
     INSITU_INT64 = 4,
-    INSITU_UINT8 = 5
+    INSITU_UINT8 = 5,
+    INSITU_INT8 = 6,
+    INSITU_INT16 = 7,
+    INSITU_UINT16 = 8,
+    INSITU_UINT32 = 9,
+    INSITU_UINT64 = 10
 } insitu_type;
 
-/* A borrowed array: the caller's memory, read only, never written or kept beyond what insitu_set_mesh() says. */
+/* A borrowed array: the caller's memory, read only, never written or kept beyond what insitu_set_mesh() says.
+ *
+ * "Any integers" are all integer types of insitu_type. Coordinates, arrays of any integers and values of fields may
+ * also lie at any address and have any stride, as in packed records; other arrays and their strides are aligned to
+ * their element type. Values are always read where they are. So are other arrays that are aligned: coordinates that are
+ * float32 or float64, and indices, offsets and numbers of 4 or 8 bytes, unsigned ones as if they were signed: they must
+ * be below 2^31 or 2^63, but uint32 may be larger where there are 2^31 vertices or faces. Others are copied once for
+ * each topology or geometry, counted in bytes_copied: coordinates that are integers as float64, integers of 1 or 2
+ * bytes as int32, arrays that are not aligned in their own type. */
 typedef struct insitu_array {
-    const void *data;     /* first element; NULL: the array is not given. Aligned to its element type. */
+    const void *data;     /* first element; NULL: the array is not given */
     insitu_type type;     /* type of one element */
-    int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. Any multiple of the size;
-                             a negative one reads backwards from data. A stride by which the elements would span more
-                             than 2^48 bytes is an error. */
+    int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. A negative one reads
+                             backwards from data. A stride by which the elements would span more than 2^48 bytes is an
+                             error. */
 } insitu_array;
 
 /* Cell types by VTK's ids, vertices in VTK's order, unless the mesh's vertex_order says otherwise. */
@@ -117,8 +130,8 @@ typedef struct insitu_lattice {
      * most 2^53 in size. */
     double origin[3], spacing[3];
     int64_t first[3];
-    /* Rectilinear: cells[a] + 1 coordinates along each axis, float32 or float64; not given where the lattice is
-     * uniform. A lattice of quads may lack those of the axis without cells; its coordinate is 0 then. */
+    /* Rectilinear: cells[a] + 1 coordinates along each axis, float32, float64 or any integers; not given where the
+     * lattice is uniform. A lattice of quads may lack those of the axis without cells; its coordinate is 0 then. */
     insitu_array axes[3];
 } insitu_lattice;
 
@@ -127,8 +140,8 @@ typedef struct insitu_lattice {
  * when it is called. Fill with insitu_mesh_defaults() first. */
 typedef struct insitu_mesh {
     int64_t vertex_count;        /* >= 0 */
-    insitu_array coordinates[3]; /* x, y, z: float32 or float64, vertex_count each; drawn cells' are at most 1e100 in
-                                    size. Interleaved xyz is three arrays of stride 3 elements: see
+    insitu_array coordinates[3]; /* x, y, z: float32, float64 or any integers, vertex_count each; drawn cells' are at
+                                    most 1e100 in size. Interleaved xyz is three arrays of stride 3 elements: see
                                     insitu_mesh_interleaved(). Meshes of triangles, quads and polygons may go without
                                     z (no data in coordinates[2]): then it is 0 everywhere. */
     insitu_array vertex_ids;     /* optional, int32 or int64, vertex_count: ids unique over all ranks, by which the
@@ -136,26 +149,29 @@ typedef struct insitu_mesh {
                                     coordinates match. */
     int64_t cell_count;          /* >= 0; at most 4294967294 */
     insitu_cell_type cell_type;  /* type of all cells, where cell_types is not given */
-    insitu_array cell_types;     /* optional, uint8, int32 or int64, cell_count: VTK's ids, for mixed cells */
+    insitu_array cell_types;     /* optional, any integers, cell_count: VTK's ids, for mixed cells; or numbers of the
+                                    code's own: see cell_type_map */
     int64_t connectivity_count;  /* elements in connectivity */
-    insitu_array connectivity;   /* int32 or int64, connectivity_count: the cells' vertex indices from index_base,
-                                    one cell after the other */
-    insitu_array offsets;        /* int32 or int64, cell_count + 1: where each cell begins in connectivity; the last
-                                    entry is connectivity_count. Not needed where all cells are of one type that is
-                                    neither INSITU_POLYHEDRON nor INSITU_POLYGON. */
+    insitu_array connectivity;   /* any integers, connectivity_count: the cells' vertex indices from index_base, one
+                                    cell after the other */
+    insitu_array offsets;        /* any integers, cell_count + 1: where each cell begins in connectivity; the last
+                                    entry is connectivity_count, and is missing where open_offsets is 1. Not needed
+                                    where all cells are of one type that is neither INSITU_POLYHEDRON nor
+                                    INSITU_POLYGON. */
     /* Faces, needed where there are polyhedra. A polyhedron's entries in connectivity are the indices of its faces,
      * counted from index_base, at least 4, in any order; two polyhedra that share a face name the same one. The faces
      * of a cell must make a closed surface: exactly two of them meet along every edge, once each. (An edge from a
      * vertex to itself does not count, so a face may repeat a vertex in succession, or be a single vertex.) A face may
-     * run either way round. Faces are not copied, except as said at owner, face_lists and keep_polyhedra; a frame holds
-     * only the polyhedra it works on, about 200 bytes a vertex of each, 16 MiB a thread at most. */
+     * run either way round. Faces are not copied, except as said at insitu_array, owner, face_lists and keep_polyhedra;
+     * a frame holds only the polyhedra it works on, about 200 bytes a vertex of each, 16 MiB a thread at most. */
     int64_t face_count;
-    insitu_array face_offsets;       /* int32 or int64, face_count + 1: where each face begins in face_connectivity */
+    insitu_array face_offsets;       /* any integers, face_count + 1: where each face begins in face_connectivity; the
+                                        last entry is missing where open_offsets is 1 */
     int64_t face_connectivity_count; /* elements in face_connectivity */
-    insitu_array face_connectivity;  /* int32 or int64, face_connectivity_count: the faces' vertex indices from
+    insitu_array face_connectivity;  /* any integers, face_connectivity_count: the faces' vertex indices from
                                         index_base, at least 3 a face, around it from any vertex in either direction */
-    insitu_array ghosts;             /* optional, uint8, int32 or int64, cell_count: cells with a nonzero flag are not
-                                        drawn */
+    insitu_array ghosts;             /* optional, any integers, cell_count: cells with a nonzero flag are not drawn.
+                                        Flags of 2 bytes, and those that are not aligned, are copied, 1 byte each. */
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
     int index_base;                  /* 0 by default, or 1, as Fortran counts: the index of the first vertex, face, cell
                                         and element in connectivity, offsets, face_offsets, face_connectivity,
@@ -208,6 +224,12 @@ typedef struct insitu_mesh {
     int64_t halo_cell_count;     /* 0 by default. Cells of a halo that owner and neighbour may name: the numbers of the
                                     halo follow those of the mesh's cells. They count as no cell, so that a face
                                     between a cell and the halo is on the boundary of this rank's part. */
+    int open_offsets; /* 0 by default; 1: offsets and face_offsets have no last entry, as in Conduit's Blueprint. The
+                         last cell ends with connectivity, the last face with face_connectivity. */
+    /* Optional: the cell types of the code's own numbers in cell_types, type n being cell_type_map[n]; 0 where n is no
+     * type. The table is copied by the call. The types are copied too, 1 byte a cell. */
+    int cell_type_map_count;
+    const int *cell_type_map;
 } insitu_mesh;
 
 /* A field has one value at each vertex, one in each cell, or one at each corner of each cell. Volumes and colours show
@@ -262,8 +284,8 @@ typedef struct insitu_patch {
 struct insitu_field;
 
 /* Gives the values of a field in the steps that need them. field is as it was set; fill adds values and what belongs to
- * them (count, component_stride_bytes, index, corner_row, patches, changed), but leaves name, centring and
- * component_count. insitu_step() calls it on its caller's thread, at most once a step, and only if a picture, a
+ * them (count, component_stride_bytes or components, index, corner_row, patches, changed), but leaves name, centring
+ * and component_count. insitu_step() calls it on its caller's thread, at most once a step, and only if a picture, a
  * statistic or a condition of this step needs the field. The arrays are borrowed until the step has returned. All ranks
  * call the fills of their fields in the same order, by the names of meshes and then of fields: where all ranks set the
  * field with a fill, it may communicate, on a communicator of the caller's. It must not call the session: each such
@@ -280,7 +302,7 @@ typedef struct insitu_field {
                                        corners; any number where index is given */
     int component_count;            /* >= 1; 1 by default. The scene picks one, or the magnitude. */
     int64_t component_stride_bytes; /* from one component to the next, as stride_bytes; 0: packed, interleaved */
-    insitu_array values;            /* float32, float64, int32 or int64. stride_bytes is from tuple to tuple; 0:
+    insitu_array values;            /* float32, float64 or any integers. stride_bytes is from tuple to tuple; 0:
                                        component_count elements */
     unsigned changed;               /* INSITU_CHANGED_VALUES or NOTHING; ALL by default */
     /* Optional, int32 or int64, vertex_count, cell_count or the number of corners: the tuple of values that each
@@ -303,6 +325,10 @@ typedef struct insitu_field {
     /* Optional, for cell fields: the values on the boundary. The table is copied, its arrays are borrowed. */
     int patch_count;
     const insitu_patch *patches;
+    /* Optional, instead of values and component_stride_bytes, which are not given then: component_count arrays, one a
+     * component, each of any place, type and stride, as values; packed where stride_bytes is 0. The table is copied,
+     * its arrays are borrowed. */
+    const insitu_array *components;
 } insitu_field;
 
 /* Report of the last step on this rank, unless said otherwise. Times are wall-clock milliseconds. */

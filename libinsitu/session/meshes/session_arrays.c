@@ -10,20 +10,24 @@ static bool is_allowed(insitu_type type, int allowed)
     case INSITU_FLOAT32:
     case INSITU_FLOAT64: return allowed & SESSION_ALLOW_FLOATS;
     case INSITU_INT32:
-    case INSITU_INT64: return allowed & SESSION_ALLOW_INTEGERS;
-    case INSITU_UINT8: return allowed & SESSION_ALLOW_BYTES;
+    case INSITU_INT64: return allowed & (SESSION_ALLOW_INTEGERS | SESSION_ALLOW_ANY);
+    case INSITU_UINT8:
+    case INSITU_INT8:
+    case INSITU_INT16:
+    case INSITU_UINT16:
+    case INSITU_UINT32:
+    case INSITU_UINT64: return allowed & SESSION_ALLOW_ANY;
     }
     return false;
 }
 
 static const char *allowed_words(int kind)
 {
-    switch (kind & (SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS | SESSION_ALLOW_BYTES)) {
-    case SESSION_ALLOW_FLOATS: return "float32 or float64";
+    switch (kind & (SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS | SESSION_ALLOW_ANY)) {
     case SESSION_ALLOW_INTEGERS: return "int32 or int64";
-    case SESSION_ALLOW_BYTES: return "uint8";
+    case SESSION_ALLOW_ANY: return "an integer type";
     case SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS: return "float32, float64, int32 or int64";
-    default: return "uint8, int32 or int64";
+    default: return "float32, float64 or an integer type";
     }
 }
 
@@ -33,9 +37,9 @@ static const uint64_t most_bytes = (uint64_t)1 << 48;
 
 /* A stride may be negative: then the elements lie before the first one. 0 bytes: packed. */
 static insitu_status check_stride(const void *data, const char *name, int64_t count, int64_t stride, int64_t size,
-                                  insitu_status bad, base_error *error)
+                                  bool is_anywhere, insitu_status bad, base_error *error)
 {
-    if (stride % size != 0)
+    if (stride % size != 0 && !is_anywhere)
         return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", name,
                          (long long)stride, (long long)size);
     const uint64_t step = stride < 0 ? 0 - (uint64_t)stride : (uint64_t)stride;
@@ -64,17 +68,19 @@ insitu_status session_check_array(const insitu_array *array, const session_array
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
                          (int)array->type, allowed_words(rule->kind));
     const int64_t size = session_type_size(array->type), count = rule->count + (rule->kind & SESSION_HAS_END ? 1 : 0);
-    const insitu_status status = check_place(array->data, rule->name, size, bad, error);
+    const bool is_anywhere = rule->kind & SESSION_ALLOW_ANY;
+    const insitu_status status = is_anywhere ? INSITU_OK : check_place(array->data, rule->name, size, bad, error);
     if (status) return status;
     const int64_t stride = array->stride_bytes ? array->stride_bytes : size * rule->per_tuple;
-    return check_stride(array->data, rule->name, count, stride, size, bad, error);
+    return check_stride(array->data, rule->name, count, stride, size, is_anywhere, bad, error);
 }
 
-insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, const char *name,
-                                       base_error *error)
+insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_anywhere,
+                                       const char *name, base_error *error)
 {
     if (!data->data) return INSITU_OK;
-    return check_stride(data->data, name, count, stride, session_type_size(data->type), INSITU_ERROR_FIELD, error);
+    return check_stride(data->data, name, count, stride, session_type_size(data->type), is_anywhere, INSITU_ERROR_FIELD,
+                        error);
 }
 
 insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
@@ -87,7 +93,7 @@ insitu_status session_check_pointers(const insitu_array *array, const session_ar
     const insitu_status status = check_place(array->data, rule->name, size, bad, error);
     if (status) return status;
     return check_stride(array->data, rule->name, rule->count, array->stride_bytes ? array->stride_bytes : size, size,
-                        bad, error);
+                        false, bad, error);
 }
 
 bool session_is_same_array(const insitu_array *a, const insitu_array *b)

@@ -10,9 +10,9 @@
 enum {
     SESSION_ALLOW_FLOATS = 1,
     SESSION_ALLOW_INTEGERS = 2,
-    SESSION_ALLOW_BYTES = 4,
     SESSION_IS_OPTIONAL = 8,
-    SESSION_HAS_END = 16 /* one element more than its count, as offsets have */
+    SESSION_HAS_END = 16,   /* one element more than its count, as offsets have */
+    SESSION_ALLOW_ANY = 32, /* all integers, aligned or not; floats need not be aligned either */
 };
 
 /* What an array must be. */
@@ -23,8 +23,8 @@ typedef struct session_array_rule {
     int per_tuple;    /* elements from one to the next if there is no stride */
 } session_array_rule;
 
-/* Checks that the array is given, has an allowed type, is aligned, and has a stride by which its elements can lie in
- * memory. bad: the status where anything but the type is wrong. */
+/* Checks that the array is given, has an allowed type, is aligned unless it need not be, and has a stride by which its
+ * elements can lie in memory. bad: the status where anything but the type is wrong. */
 insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                   base_error *error);
 
@@ -32,9 +32,10 @@ insitu_status session_check_array(const insitu_array *array, const session_array
 insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                      base_error *error);
 
-/* Checks the stride from each component of data's tuples to the next. name: of the components. */
-insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, const char *name,
-                                       base_error *error);
+/* Checks the stride from each component of data's tuples to the next, of any size if is_anywhere. name: of the
+ * components. */
+insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_anywhere,
+                                       const char *name, base_error *error);
 
 /* Tells whether both are read from the same place in the same way. */
 bool session_is_same_array(const insitu_array *a, const insitu_array *b);

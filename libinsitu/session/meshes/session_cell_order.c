@@ -82,7 +82,7 @@ static bool place_of(const grid *g, int64_t cell, int count, int64_t entries, in
     *first = cell * count;
     if (!g->offsets.data) return true;
     *first = grid_array_index(&g->offsets, cell);
-    return *first >= 0 && *first <= entries - count && grid_array_index(&g->offsets, cell + 1) - *first == count;
+    return *first >= 0 && *first <= entries - count && grid_offset_end(&g->offsets, cell) - *first == count;
 }
 
 static void turn_cell(const session_mesh *mesh, int64_t cell, int64_t entries, const grid_array *out)

@@ -14,6 +14,7 @@
 #include "memory.h"
 #include "region.h"
 #include "session_agree.h"
+#include "session_conform.h"
 #include "session_lattice.h"
 #include "session_tally.h"
 #include "session_topology.h"
@@ -223,7 +224,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     const grid *g = &mesh->cells;
     if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
     place->first = grid_array_index(&g->offsets, cell);
-    place->next = grid_array_index(&g->offsets, cell + 1);
+    place->next = grid_offset_end(&g->offsets, cell);
     if (place->first < 0 || place->next > mesh->topology.connectivity_count || place->next < place->first)
         return BAD_OFFSETS;
     place->fault_of_faces = check_faces(mesh, cell, room, &place->faces);
@@ -236,7 +237,7 @@ static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_pl
     const grid *g = &mesh->cells;
     if (!g->offsets.data) return BAD_TYPE;
     place->first = grid_array_index(&g->offsets, cell);
-    place->next = grid_array_index(&g->offsets, cell + 1);
+    place->next = grid_offset_end(&g->offsets, cell);
     if (place->first < 0 || place->next < place->first || place->next > mesh->given.connectivity_count ||
         place->next - place->first < 3)
         return BAD_OFFSETS;
@@ -259,7 +260,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD; /* padding has no vertices, others are in range */
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
-        place->next = grid_array_index(&g->offsets, cell + 1);
+        place->next = grid_offset_end(&g->offsets, cell);
         if (place->first < 0 || place->next > mesh->topology.connectivity_count || place->next < place->first ||
             place->next - place->first != count)
             return BAD_OFFSETS;
@@ -274,8 +275,13 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
 }
 
 /* The type as it stands in the array, which may be of int64. */
-static long long given_type(const grid *g, int64_t cell)
+static long long given_type(const session_mesh *mesh, int64_t cell)
 {
+    const grid *g = &mesh->cells;
+    if (mesh->conformed.types) {
+        const grid_array numbers = session_grid_array(&mesh->original.cell_types);
+        return (long long)grid_array_number(&numbers, cell);
+    }
     if (!g->cell_types || g->cell_types_bytes < 8) return grid_cell_type(g, cell);
     const grid_array types = {
         .data = g->cell_types, .stride = g->cell_types_stride, .is_wide = true, .is_integer = true};
@@ -351,7 +357,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
             error, INSITU_ERROR_MESH,
             "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
             "triangle, 9 quad, 7 polygon)",
-            mesh->name, at, given_type(&mesh->cells, cell));
+            mesh->name, at, given_type(mesh, cell));
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
@@ -411,7 +417,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
 {
     const grid *g = &mesh->cells;
     if (!g->offsets.data || g->cell_count == 0) return INSITU_OK;
-    const int64_t last = grid_array_index(&g->offsets, g->cell_count);
+    const int64_t last = grid_offset_end(&g->offsets, g->cell_count - 1);
     if (last == mesh->topology.connectivity_count) return INSITU_OK;
     const long long base = mesh->given.index_base;
     return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld",
@@ -526,6 +532,7 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
 /* Where cells are wrong, the topology made of them is dropped, as the caller may mend them in place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
+    session_fill_conformed(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
     insitu_status status = session_make_axes(mesh, error);
     if (!status) status = check_cells_of(mesh, threads, error);

@@ -170,7 +170,8 @@ static insitu_status check_axes(const insitu_lattice *l, base_error *error)
     static const char *const names[3] = {"coordinates along i", "coordinates along j", "coordinates along k"};
     for (int axis = 0; axis < 3; axis++) {
         const int optional = l->cells[axis] ? 0 : SESSION_IS_OPTIONAL;
-        const session_array_rule rule = {names[axis], vertices_along(l, axis), SESSION_ALLOW_FLOATS | optional, 1};
+        const session_array_rule rule = {names[axis], vertices_along(l, axis),
+                                         SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY | optional, 1};
         const insitu_status status = session_check_array(&l->axes[axis], &rule, INSITU_ERROR_MESH, error);
         if (status) return status;
     }

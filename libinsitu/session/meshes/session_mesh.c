@@ -6,6 +6,30 @@
 #include "memory.h"
 #include "session_agree.h"
 
+bool session_is_aligned(const insitu_array *array)
+{
+    const int64_t size = session_type_size(array->type);
+    return array->stride_bytes % size == 0 && (uintptr_t)array->data % (uintptr_t)size == 0;
+}
+
+static grid_odd odd_of(const insitu_array *array)
+{
+    const bool is_aligned = session_is_aligned(array);
+    switch (array->type) {
+    case INSITU_FLOAT32: return is_aligned ? GRID_NOT_ODD : GRID_ODD_FLOAT32;
+    case INSITU_FLOAT64: return is_aligned ? GRID_NOT_ODD : GRID_ODD_FLOAT64;
+    case INSITU_INT32: return is_aligned ? GRID_NOT_ODD : GRID_ODD_INT32;
+    case INSITU_INT64: return is_aligned ? GRID_NOT_ODD : GRID_ODD_INT64;
+    case INSITU_UINT8: return GRID_ODD_UINT8;
+    case INSITU_INT8: return GRID_ODD_INT8;
+    case INSITU_INT16: return GRID_ODD_INT16;
+    case INSITU_UINT16: return GRID_ODD_UINT16;
+    case INSITU_UINT32: return GRID_ODD_UINT32;
+    case INSITU_UINT64: return GRID_ODD_UINT64;
+    }
+    return GRID_NOT_ODD;
+}
+
 grid_array session_grid_array(const insitu_array *array)
 {
     grid_array out = {0};
@@ -13,7 +37,8 @@ grid_array session_grid_array(const insitu_array *array)
     out.data = array->data;
     out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
     out.is_wide = session_type_size(array->type) == 8;
-    out.is_integer = array->type == INSITU_INT32 || array->type == INSITU_INT64;
+    out.odd = (unsigned char)odd_of(array);
+    out.is_integer = out.odd || array->type == INSITU_INT32 || array->type == INSITU_INT64;
     return out;
 }
 
@@ -29,6 +54,15 @@ grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *arra
 {
     grid_array out = session_grid_array(array);
     out.base = mesh->index_base;
+    return out;
+}
+
+grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries)
+{
+    grid_array out = session_index_array(mesh, array);
+    if (!mesh->open_offsets) return out;
+    out.open_count = count;
+    out.open_end = entries;
     return out;
 }
 
@@ -127,6 +161,23 @@ void session_drop_axes(session_lattice *lattice)
     lattice->bytes = 0;
 }
 
+void session_drop_conformed(session_conformed *conformed)
+{
+    for (int i = 0; i < SESSION_CONFORMED; i++) base_free(conformed->copies[i]);
+    base_free(conformed->types);
+    *conformed = (session_conformed){0};
+}
+
+void session_drop_field_tables(session_field *field)
+{
+    base_free(field->patches);
+    base_free(field->components);
+    base_free(field->apart);
+    field->patches = NULL;
+    field->components = NULL;
+    field->apart = NULL;
+}
+
 void session_drop_copy(session_field *field)
 {
     base_free(field->copy);
@@ -154,7 +205,7 @@ void session_drop_fields(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++) {
         base_free((void *)(uintptr_t)mesh->fields[i].given.name);
-        base_free(mesh->fields[i].patches);
+        session_drop_field_tables(&mesh->fields[i]);
         session_drop_copy(&mesh->fields[i]);
     }
     base_free(mesh->fields);
@@ -246,6 +297,7 @@ static void drop_cells(session_mesh *mesh)
     session_drop_topology(&mesh->topology);
     session_drop_torn(&mesh->torn);
     session_drop_axes(&mesh->lattice);
+    session_drop_conformed(&mesh->conformed);
     base_free(mesh->flat);
     mesh->flat = NULL;
 }
@@ -263,12 +315,12 @@ void session_refuse_mesh(session_mesh *mesh)
     for (int i = 0; i < mesh->field_count; i++) {
         session_field *field = &mesh->fields[i];
         const char *name = field->given.name;
-        base_free(field->patches);
+        session_drop_field_tables(field);
         session_drop_copy(field);
         *field = (session_field){.given = {.name = name}};
     }
     mesh->is_given = false;
-    mesh->given = (insitu_mesh){0};
+    mesh->given = mesh->original = (insitu_mesh){0};
     mesh->cells = (grid){0};
     mesh->drawn_count = 0;
 }

@@ -9,7 +9,8 @@
 
 typedef struct session_field {
     insitu_field given; /* name is a copy of ours, the values are borrowed */
-    grid_array values;
+    grid_array values;  /* or of the first component, if each is an array of its own: */
+    grid_array *apart;
     int64_t component_stride;
     base_error problem;          /* what was wrong with the last insitu_set_field(), */
     bool is_problem_of_contents; /* or with its values, found by this step's check */
@@ -18,12 +19,13 @@ typedef struct session_field {
     bool is_wanted;     /* by statistics of this step; fields of images have scalars */
     bool is_filled;     /* given.fill has made the values in this step, unless it failed: */
     base_error fill_problem;
-    bool is_derived;       /* the session makes it of other fields, in copy (plan/session_derived.h) */
-    bool is_source;        /* a derived field that this step needs is made of it */
-    uint64_t made_of;      /* hash of the inputs of a derived field's values; 0: no values yet */
-    int64_t version;       /* incremented at each known change of the values */
-    insitu_patch *patches; /* given.patches, a table of ours */
-    char *copy;            /* NULL until made; packed tuples, components interleaved */
+    bool is_derived;          /* the session makes it of other fields, in copy (plan/session_derived.h) */
+    bool is_source;           /* a derived field that this step needs is made of it */
+    uint64_t made_of;         /* hash of the inputs of a derived field's values; 0: no values yet */
+    int64_t version;          /* incremented at each known change of the values */
+    insitu_patch *patches;    /* given.patches, a table of ours */
+    insitu_array *components; /* given.components, a table of ours */
+    char *copy;               /* NULL until made; packed tuples, components interleaved */
     int64_t copy_bytes;
 } session_field;
 
@@ -155,10 +157,22 @@ typedef struct session_lattice {
     int64_t bytes;     /* size of places in bytes */
 } session_lattice;
 
+enum { SESSION_CONFORMED = 9 };
+
+/* Arrays that are read from copies in other types (session_conform.h), declared ones. */
+typedef struct session_conformed {
+    char *copies[SESSION_CONFORMED]; /* NULL: read where they are */
+    unsigned char *types;            /* of the code's own numbers for them; NULL: it has none */
+    int type_count;
+    int64_t bytes;
+} session_conformed;
+
 /* One rank's part of a mesh. */
 typedef struct session_mesh {
     char *name;
-    insitu_mesh given;
+    insitu_mesh original; /* the caller's description, */
+    insitu_mesh given;    /* with copies for the arrays that cannot be read in place */
+    session_conformed conformed;
     session_topology topology;
     session_torn torn;
     session_lattice lattice;
@@ -219,13 +233,21 @@ static inline int64_t session_type_size(insitu_type type)
 {
     switch (type) {
     case INSITU_FLOAT32:
-    case INSITU_INT32: return 4;
+    case INSITU_INT32:
+    case INSITU_UINT32: return 4;
     case INSITU_FLOAT64:
-    case INSITU_INT64: return 8;
+    case INSITU_INT64:
+    case INSITU_UINT64: return 8;
+    case INSITU_INT16:
+    case INSITU_UINT16: return 2;
+    case INSITU_INT8:
     case INSITU_UINT8: return 1;
     }
     return 0;
 }
+
+/* Tells whether the place and the stride of an array are multiples of its elements' size. */
+bool session_is_aligned(const insitu_array *array);
 
 /* An array as the rooms below read it; its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
@@ -235,6 +257,9 @@ grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
 /* As above, for an array whose indices count from the mesh's index_base. */
 grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
+
+/* As above, for offsets of so many cells or faces into so many entries, whose last one may be missing. */
+grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
 
 /* Allocates count + 1 indices, all 0, of 4 bytes where largest fits into them, else of 8. Returns false where memory
  * runs out; the error then names the mesh and what the indices are of. */
@@ -274,8 +299,11 @@ void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_torn(session_torn *torn);
 void session_drop_axes(session_lattice *lattice);
+void session_drop_conformed(session_conformed *conformed);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
+/* Frees the copies of the caller's tables: patches and components. */
+void session_drop_field_tables(session_field *field);
 /* Removes the derived fields, and with them all scalars and thresholds, which go by the numbers of fields. */
 void session_drop_derived(session_mesh *mesh);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */

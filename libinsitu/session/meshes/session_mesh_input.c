@@ -8,6 +8,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_conform.h"
 #include "session_lattice.h"
 #include "session_topology.h"
 
@@ -93,23 +94,24 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
     const int64_t apart = mesh->boundary_face_count;
     const bool has_lists = mesh->face_lists.data != NULL, has_axes = session_has_axes(mesh);
-    const int floats = SESSION_ALLOW_FLOATS, integers = SESSION_ALLOW_INTEGERS, bytes = SESSION_ALLOW_BYTES;
-    const int optional = SESSION_IS_OPTIONAL, end = SESSION_HAS_END;
+    const int numbers = SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY, integers = SESSION_ALLOW_INTEGERS;
+    const int any = SESSION_ALLOW_ANY, optional = SESSION_IS_OPTIONAL, closed = SESSION_HAS_END;
+    const int end = mesh->open_offsets ? 0 : closed;
     const session_array_rule rules[] = {
-        {"x coordinates", vertices, floats | (has_axes ? optional : 0), 1},
-        {"y coordinates", vertices, floats | (has_axes ? optional : 0), 1},
-        {"z coordinates", vertices, floats | (has_axes || may_be_plane(mesh) ? optional : 0), 1},
+        {"x coordinates", vertices, numbers | (has_axes ? optional : 0), 1},
+        {"y coordinates", vertices, numbers | (has_axes ? optional : 0), 1},
+        {"z coordinates", vertices, numbers | (has_axes || may_be_plane(mesh) ? optional : 0), 1},
         {"vertex ids", vertices, integers | optional, 1},
-        {"cell types", cells, integers | bytes | optional, 1},
-        {"connectivity indices", mesh->connectivity_count, integers, 1},
-        {"offsets", cells, integers | optional | end, 1},
-        {"ghost flags", cells, integers | bytes | optional, 1},
-        {"face offsets", faces, integers | end | (has_lists ? optional : 0), 1},
+        {"cell types", cells, any | optional, 1},
+        {"connectivity indices", mesh->connectivity_count, any, 1},
+        {"offsets", cells, any | optional | end, 1},
+        {"ghost flags", cells, any | optional, 1},
+        {"face offsets", faces, any | end | (has_lists ? optional : 0), 1},
         {"face sizes", faces, integers | (has_lists ? 0 : optional), 1},
         {"owners of faces", faces, integers | optional, 1},
         {"neighbours of faces", mesh->neighbour_count, integers, 1},
-        {"face vertex indices", mesh->face_connectivity_count, integers, 1},
-        {"offsets of boundary faces", apart, integers | end, 1},
+        {"face vertex indices", mesh->face_connectivity_count, any, 1},
+        {"offsets of boundary faces", apart, integers | closed, 1},
         {"owners of boundary faces", apart, integers, 1},
         {"vertex indices of boundary faces", mesh->boundary_face_connectivity_count, integers, 1},
     };
@@ -176,6 +178,11 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", mesh->changed);
     if (mesh->index_base != 0 && mesh->index_base != 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "index_base is %d, expected 0 or 1", mesh->index_base);
+    if (mesh->open_offsets != 0 && mesh->open_offsets != 1)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "open_offsets is %d, expected 0 or 1", mesh->open_offsets);
+    if (mesh->cell_type_map_count < 0 || (mesh->cell_type_map_count && !mesh->cell_type_map))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "cell_type_map_count is %d%s", mesh->cell_type_map_count,
+                         mesh->cell_type_map ? "" : ", and cell_type_map is not given");
     if (mesh->keep_polyhedra != 0 && mesh->keep_polyhedra != 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "keep_polyhedra is %d, expected 0 or 1", mesh->keep_polyhedra);
     if (mesh->vertex_order != INSITU_ORDER_VTK && mesh->vertex_order != INSITU_ORDER_LEXICOGRAPHIC &&
@@ -257,8 +264,9 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            !a->offsets.data != !b->offsets.data || !a->ghosts.data != !b->ghosts.data ||
            a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count ||
            a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra ||
-           a->vertex_order != b->vertex_order || a->connectivity_row != b->connectivity_row ||
-           !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data ||
+           a->open_offsets != b->open_offsets || a->vertex_order != b->vertex_order ||
+           a->connectivity_row != b->connectivity_row || !a->owner.data != !b->owner.data ||
+           !a->face_lists.data != !b->face_lists.data ||
            session_lattice_changes(a->lattice, b->lattice) == INSITU_CHANGED_ALL ||
            a->boundary_face_count != b->boundary_face_count || a->halo_cell_count != b->halo_cell_count ||
            a->boundary_face_connectivity_count != b->boundary_face_connectivity_count;
@@ -266,9 +274,11 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 
 /* The changes that two descriptions with as many cells and vertices show: arrays at other addresses, or read in another
  * way, have not been checked yet. */
-static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
+static unsigned seen_changes(const session_mesh *mesh, const insitu_mesh *b)
 {
+    const insitu_mesh *a = &mesh->original;
     bool has_same_cells =
+        session_has_types(mesh, b->cell_type_map_count, b->cell_types.data ? b->cell_type_map : NULL) &&
         session_is_same_array(&a->cell_types, &b->cell_types) &&
         session_is_same_array(&a->connectivity, &b->connectivity) && session_is_same_array(&a->offsets, &b->offsets) &&
         session_is_same_array(&a->ghosts, &b->ghosts) && session_is_same_array(&a->face_offsets, &b->face_offsets) &&
@@ -288,15 +298,19 @@ static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given)
+/* On an error, which is of memory, the mesh is to be refused. */
+static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
 {
     unsigned changed = given->changed;
-    if (!mesh->is_given || has_other_shape(&mesh->given, given)) changed = INSITU_CHANGED_ALL;
-    if (changed & INSITU_CHANGED_TOPOLOGY) {
+    if (!mesh->is_given || has_other_shape(&mesh->original, given)) changed = INSITU_CHANGED_ALL;
+    const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
+    const bool had_ids = mesh->given.vertex_ids.data;
+    changed |= seen_changes(mesh, given);
+    if (session_conform_mesh(mesh, given, changed, error)) return;
+    if (drops_fields) {
         session_drop_fields(mesh);
         meshes->are_names_changed = true;
     }
-    changed |= seen_changes(&mesh->given, given);
     if (changed & INSITU_CHANGED_TOPOLOGY) {
         session_drop_scalars(mesh);
         session_drop_tree(mesh);
@@ -305,7 +319,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
         mesh->rent = 0;
         mesh->is_topology_stale = true;
     }
-    if (!mesh->given.vertex_ids.data != !given->vertex_ids.data) meshes->are_names_changed = true;
+    if (had_ids != (given->vertex_ids.data != NULL)) meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
         mesh->places_stamp = ++meshes->stamp;
         if (changed & INSITU_CHANGED_TOPOLOGY) mesh->cells_stamp = meshes->stamp;
@@ -316,8 +330,8 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
         meshes->are_cells_changed = true;
         for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
     }
-    mesh->given = *given;
     session_take_lattice(mesh);
+    mesh->original.lattice = mesh->given.lattice;
     session_read_topology(mesh);
     mesh->is_given = true;
     mesh->problem = (base_error){0};
@@ -339,10 +353,8 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, const in
     if (!mesh) mesh = session_add_mesh(meshes, name, error);
     if (!mesh) return INSITU_ERROR_MEMORY;
     base_error what = {0};
-    if (check_mesh(given, &what) == INSITU_OK) {
-        take_mesh(meshes, mesh, given);
-        return INSITU_OK;
-    }
+    if (check_mesh(given, &what) == INSITU_OK) take_mesh(meshes, mesh, given, &what);
+    if (!what.status) return INSITU_OK;
     session_refuse_mesh(mesh);
     meshes->are_cells_changed = true;
     meshes->are_names_changed = true;

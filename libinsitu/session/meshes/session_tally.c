@@ -213,7 +213,7 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
 {
     const grid_array *offsets = &mesh->cells.offsets;
     if (!offsets->data) return true;
-    const int64_t first = grid_array_index(offsets, cell), next = grid_array_index(offsets, cell + 1);
+    const int64_t first = grid_array_index(offsets, cell), next = grid_offset_end(offsets, cell);
     return first >= 0 && next >= first && next <= mesh->topology.connectivity_count && next - first == count;
 }
 

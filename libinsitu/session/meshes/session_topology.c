@@ -36,9 +36,9 @@ static grid as_grid(const insitu_mesh *mesh)
     grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
     for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_coordinates(mesh, axis);
     g.connectivity = session_index_array(mesh, &mesh->connectivity);
-    g.offsets = session_index_array(mesh, &mesh->offsets);
+    g.offsets = session_offset_array(mesh, &mesh->offsets, mesh->cell_count, mesh->connectivity_count);
     g.face_count = mesh->face_count;
-    g.face_offsets = session_index_array(mesh, &mesh->face_offsets);
+    g.face_offsets = session_offset_array(mesh, &mesh->face_offsets, mesh->face_count, mesh->face_connectivity_count);
     g.face_connectivity = session_index_array(mesh, &mesh->face_connectivity);
     if (mesh->cell_types.data) {
         const grid_array types = session_grid_array(&mesh->cell_types);
@@ -105,11 +105,13 @@ session_face_row session_given_face(const insitu_mesh *mesh, int64_t face)
         const int64_t size = grid_array_index(&sizes, face);
         return (session_face_row){session_index_array(mesh, &list), 0, size, size};
     }
-    const grid_array offsets = session_index_array(mesh, is_apart ? &mesh->boundary_face_offsets : &mesh->face_offsets);
+    const grid_array offsets =
+        is_apart ? session_index_array(mesh, &mesh->boundary_face_offsets)
+                 : session_offset_array(mesh, &mesh->face_offsets, mesh->face_count, mesh->face_connectivity_count);
     const insitu_array *list = is_apart ? &mesh->boundary_face_connectivity : &mesh->face_connectivity;
     const int64_t at = is_apart ? face - mesh->face_count : face, first = grid_array_index(&offsets, at);
     return (session_face_row){session_index_array(mesh, list), first,
-                              (int64_t)((uint64_t)grid_array_index(&offsets, at + 1) - (uint64_t)first),
+                              (int64_t)((uint64_t)grid_offset_end(&offsets, at) - (uint64_t)first),
                               is_apart ? mesh->boundary_face_connectivity_count : mesh->face_connectivity_count};
 }
 
@@ -554,7 +556,7 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
     const grid *g = &mesh->cells;
     const int64_t count = g->cell_count;
     recognition r = {0};
-    if (grid_array_index(&g->offsets, count) != t->connectivity_count) return INSITU_OK;
+    if (grid_offset_end(&g->offsets, count - 1) != t->connectivity_count) return INSITU_OK;
     r.types = base_alloc((size_t)count);
     if (!r.types)
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of cells' types",

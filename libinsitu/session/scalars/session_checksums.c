@@ -41,7 +41,7 @@ static uint64_t sum_strided(const char *data, int64_t stride, size_t size, int64
 
 static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
 {
-    const int64_t size = a->is_wide ? 8 : 4, blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
+    const int64_t size = grid_element_bytes(a), blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
     uint64_t sum = 0;
 #pragma omp parallel num_threads(threads)
     {
@@ -66,8 +66,7 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     const int first = field->component < 0 ? 0 : field->component;
     const int end = field->component < 0 ? field->component_count : first + 1;
     for (int component = first; component < end && field->values.data; component++) {
-        grid_array a = field->values;
-        a.data += component * field->component_stride;
+        const grid_array a = grid_field_component(field, component);
         sum = mix(sum, sum_array(&a, count, threads));
     }
     return sum;

@@ -44,6 +44,20 @@ static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
     return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
 }
 
+/* Checks components that are arrays of their own. */
+static insitu_status check_apart(const insitu_field *field, int64_t count, base_error *error)
+{
+    if (field->values.data)
+        return base_fail(error, INSITU_ERROR_FIELD, "values and components are given: values are given by one of them");
+    for (int c = 0; c < field->component_count; c++) {
+        const session_array_rule rule = {"values", count, SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY, 1};
+        base_error what = {0};
+        if (session_check_array(&field->components[c], &rule, INSITU_ERROR_FIELD, &what))
+            return base_fail(error, what.status, "component %d: %s", c, what.message);
+    }
+    return INSITU_OK;
+}
+
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const int64_t places = session_field_places(&mesh->given, field);
@@ -52,12 +66,13 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
                          (long long)places, place_words(field->centring), has_rows ? ", rows' rests counted" : "");
     const session_array_rule values = {"values", has_index && !places ? 0 : field->count,
-                                       SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS, field->component_count};
+                                       SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY, field->component_count};
     const session_array_rule index = {"entries of index", places, SESSION_ALLOW_INTEGERS | SESSION_IS_OPTIONAL, 1};
-    insitu_status status = session_check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
-    if (!status) status = session_check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
+    insitu_status status = session_check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
+    if (!status && field->components) return check_apart(field, values.count, error);
+    if (!status) status = session_check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
     if (status) return status;
-    return session_check_components(&field->values, field->component_count, field->component_stride_bytes,
+    return session_check_components(&field->values, field->component_count, field->component_stride_bytes, true,
                                     "components of values", error);
 }
 
@@ -105,8 +120,8 @@ static insitu_status check_patch_arrays(const insitu_patch *patch, int component
     if (!status) status = session_check_array(&patch->connectivity, &vertices, INSITU_ERROR_FIELD, error);
     if (!status) status = session_check_array(&patch->offsets, &offsets, INSITU_ERROR_FIELD, error);
     if (status) return status;
-    return session_check_components(&patch->values, components, patch->component_stride_bytes, "components of values",
-                                    error);
+    return session_check_components(&patch->values, components, patch->component_stride_bytes, false,
+                                    "components of values", error);
 }
 
 /* Checks how the patch names its faces, and its values. */
@@ -160,7 +175,7 @@ static insitu_status check_fill(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
         return base_fail(error, INSITU_ERROR_FIELD, "patches and fill are given: patches are given by fill");
-    if (!field->values.data && !field->index.data) return INSITU_OK;
+    if (!field->values.data && !field->components && !field->index.data) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_FIELD, "values and fill are given: values are given by one of them");
 }
 
@@ -206,36 +221,72 @@ static bool are_same_patches(const insitu_field *a, const insitu_field *b)
     return is_same;
 }
 
+static bool are_same_components(const insitu_field *a, const insitu_field *b)
+{
+    bool is_same = !a->components == !b->components;
+    for (int c = 0; a->components && is_same && c < a->component_count; c++)
+        is_same = session_is_same_array(&a->components[c], &b->components[c]);
+    return is_same;
+}
+
 /* Tells whether the values are read from the same place as before. */
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
     return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
            session_is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row &&
-           are_same_patches(a, b);
+           a->component_count == b->component_count && are_same_components(a, b) && are_same_patches(a, b);
 }
 
-/* The table of patches becomes the field's, which may hold the given one. False where memory runs out. */
-static bool copy_patches(session_field *field, const insitu_field *given, base_error *error)
+/* The tables of patches and components become the field's, which may hold the given ones. False where memory runs out.
+ */
+static bool copy_tables(session_field *field, const insitu_field *given, base_error *error)
 {
+    const size_t components = given->components ? (size_t)given->component_count : 0;
     const size_t bytes = (size_t)given->patch_count * sizeof *given->patches;
-    insitu_patch *patches = bytes ? base_alloc(bytes) : NULL;
-    if (bytes && !patches) {
-        session_no_memory(error, (int64_t)bytes, "a field's table of patches");
+    session_field copy = {0};
+    copy.patches = bytes ? base_alloc(bytes) : NULL;
+    copy.components = components ? base_alloc(components * sizeof *copy.components) : NULL;
+    copy.apart = components ? base_alloc(components * sizeof *copy.apart) : NULL;
+    if ((bytes && !copy.patches) || (components && (!copy.components || !copy.apart))) {
+        session_drop_field_tables(&copy);
+        session_no_memory(error, (int64_t)(bytes + components * sizeof *copy.apart),
+                          "a field's table of patches or components");
         return false;
     }
-    if (bytes) memcpy(patches, given->patches, bytes);
-    base_free(field->patches);
-    field->patches = patches;
+    if (bytes) memcpy(copy.patches, given->patches, bytes);
+    for (size_t c = 0; c < components; c++) {
+        copy.components[c] = given->components[c];
+        copy.apart[c] = session_grid_array(&given->components[c]);
+    }
+    session_drop_field_tables(field);
+    field->patches = copy.patches;
+    field->components = copy.components;
+    field->apart = copy.apart;
     return true;
 }
 
-/* Takes the arrays, and notes whether their copy must be made again. Patches have been copied. */
+/* The values as they are read, from tuple to tuple of their first component. */
+static void read_array(session_field *field, const insitu_field *given)
+{
+    const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
+    insitu_array values = given->values;
+    field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
+    if (!values.stride_bytes) values.stride_bytes = size * given->component_count;
+    field->values = field->apart ? field->apart[0] : session_grid_array(&values);
+    if (!values.data || field->apart || field->component_stride % size == 0) return;
+    values.stride_bytes = field->component_stride; /* the other components are not aligned */
+    const grid_array other = session_grid_array(&values);
+    field->values.odd = other.odd;
+    field->values.is_integer = other.is_integer;
+}
+
+/* Takes the arrays, and notes whether their copy must be made again. Tables have been copied. */
 static void read_values(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                         bool is_stale)
 {
-    const bool has_index = is_by_index(mesh, given);
+    const bool has_index = is_by_index(mesh, given), was_apart = field->given.components != NULL;
     if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
-        field->given.values.type != given->values.type)
+        field->given.values.type != given->values.type || field->values.odd || field->apart || was_apart)
         session_drop_copy(field);
     field->has_index = has_index;
     field->is_copy_stale = field->is_copy_stale || is_stale;
@@ -243,13 +294,11 @@ static void read_values(const session_mesh *mesh, session_field *field, const in
     field->given = *given;
     field->given.name = name;
     field->given.patches = field->patches;
-    field->values = session_grid_array(&given->values);
-    const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
-    if (given->values.stride_bytes == 0) field->values.stride = size * given->component_count;
-    field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
+    field->given.components = field->components;
+    read_array(field, given);
 }
 
-/* Patches have been copied; is_same: all is read from where it was. */
+/* Tables have been copied, unless all is read from where it was (is_same). */
 static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
@@ -285,7 +334,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     }
     if (check_field(mesh, given, &what) == INSITU_OK) {
         const bool is_same = is_same_place(&field->given, given);
-        if (copy_patches(field, given, &what)) {
+        if (is_same || copy_tables(field, given, &what)) {
             take_field(meshes, mesh, index, given, is_same);
             return INSITU_OK;
         }
@@ -344,11 +393,12 @@ insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_fi
     session_field *field = &mesh->fields[index];
     const insitu_field promised = field->given;
     base_error what = {0};
-    if (check_filled(mesh, &promised, filled, &what) || !copy_patches(field, filled, &what))
+    if (check_filled(mesh, &promised, filled, &what) || !copy_tables(field, filled, &what))
         return session_place_error(error, mesh->name, promised.name, &what);
     read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
-    if (filled->changed & INSITU_CHANGED_VALUES) session_spoil_scalars(mesh, index);
+    /* Scalars may hold the last table of components. */
+    if (filled->changed & INSITU_CHANGED_VALUES || filled->components) session_spoil_scalars(mesh, index);
     return INSITU_OK;
 }

@@ -75,6 +75,7 @@ void session_forget_filled(const session_meshes *meshes)
             field->given.values.data = field->given.index.data = NULL;
             field->values.data = NULL;
             field->given.patch_count = 0;
-            field->given.patches = NULL; /* the last step's table is the field's own */
+            field->given.patches = NULL; /* the last step's tables are the field's own */
+            field->given.components = NULL;
         }
 }

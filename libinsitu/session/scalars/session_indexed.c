@@ -23,25 +23,27 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 
 typedef struct indexed_values {
     const session_torn *torn; /* where the places are its corners, and values are at vertices */
-    grid_array index, values; /* no index: places have the tuples of their numbers */
-    int64_t row, used;        /* places in a row, and how many of them are read */
-    int64_t count, places;    /* tuples, and those that have them */
-    int64_t component_stride;
-    int component_count;
+    grid_array index;         /* no index: places have the tuples of their numbers */
+    grid_field values;
+    int64_t row, used;     /* places in a row, and how many of them are read */
+    int64_t count, places; /* tuples, and those that have them */
+    bool is_plain;         /* values are copied as they are, else as doubles */
 } indexed_values;
 
 static indexed_values values_of(const session_mesh *mesh, const session_field *field)
 {
     const insitu_field *given = &field->given;
     indexed_values out = {.index = session_grid_array(&given->index),
-                          .values = field->values,
+                          .values = {.values = field->values,
+                                     .component_stride = field->component_stride,
+                                     .apart = field->apart,
+                                     .component_count = given->component_count},
+                          .is_plain = session_is_plain_copy(field),
                           .row = 1,
                           .used = 1,
                           .count = given->count,
                           .places =
-                              given->centring == INSITU_CELL ? mesh->given.cell_count : session_vertex_count(mesh),
-                          .component_stride = field->component_stride,
-                          .component_count = given->component_count};
+                              given->centring == INSITU_CELL ? mesh->given.cell_count : session_vertex_count(mesh)};
     out.index.base = mesh->given.index_base;
     if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.torn = &mesh->torn;
     if (given->corner_row) {
@@ -64,14 +66,19 @@ static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
     const int64_t entry = entry_of(v, place);
     const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
     if (at < 0 || at >= v->count) return false;
-    const size_t size = v->values.is_wide ? 8 : 4;
-    const char *from = v->values.data + at * v->values.stride;
-    out += place * v->component_count * (int64_t)size;
-    for (int i = 0; i < v->component_count; i++, out += size, from += v->component_stride)
-        if (size == 8)
-            memcpy(out, from, 8);
+    const int count = v->values.component_count;
+    const size_t size = !v->is_plain || v->values.values.is_wide ? 8 : 4;
+    out += place * count * (int64_t)size;
+    for (int i = 0; i < count; i++, out += size) {
+        const grid_array from = grid_field_component(&v->values, i);
+        const double number = v->is_plain ? 0 : grid_array_number(&from, at);
+        if (!v->is_plain)
+            memcpy(out, &number, 8);
+        else if (size == 8)
+            memcpy(out, from.data + at * from.stride, 8);
         else
-            memcpy(out, from, 4);
+            memcpy(out, from.data + at * from.stride, 4);
+    }
     return true;
 }
 
@@ -92,7 +99,7 @@ static insitu_status describe_fault(const session_mesh *mesh, const session_fiel
 static insitu_status copy_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
 {
     const indexed_values v = values_of(mesh, field);
-    const int64_t bytes = v.places * v.component_count * (v.values.is_wide ? 8 : 4);
+    const int64_t bytes = v.places * v.values.component_count * (!v.is_plain || v.values.values.is_wide ? 8 : 4);
     int64_t bad = v.places;
     if (!field->copy) field->copy = base_alloc((size_t)(bytes ? bytes : 1));
     if (!field->copy) return session_no_memory(error, bytes, "a field's values by their index");

@@ -64,6 +64,11 @@ bool session_is_copied(const session_mesh *mesh, const session_field *field)
     return field->given.corner_row && field->given.corner_row != grid_type_vertices((int)mesh->given.cell_type);
 }
 
+bool session_is_plain_copy(const session_field *field)
+{
+    return !field->apart && !field->values.odd;
+}
+
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
 {
     const int index = find_field(mesh, field);
@@ -81,8 +86,17 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
                       .component_count = field->given.component_count,
                       .component = component,
                       .is_cell_centred = field->given.centring == INSITU_CELL};
-    if (!session_is_copied(mesh, field)) return out;
-    out.component_stride = field->values.is_wide ? 8 : 4;
+    if (!session_is_copied(mesh, field)) {
+        if (!field->apart) return out;
+        out.component_stride = 0; /* the component has been chosen */
+        if (component >= 0)
+            out.values = field->apart[component];
+        else
+            out.apart = field->apart;
+        return out;
+    }
+    if (!session_is_plain_copy(field)) out.values = (grid_array){.is_wide = true};
+    out.component_stride = out.values.is_wide ? 8 : 4;
     out.values.data = field->copy;
     out.values.stride = out.component_stride * out.component_count;
     return out;

@@ -28,6 +28,10 @@ grid_field session_given_field(const session_mesh *mesh, int field, int componen
 /* Tells whether the values are read from the session's copy, in the order of the vertices, cells or corners. */
 bool session_is_copied(const session_mesh *mesh, const session_field *field);
 
+/* Tells whether a copy has the values in their own type; else they are doubles: components that are arrays of their own
+ * may differ in it, and others are integers or not aligned. */
+bool session_is_plain_copy(const session_field *field);
+
 /* The field's values as the caller gave them, with no scalar for it; false where the mesh does not have it. */
 bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out);
 

@@ -1,0 +1,506 @@
+/* Arrays of any type, at any address and of any stride draw the picture of the same numbers as float64 and int64: the
+ * arrays of cells and faces, their flags and coordinates, and values whose components are interleaved or apart. Those
+ * that are read in place add nothing to what is copied. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 2, MOST_ROOMS = 64 };
+
+/* How an array is laid out. */
+typedef struct layout {
+    insitu_type type;
+    int shift; /* of its first element from an aligned place, bytes */
+    int gap;   /* bytes between elements */
+    bool is_in_place;
+} layout;
+
+static const layout index_layouts[] = {
+    {INSITU_INT32, 0, 0, true},   {INSITU_INT32, 0, 4, true},   {INSITU_INT64, 0, 8, true},
+    {INSITU_UINT32, 0, 0, true},  {INSITU_UINT64, 0, 0, true},  {INSITU_UINT64, 0, 16, true},
+    {INSITU_INT8, 0, 0, false},   {INSITU_UINT8, 0, 0, false},  {INSITU_UINT8, 1, 2, false},
+    {INSITU_INT16, 0, 0, false},  {INSITU_UINT16, 0, 0, false}, {INSITU_UINT16, 1, 0, false},
+    {INSITU_INT32, 1, 0, false},  {INSITU_INT32, 0, 3, false},  {INSITU_INT64, 4, 0, false},
+    {INSITU_UINT32, 2, 0, false}, {INSITU_UINT64, 3, 1, false},
+};
+static const layout number_layouts[] = {
+    {INSITU_FLOAT64, 0, 8, true}, {INSITU_FLOAT64, 4, 0, false}, {INSITU_FLOAT64, 0, 1, false},
+    {INSITU_INT8, 0, 0, false},   {INSITU_INT16, 1, 0, false},   {INSITU_INT16, 0, 0, false},
+    {INSITU_INT32, 0, 0, false},  {INSITU_INT32, 3, 5, false},   {INSITU_INT64, 0, 0, false},
+    {INSITU_FLOAT32, 0, 0, true}, {INSITU_FLOAT32, 2, 0, false},
+};
+enum {
+    INDEX_LAYOUTS = sizeof index_layouts / sizeof index_layouts[0],
+    NUMBER_LAYOUTS = sizeof number_layouts / sizeof number_layouts[0]
+};
+
+static const char scene[] = "images:\n"
+                            "  - name: a\n"
+                            "    size: [40, 32]\n"
+                            "    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n"
+                            "    layers:\n"
+                            "      - isosurface: {field: f, values: [3]}\n"
+                            "      - surface: {colour_by: {field: f}, opacity: 0.3}\n"
+                            "      - volume: {field: f, range: [-50, 50], opacity: [[0, 0.4], [1, 0]]}\n"
+                            "    outputs: [{path: a.png}]\n";
+
+static void *rooms[MOST_ROOMS];
+static int room_count;
+
+static void free_rooms(void)
+{
+    while (room_count) free(rooms[--room_count]);
+}
+
+static double number_at(const insitu_array *a, int64_t i)
+{
+    if (a->type == INSITU_UINT8) return ((const unsigned char *)a->data)[i];
+    if (a->type == INSITU_INT64) return (double)((const int64_t *)a->data)[i];
+    return ((const double *)a->data)[i];
+}
+
+#define PUT(type)                                                                                                      \
+    {                                                                                                                  \
+        const type number = (type)value;                                                                               \
+        memcpy(out, &number, sizeof number);                                                                           \
+        return (double)number == value;                                                                                \
+    }
+
+/* Stores a number; false where the type cannot hold it. */
+static bool put(char *out, insitu_type type, double value)
+{
+    switch (type) {
+    case INSITU_FLOAT32: PUT(float)
+    case INSITU_FLOAT64: PUT(double)
+    case INSITU_INT8:
+        if (fabs(value) > 127) return false;
+        PUT(int8_t)
+    case INSITU_UINT8:
+        if (value < 0 || value > 255) return false;
+        PUT(uint8_t)
+    case INSITU_INT16: PUT(int16_t)
+    case INSITU_UINT16:
+        if (value < 0) return false;
+        PUT(uint16_t)
+    case INSITU_INT32: PUT(int32_t)
+    case INSITU_UINT32:
+        if (value < 0) return false;
+        PUT(uint32_t)
+    case INSITU_INT64: PUT(int64_t)
+    case INSITU_UINT64:
+        if (value < 0) return false;
+        PUT(uint64_t)
+    }
+    return false;
+}
+
+static int64_t size_of(insitu_type type)
+{
+    static const int sizes[] = {0, 4, 8, 4, 8, 1, 1, 2, 2, 4, 8};
+    return sizes[type];
+}
+
+/* The same numbers, float64, int64 or uint8 until now, in another layout; false where it cannot hold them. */
+static bool lay_out(insitu_array *a, int64_t count, const layout *as)
+{
+    const int64_t stride = size_of(as->type) + as->gap;
+    if (!a->data) return true;
+    char *room = malloc((size_t)(count * stride + as->shift + 16)); /* is aligned to 16 bytes */
+    assert_true(room && room_count < MOST_ROOMS);
+    rooms[room_count++] = room;
+    bool fits = true;
+    for (int64_t i = 0; i < count && fits; i++) fits = put(room + as->shift + i * stride, as->type, number_at(a, i));
+    *a = (insitu_array){room + as->shift, as->type, as->gap ? stride : 0};
+    return fits;
+}
+
+static bool agree(bool here)
+{
+    int all = here;
+    MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
+    return all;
+}
+
+/* Whole numbers as coordinates and values, so that each type can say them. */
+static void create(session_input *in, test_mesh_kind kind)
+{
+    input_create(in, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
+    for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
+        in->part.coordinates[i] = rint(100 * in->part.coordinates[i]);
+    for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = rint(30 * in->part.values[i]);
+    for (int64_t i = 0; i < in->part.cell_count; i++) in->part.ghosts[i] = i % 7 == 3;
+    input_describe(in);
+}
+
+/* What the step copied, and its picture. */
+static caught_picture draw(const char *path, const session_input *in, int64_t *copied)
+{
+    forget_pictures();
+    insitu_session *session = open_drawn(MPI_COMM_WORLD, path, in);
+    *copied = insitu_last_report(session)->bytes_copied;
+    everywhere(in->part.cell_count == 0 || insitu_last_report(session)->bytes_borrowed > 0);
+    insitu_destroy(&session);
+    return take_caught();
+}
+
+/* Draws the input and compares; is_in_place: no more is copied than of the truth. */
+static void same(const char *path, const session_input *in, const caught_picture *truth, int64_t copied,
+                 bool is_in_place)
+{
+    int64_t own;
+    caught_picture picture = draw(path, in, &own);
+    const bool is_same = own_rank || same_pictures(&picture, truth);
+    everywhere(is_same);
+    everywhere(is_in_place ? own <= copied : own > 0 || own == copied);
+    free_caught(&picture);
+}
+
+static bool lay_out_cells(insitu_mesh *m, const layout *as)
+{
+    const int64_t end = m->open_offsets ? 0 : 1;
+    bool fits = lay_out(&m->connectivity, m->connectivity_count, as);
+    fits = lay_out(&m->offsets, m->cell_count + end, as) && fits;
+    fits = lay_out(&m->face_offsets, m->face_count + end, as) && fits;
+    return lay_out(&m->face_connectivity, m->face_connectivity_count, as) && fits;
+}
+
+static void cells_of_any_type_are_the_same(void **state)
+{
+    (void)state;
+    static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_MIXED, TEST_POLYHEDRA};
+    const char *path = write_scene(scene);
+    int drawn = 0;
+    for (int k = 0; k < 3; k++) {
+        session_input in;
+        int64_t copied;
+        create(&in, kinds[k]);
+        caught_picture truth = draw(path, &in, &copied);
+        for (int i = 0; i < 2 * INDEX_LAYOUTS; i++) {
+            const layout *as = &index_layouts[i / 2];
+            input_describe(&in);
+            in.mesh.open_offsets = i % 2;
+            const bool fits = agree(lay_out_cells(&in.mesh, as));
+            if (fits) same(path, &in, &truth, copied, as->is_in_place);
+            drawn += fits;
+            free_rooms();
+        }
+        free_caught(&truth);
+        input_free(&in);
+    }
+    everywhere(drawn > 60);
+}
+
+/* Types as VTK has them, and by numbers of the code's own; flags whose lowest byte is 0. */
+static void types_and_flags_of_any_type_are_the_same(void **state)
+{
+    (void)state;
+    static int map[60];
+    const char *path = write_scene(scene);
+    session_input in;
+    int64_t copied;
+    create(&in, TEST_MIXED);
+    caught_picture truth = draw(path, &in, &copied);
+    for (int type = 0; type < 60; type++) map[type] = (type + 25) % 60;
+    for (int i = 0; i < 2 * INDEX_LAYOUTS; i++) {
+        const layout *as = &index_layouts[i / 2];
+        double flag = as->type == INSITU_INT8 || as->type == INSITU_UINT8 ? 1 : 256;
+        input_describe(&in);
+        lay_out(&in.mesh.ghosts, in.mesh.cell_count, as);
+        for (int64_t c = 0; c < in.mesh.cell_count; c++) {
+            char *to = (char *)(uintptr_t)in.mesh.ghosts.data + c * (size_of(as->type) + as->gap);
+            put(to, as->type, in.part.ghosts[c] ? flag : 0);
+            if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60); /* map's inverse */
+        }
+        if (i % 2) in.mesh.cell_type_map = map;
+        if (i % 2) in.mesh.cell_type_map_count = 60;
+        everywhere(lay_out(&in.mesh.cell_types, in.mesh.cell_count, as));
+        same(path, &in, &truth, copied, false);
+        for (int64_t c = 0; c < in.mesh.cell_count && i % 2; c++)
+            in.part.types[c] = (unsigned char)map[in.part.types[c]];
+        free_rooms();
+    }
+    free_caught(&truth);
+    input_free(&in);
+}
+
+static void lay_out_places(session_input *in, const layout *as)
+{
+    static double apart[3][4096];
+    for (int axis = 0; axis < 3; axis++) {
+        for (int64_t v = 0; v < in->mesh.vertex_count; v++) apart[axis][v] = in->part.coordinates[3 * v + axis];
+        in->mesh.coordinates[axis] = (insitu_array){apart[axis], INSITU_FLOAT64, 0};
+        everywhere(lay_out(&in->mesh.coordinates[axis], in->mesh.vertex_count, as));
+    }
+}
+
+static void coordinates_of_any_type_are_the_same(void **state)
+{
+    (void)state;
+    const char *path = write_scene(scene);
+    session_input in;
+    int64_t copied;
+    create(&in, TEST_MIXED);
+    caught_picture truth = draw(path, &in, &copied);
+    for (int i = 0; i < NUMBER_LAYOUTS; i++) {
+        input_describe(&in);
+        lay_out_places(&in, &number_layouts[i]);
+        same(path, &in, &truth, copied, number_layouts[i].is_in_place);
+        free_rooms();
+    }
+    free_caught(&truth);
+    input_free(&in);
+}
+
+/* Values are read where they are, whatever their type. */
+static void values_of_any_type_are_the_same(void **state)
+{
+    (void)state;
+    const char *path = write_scene(scene);
+    session_input in;
+    int64_t copied;
+    for (int k = 0; k < 2; k++) {
+        create(&in, k ? TEST_TETS : TEST_MIXED);
+        caught_picture truth = draw(path, &in, &copied);
+        for (int i = 0; i < NUMBER_LAYOUTS; i++) {
+            input_describe(&in);
+            everywhere(lay_out(&in.field.values, in.field.count, &number_layouts[i]));
+            same(path, &in, &truth, copied, true);
+            free_rooms();
+        }
+        free_caught(&truth);
+        input_free(&in);
+    }
+}
+
+/* ---- components -------------------------------------------------------------------------------------------------- */
+
+static const char vector_scene[] = "images:\n"
+                                   "  - name: a\n"
+                                   "    size: [40, 32]\n"
+                                   "    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n"
+                                   "    layers:\n"
+                                   "      - isosurface: {field: f, component: 1, values: [3]}\n"
+                                   "      - surface: {colour_by: {field: f, component: magnitude}, opacity: 0.3}\n"
+                                   "      - volume: {field: e, range: [-50, 50], opacity: [[0, 0.4], [1, 0]]}\n"
+                                   "    outputs: [{path: a.png}]\n"
+                                   "fields: {e: 'f.2 + mag(f)'}\n";
+
+enum { COMPONENTS = 3 };
+
+/* How the vector field is given beside the truth's packed tuples. */
+typedef enum vector_form { TUPLES, APART, APART_BY_INDEX, UNALIGNED_TUPLES, TUPLES_BY_INDEX, VECTOR_FORMS } vector_form;
+
+static insitu_array components[COMPONENTS];
+
+static void make_field(vector_form form, insitu_centring centring, session_input *in)
+{
+    static const layout apart[COMPONENTS] = {
+        {INSITU_FLOAT64, 0, 8, true}, {INSITU_INT16, 1, 0, true}, {INSITU_FLOAT64, 3, 2, true}};
+    static const layout packed = {INSITU_FLOAT64, 5, 0, true}, aligned = {INSITU_FLOAT64, 0, 0, true};
+    static double tuples[3 * 4096], one[COMPONENTS][4096], numbers[4096];
+    const bool by_index = form == APART_BY_INDEX || form == TUPLES_BY_INDEX;
+    const int64_t count = centring == INSITU_VERTEX ? in->part.vertex_count : in->part.cell_count;
+    insitu_field_defaults(&in->field);
+    in->field.name = "f";
+    in->field.centring = centring;
+    in->field.count = count;
+    in->field.component_count = COMPONENTS;
+    for (int64_t i = 0; i < count; i++) {
+        const int64_t at = by_index ? count - 1 - i : i;
+        numbers[i] = (double)at;
+        for (int c = 0; c < COMPONENTS; c++)
+            tuples[3 * at + c] = one[c][at] = rint(test_uniform_in((uint64_t)(3 * i + c), 11, -40, 40));
+    }
+    if (form == APART || form == APART_BY_INDEX) {
+        for (int c = 0; c < COMPONENTS; c++) {
+            components[c] = (insitu_array){one[c], INSITU_FLOAT64, 0};
+            lay_out(&components[c], count, &apart[c]);
+        }
+        in->field.components = components;
+    } else {
+        in->field.values = (insitu_array){tuples, INSITU_FLOAT64, 0};
+        lay_out(&in->field.values, COMPONENTS * count, form == UNALIGNED_TUPLES ? &packed : &aligned);
+    }
+    static const layout index = {INSITU_INT64, 0, 0, true};
+    if (by_index) in->field.index = (insitu_array){numbers, INSITU_FLOAT64, 0};
+    if (by_index) lay_out(&in->field.index, count, &index);
+}
+
+static void components_apart_are_the_same(void **state)
+{
+    (void)state;
+    const char *path = write_scene(vector_scene);
+    for (int k = 0; k < 4; k++) {
+        session_input in;
+        int64_t copied;
+        const insitu_centring centring = k % 2 ? INSITU_CELL : INSITU_VERTEX;
+        create(&in, k / 2 ? TEST_POLYHEDRA : TEST_MIXED);
+        make_field(TUPLES, centring, &in);
+        caught_picture truth = draw(path, &in, &copied);
+        for (vector_form form = APART; form < VECTOR_FORMS; form++) {
+            make_field(form, centring, &in);
+            same(path, &in, &truth, copied, form == APART || form == UNALIGNED_TUPLES);
+            free_rooms();
+        }
+        free_caught(&truth);
+        input_free(&in);
+        free_rooms();
+    }
+}
+
+/* A field that is set again as it was, or without need, is read by the tables of the last time or by new ones. */
+static void components_may_be_set_again(void **state)
+{
+    (void)state;
+    static const char recentred[] = "images:\n"
+                                    "  - name: a\n"
+                                    "    size: [40, 32]\n"
+                                    "    layers:\n"
+                                    "      - isosurface: {field: f, component: magnitude, values: [30]}\n"
+                                    "    outputs: [{path: a.png}]\n";
+    session_input in;
+    create(&in, TEST_MIXED);
+    make_field(APART, INSITU_CELL, &in);
+    insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(recentred), &in);
+    caught_picture first = take_caught();
+    for (int step = 1; step < 4; step++) {
+        insitu_array again[COMPONENTS];
+        memcpy(again, components, sizeof again);
+        in.mesh.changed = INSITU_CHANGED_NOTHING;
+        in.field.changed = step == 2 ? INSITU_CHANGED_VALUES : INSITU_CHANGED_NOTHING;
+        in.field.components = again;
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        memset(again, 0, sizeof again);
+        step_is_good(session, step);
+        caught_picture picture = take_caught();
+        const bool is_same = own_rank || same_pictures(&picture, &first);
+        everywhere(is_same);
+        free_caught(&picture);
+    }
+    free_caught(&first);
+    insitu_destroy(&session);
+    free_rooms();
+    input_free(&in);
+}
+
+/* A session goes from one form to another, and to new coordinates, as another does that has float64 all the time. */
+static void forms_may_change_from_step_to_step(void **state)
+{
+    (void)state;
+    static const layout forms[] = {{INSITU_INT8, 0, 0, false},
+                                   {INSITU_FLOAT64, 0, 0, true},
+                                   {INSITU_FLOAT64, 4, 0, false},
+                                   {INSITU_INT32, 0, 0, false},
+                                   {INSITU_INT8, 1, 1, false}};
+    const char *path = write_scene(scene);
+    session_input in;
+    create(&in, TEST_MIXED);
+    insitu_session *session = open_session(MPI_COMM_WORLD, path), *plain = open_session(MPI_COMM_WORLD, path);
+    for (int step = 0; step < 10; step++) {
+        for (int64_t i = 0; i < in.part.vertex_count && step == 5; i++) in.part.coordinates[3 * i] += 3;
+        caught_picture pictures[2];
+        for (int k = 0; k < 2; k++) {
+            input_describe(&in);
+            in.mesh.changed = INSITU_CHANGED_GEOMETRY;
+            if (k) lay_out_places(&in, &forms[step % 5]);
+            if (k) everywhere(lay_out(&in.field.values, in.field.count, &forms[step % 5]));
+            everywhere(hand_over(k ? session : plain, &in) == INSITU_OK);
+            step_is_good(k ? session : plain, step);
+            pictures[k] = take_caught();
+        }
+        const bool is_same = own_rank || same_pictures(&pictures[0], &pictures[1]);
+        everywhere(is_same);
+        for (int k = 0; k < 2; k++) free_caught(&pictures[k]);
+        if (room_count > MOST_ROOMS - 8) free_rooms(); /* the next step's arrays replace them before it */
+    }
+    insitu_destroy(&session);
+    insitu_destroy(&plain);
+    free_rooms();
+    input_free(&in);
+}
+
+/* ---- faults ------------------------------------------------------------------------------------------------------ */
+
+static const int short_map[] = {0, INSITU_TET, INSITU_HEX};
+
+static void numbers_without_type(session_input *in)
+{
+    for (int64_t i = 0; i < in->part.cell_count; i++) in->part.types[i] = (unsigned char)(i == 3 ? 7 : 2);
+    in->mesh.cell_type_map = short_map;
+    in->mesh.cell_type_map_count = 3;
+}
+
+static void no_map(session_input *in)
+{
+    in->mesh.cell_type_map_count = 3;
+}
+
+static void offsets_half_open(session_input *in)
+{
+    in->mesh.open_offsets = 2;
+}
+
+static void last_cell_too_long(session_input *in)
+{
+    in->mesh.open_offsets = 1;
+    in->mesh.connectivity_count++;
+}
+
+static void values_twice(session_input *in)
+{
+    components[0] = in->field.values;
+    in->field.components = components;
+}
+
+static void no_component(session_input *in)
+{
+    components[0] = in->field.values;
+    components[1] = components[2] = (insitu_array){NULL, INSITU_FLOAT64, 0};
+    in->field.values.data = NULL;
+    in->field.component_count = 2;
+    in->field.components = components;
+}
+
+static void component_of_no_type(session_input *in)
+{
+    no_component(in);
+    components[1] = components[0];
+    components[1].type = (insitu_type)77;
+}
+
+static const spoilt_case faults[] = {
+    {"no type", numbers_without_type, INSITU_ERROR_MESH, false, {"cell 3", "type 7"}},
+    {"no map", no_map, INSITU_ERROR_ARGUMENT, true, {"cell_type_map_count is 3, and cell_type_map is not given"}},
+    {"open", offsets_half_open, INSITU_ERROR_ARGUMENT, true, {"open_offsets is 2, expected 0 or 1"}},
+    {"long", last_cell_too_long, INSITU_ERROR_MESH, false, {"offsets", "do not lie 8 apart"}},
+    {"twice", values_twice, INSITU_ERROR_FIELD, true, {"values and components are given"}},
+    {"no component", no_component, INSITU_ERROR_FIELD, true, {"component 1: values are not given"}},
+    {"no type", component_of_no_type, INSITU_ERROR_ARGUMENT, true, {"component 1: values are of element type 77"}},
+};
+
+static void faults_are_told_to_all(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
+    all_are_told(&in, faults, sizeof faults / sizeof faults[0]);
+    input_free(&in);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cells_of_any_type_are_the_same),
+        cmocka_unit_test(types_and_flags_of_any_type_are_the_same),
+        cmocka_unit_test(coordinates_of_any_type_are_the_same),
+        cmocka_unit_test(values_of_any_type_are_the_same),
+        cmocka_unit_test(components_apart_are_the_same),
+        cmocka_unit_test(components_may_be_set_again),
+        cmocka_unit_test(forms_may_change_from_step_to_step),
+        cmocka_unit_test(faults_are_told_to_all),
+    };
+    return run_session_tests(argc, argv, tests, NULL, NULL);
+}
