@@ -1,4 +1,4 @@
-# Installs headers, libraries, insitu::insitu and insitu::vtk for find_package(), and insitu.pc for others. All of it may
+# Installs headers, libraries, insitu::insitu, insitu::blueprint and insitu::vtk for find_package(), and insitu.pc for others. All of it may
 # be moved after installation: no file names the prefix. A component is what a Debian package holds (package.cmake).
 include(CMakePackageConfigHelpers)
 set(insitu_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/insitu)
@@ -9,7 +9,11 @@ add_library(insitu::static ALIAS insitu_static)
 set_target_properties(insitu_headers PROPERTIES EXPORT_NAME headers)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h")
-install(TARGETS insitu insitu_static insitu_headers EXPORT insituTargets
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/adaptors/blueprint/include/insitu
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h")
+add_library(insitu::blueprint ALIAS insitu_blueprint)
+set_target_properties(insitu_blueprint PROPERTIES EXPORT_NAME blueprint)
+install(TARGETS insitu insitu_static insitu_headers insitu_blueprint EXPORT insituTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})

@@ -26,6 +26,9 @@ add_test(NAME exported_symbols_of_archive COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/ex
   ${insitu_headers_of}/insitu.h ${insitu_headers_of}/status.h)
 add_test(NAME exported_symbols_of_image COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu_image>
   libinsitu_image.so ${insitu_headers_of}/image_output.h)
+add_test(NAME exported_symbols_of_blueprint COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh
+  $<TARGET_FILE:insitu_blueprint> libinsitu_blueprint.so.0
+  ${PROJECT_SOURCE_DIR}/adaptors/blueprint/include/insitu/blueprint.h)
 if(TARGET insitu_vtk)
   add_test(NAME exported_symbols_of_vtk COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu_vtk>
     libinsitu_vtk.so.0 ${PROJECT_SOURCE_DIR}/adaptors/vtk/include/insitu/vtk.h

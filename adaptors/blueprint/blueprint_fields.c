@@ -1,0 +1,342 @@
+/* Fields, and among them the flags of cells that are not drawn. Of a lattice all vertex arrays are in one order and all
+ * cell arrays in another: the topology's, and that of the first element field. */
+#include "blueprint_mesh.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A field of the topology. */
+typedef struct door_field {
+    node at, values;
+    bool is_element;
+    int64_t first;      /* the tuple of the first vertex or cell, */
+    int64_t strides[3]; /* and tuples from one to the next along each axis of a lattice */
+} door_field;
+
+/* Bits of VTK's flags that hide a cell: duplicate, refined, hidden. The others describe it. */
+enum { VTK_HIDING = 1 | 8 | 32 };
+
+/* ---- which fields ----------------------------------------------------------------------------------------------- */
+
+/* Tells whether VTK's attribute of the field is its flags of ghosts. */
+static bool is_called_ghosts(const node *domain, const char *name)
+{
+    node states, state;
+    const char *attribute;
+    if (!node_find(domain, "state/metadata/vtk_fields", &states) || !node_find(&states, name, &state)) return false;
+    return node_has(&state, "attribute_type") && node_string(&state, "attribute_type", &attribute) &&
+           strcmp(attribute, "Ghosts") == 0;
+}
+
+static bool is_ghosts(const node *domain, const char *name)
+{
+    return strcmp(name, "vtkGhostType") == 0 || strcmp(name, "ascent_ghosts") == 0 || is_called_ghosts(domain, name);
+}
+
+/* Tells whether the field is on the topology; a field of another one is none of ours, whatever else is wrong. */
+static bool is_on(const node *field, const char *topology)
+{
+    const char *name;
+    if (!node_string(field, "topology", &name)) return false;
+    return strcmp(name, topology) == 0;
+}
+
+/* Reads where a field is and of what; false where it is wrong or left out. */
+static bool find_field(const node *field, door_field *out, bool tells)
+{
+    const char *association;
+    if (!node_has(field, "association") && node_has(field, "basis")) {
+        if (tells) node_leave_out(field, "basis", "fields by a basis are not read");
+        return false;
+    }
+    if (!node_has(field, "values") && node_has(field, "matset_values")) {
+        if (tells) node_leave_out(field, "values", "values of materials alone are not read");
+        return false;
+    }
+    if (!node_string(field, "association", &association)) return false;
+    out->at = *field;
+    out->is_element = strcmp(association, "element") == 0;
+    if (!out->is_element && strcmp(association, "vertex") != 0)
+        return node_fail(field, "association", INSITU_ERROR_FIELD, "is \"%s\", expected vertex or element",
+                         association);
+    return node_need(&out->at, "values", &out->values);
+}
+
+/* Visits the fields of a topology; false after the last one, or where one is wrong. */
+typedef struct field_walk {
+    const node *domain;
+    const char *topology;
+    bool tells; /* what is left out */
+    node fields, field;
+    int64_t next;
+    door_field found;
+} field_walk;
+
+static bool next_field(field_walk *w)
+{
+    if (w->next == 0 && !node_find(w->domain, "fields", &w->fields)) return false;
+    while (w->next < node_child_count(&w->fields)) {
+        node_child(&w->fields, w->next++, &w->field);
+        w->found = (door_field){.first = 0};
+        if (is_on(&w->field, w->topology) && find_field(&w->field, &w->found, w->tells)) return true;
+        if (w->domain->log->status) return false;
+    }
+    return false;
+}
+
+uint64_t door_field_names(const node *domain, const char *topology)
+{
+    uint64_t sum = 0;
+    for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
+        uint64_t hash = 14695981039346656037u;
+        for (const char *c = w.field.name; *c; c++) hash = (hash ^ (unsigned char)*c) * 1099511628211u;
+        sum += hash | 1;
+    }
+    return sum;
+}
+
+/* ---- orders of lattices ------------------------------------------------------------------------------------------ */
+
+/* Cells or vertices along each axis, at least 1. */
+static void counts_of(const door_mesh *mesh, bool is_element, int64_t counts[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t cells = mesh->lattice.cells[axis];
+        counts[axis] = is_element ? (cells ? cells : 1) : cells + 1;
+    }
+}
+
+/* Reads the field's order: packed, or by its offsets and strides. */
+static bool read_order(const door_mesh *mesh, door_field *field)
+{
+    int64_t counts[3], offsets[3] = {0, 0, 0};
+    int count = 0;
+    counts_of(mesh, field->is_element, counts);
+    field->strides[0] = 1;
+    field->strides[1] = counts[0];
+    field->strides[2] = counts[0] * counts[1];
+    if (!mesh->mesh.lattice) return true;
+    node_integers(&field->at, "offsets", offsets, &count);
+    if (node_integers(&field->at, "strides", field->strides, &count))
+        for (int axis = count; axis < 3; axis++) field->strides[axis] = field->strides[axis - 1] * counts[axis - 1];
+    for (int axis = 0; axis < 3; axis++) {
+        if (field->strides[axis] < 1 || offsets[axis] < 0)
+            return node_fail(&field->at, field->strides[axis] < 1 ? "strides" : "offsets", INSITU_ERROR_FIELD,
+                             "has %lld", (long long)(field->strides[axis] < 1 ? field->strides : offsets)[axis]);
+        field->first += offsets[axis] * field->strides[axis];
+    }
+    return !field->at.log->status;
+}
+
+/* Tells whether the strides along all axes of more than one place are the same. */
+static bool is_same_order(const int64_t counts[3], const int64_t a[3], const int64_t b[3])
+{
+    bool is_same = true;
+    for (int axis = 0; axis < 3; axis++) is_same = is_same && (counts[axis] == 1 || a[axis] == b[axis]);
+    return is_same;
+}
+
+/* Takes the field's order for cells if it is the first; tells whether it is that of the mesh. */
+static bool has_order(door_mesh *mesh, door_field *field)
+{
+    int64_t counts[3];
+    if (!mesh->mesh.lattice) return true;
+    counts_of(mesh, field->is_element, counts);
+    if (!field->is_element) return is_same_order(counts, field->strides, mesh->lattice.vertex_strides);
+    if (!mesh->has_cell_order) {
+        memcpy(mesh->lattice.cell_strides, field->strides, sizeof field->strides);
+        mesh->mesh.cell_count = door_reach(counts, field->strides);
+        mesh->has_cell_order = true;
+    }
+    return is_same_order(counts, field->strides, mesh->lattice.cell_strides);
+}
+
+/* ---- arrays ------------------------------------------------------------------------------------------------------ */
+
+/* Reads one component, from the mesh's first vertex or cell on. */
+static bool read_component(const node *values, const door_mesh *mesh, const door_field *field, insitu_array *out)
+{
+    node_array array;
+    const int64_t needed = field->is_element ? mesh->mesh.cell_count : mesh->mesh.vertex_count;
+    if (!node_read_array(values, &array)) return false;
+    const bool is_whole = !mesh->mesh.lattice && array.count != needed;
+    if (is_whole || array.count < field->first + needed)
+        return node_fail(values, "", INSITU_ERROR_FIELD, "has %lld elements, the topology has %lld %s%s",
+                         (long long)array.count, (long long)needed, field->is_element ? "elements" : "vertices",
+                         field->first ? ", after the field's offsets" : "");
+    *out = array.array;
+    if (out->data) out->data = (const char *)out->data + field->first * out->stride_bytes;
+    return true;
+}
+
+/* ---- ghosts ------------------------------------------------------------------------------------------------------ */
+
+/* The flags of the mesh's cells as bytes of the door's own. */
+static unsigned char *own_flags(const node *of, door_mesh *mesh, const insitu_array *flags, int64_t mask)
+{
+    unsigned char *own = door_own(of, &mesh->owned, mesh->mesh.cell_count);
+    for (int64_t i = 0; own && i < mesh->mesh.cell_count && flags->data; i++)
+        own[i] = (node_element(flags, i) & mask) != 0;
+    return own;
+}
+
+static bool take_flags(const door_field *field, door_mesh *mesh)
+{
+    node_array array;
+    insitu_array flags;
+    if (!node_read_array(&field->values, &array)) return false;
+    if (!node_is_integers(&array))
+        return node_fail(&field->values, "", INSITU_ERROR_FIELD, "are no whole numbers, as flags of ghosts are");
+    if (!read_component(&field->values, mesh, field, &flags)) return false;
+    int64_t any = 0;
+    for (int64_t i = 0; i < mesh->mesh.cell_count && flags.data; i++) any |= node_element(&flags, i);
+    mesh->mesh.ghosts = any ? flags : (insitu_array){0};
+    if (strcmp(field->at.name, "ascent_ghosts") == 0 || !(any & ~(int64_t)VTK_HIDING)) return true;
+    unsigned char *own = own_flags(&field->at, mesh, &flags, VTK_HIDING);
+    if (!own) return false;
+    node_note_copy(&field->at, "values", mesh->mesh.cell_count, "the flags that hide a cell");
+    mesh->mesh.ghosts = (insitu_array){own, INSITU_UINT8, 0};
+    return true;
+}
+
+/* Reads the cells of a window, in indices of the domain's own. *fits: they are among the domain's. */
+static bool read_window(const node *window, const door_mesh *mesh, int64_t first[3], int64_t end[3], bool *fits)
+{
+    static const char *const origins[3] = {"origin/i", "origin/j", "origin/k"};
+    static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
+    int64_t counts[3];
+    counts_of(mesh, true, counts);
+    *fits = true;
+    for (int axis = 0; axis < 3; axis++) {
+        int64_t count = 1;
+        first[axis] = 0;
+        if (!node_integer(window, origins[axis], axis == 0, &first[axis])) return false;
+        if (!node_integer(window, dims[axis], axis == 0, &count)) return false;
+        *fits = *fits && first[axis] >= 0 && count >= 0 && count <= counts[axis] && first[axis] <= counts[axis] - count;
+        end[axis] = first[axis] + count;
+    }
+    return true;
+}
+
+static void mark_cells(const int64_t strides[3], const int64_t first[3], const int64_t end[3], unsigned char *flags)
+{
+    for (int64_t k = first[2]; k < end[2]; k++)
+        for (int64_t j = first[1]; j < end[1]; j++)
+            for (int64_t i = first[0]; i < end[0]; i++) flags[i * strides[0] + j * strides[1] + k * strides[2]] = 1;
+}
+
+/* Flags the cells that finer domains cover, by the windows of the domain's nestsets. Some codes count a window's
+ * vertices, or in indices of another level: such windows are left out. */
+static bool cover_cells(const node *nestset, door_mesh *mesh)
+{
+    node windows, window;
+    const char *kind;
+    unsigned char *flags = NULL;
+    int64_t first[3], end[3];
+    bool fits;
+    if (!node_need(nestset, "windows", &windows)) return false;
+    for (int64_t i = 0; i < node_child_count(&windows); i++) {
+        node_child(&windows, i, &window);
+        if (!node_string(&window, "domain_type", &kind)) return false;
+        if (strcmp(kind, "child") != 0) continue;
+        if (!read_window(&window, mesh, first, end, &fits)) return false;
+        if (!fits) {
+            node_leave_out(&window, "",
+                           "is not within the domain's own cells: the cells that a child covers are drawn too");
+            continue;
+        }
+        if (!flags) flags = own_flags(nestset, mesh, &mesh->mesh.ghosts, -1);
+        if (!flags) return false;
+        mark_cells(mesh->lattice.cell_strides, first, end, flags);
+    }
+    if (!flags) return true;
+    node_note_copy(nestset, "windows", mesh->mesh.cell_count, "flags of the cells that other domains refine");
+    mesh->mesh.ghosts = (insitu_array){flags, INSITU_UINT8, 0};
+    return true;
+}
+
+static bool read_nestsets(const node *domain, const char *topology, door_mesh *mesh)
+{
+    node nestsets, nestset;
+    if (!mesh->mesh.lattice || !node_find(domain, "nestsets", &nestsets)) return true;
+    for (int64_t i = 0; i < node_child_count(&nestsets); i++) {
+        node_child(&nestsets, i, &nestset);
+        if (is_on(&nestset, topology) && !cover_cells(&nestset, mesh)) return false;
+        if (domain->log->status) return false;
+    }
+    return true;
+}
+
+bool door_read_ghosts(const node *domain, const char *topology, door_mesh *mesh)
+{
+    for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
+        if (!w.found.is_element) continue;
+        if (!read_order(mesh, &w.found)) return false;
+        const bool is_shown = has_order(mesh, &w.found);
+        if (is_shown && is_ghosts(domain, w.field.name) && !take_flags(&w.found, mesh)) return false;
+        if (domain->log->status) return false;
+    }
+    return !domain->log->status && read_nestsets(domain, topology, mesh);
+}
+
+/* ---- values ------------------------------------------------------------------------------------------------------ */
+
+/* Reads the field's components into an array that the caller frees. */
+static insitu_array *read_values(const door_field *field, const door_mesh *mesh, int *count)
+{
+    const int64_t children = node_child_count(&field->values);
+    *count = children ? (int)children : 1;
+    insitu_array *out = calloc((size_t)*count, sizeof *out);
+    bool is_read = out != NULL;
+    if (!out) node_fail(&field->values, "", INSITU_ERROR_MEMORY, "no memory for %d components", *count);
+    if (out && !children) is_read = read_component(&field->values, mesh, field, out);
+    for (int i = 0; i < children && is_read; i++) {
+        node component;
+        node_child(&field->values, i, &component);
+        is_read = read_component(&component, mesh, field, &out[i]);
+    }
+    if (is_read) return out;
+    free(out);
+    return NULL;
+}
+
+static bool set_field(const door_field *field, const door_mesh *mesh, insitu_session *session, const char *name)
+{
+    insitu_field given;
+    int components;
+    insitu_array *values = read_values(field, mesh, &components);
+    if (!values) return false;
+    insitu_field_defaults(&given);
+    given.name = field->at.name;
+    given.centring = field->is_element ? INSITU_CELL : INSITU_VERTEX;
+    given.count = field->is_element ? mesh->mesh.cell_count : mesh->mesh.vertex_count;
+    given.component_count = components;
+    if (components == 1)
+        given.values = values[0];
+    else
+        given.components = values;
+    const insitu_status status = insitu_set_field(session, name, &given);
+    free(values);
+    return !status || node_fail(&field->at, "", status, "%s", insitu_error(session));
+}
+
+bool door_set_fields(const node *domain, const char *topology, const door_mesh *mesh, insitu_session *session,
+                     const char *name, int *count)
+{
+    door_mesh order = *mesh;
+    for (field_walk w = {.domain = domain, .topology = topology, .tells = true}; next_field(&w);) {
+        if (is_ghosts(domain, w.field.name)) {
+            if (!w.found.is_element) node_leave_out(&w.field, "values", "ghosts at vertices are not read");
+            continue;
+        }
+        if (!read_order(mesh, &w.found)) return false;
+        if (!has_order(&order, &w.found)) {
+            node_leave_out(&w.field, "strides", "has other strides than the %s of the topology",
+                           w.found.is_element ? "other element fields" : "vertices");
+            continue;
+        }
+        if (!set_field(&w.found, mesh, session, name)) return false;
+        ++*count;
+    }
+    return !domain->log->status;
+}

@@ -1,0 +1,103 @@
+#include "blueprint_hash.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+enum { LANES = 4 };
+
+static uint64_t mix(uint64_t sum, uint64_t bits)
+{
+    const uint64_t product = (sum ^ bits) * 0x9e3779b97f4a7c15u;
+    return product ^ product >> 29;
+}
+
+/* Several independent sums, since each multiplication waits for the one before. */
+static uint64_t hash_bytes(const char *data, int64_t bytes)
+{
+    uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
+    for (; bytes >= (int64_t)sizeof words; bytes -= (int64_t)sizeof words, data += sizeof words) {
+        memcpy(words, data, sizeof words);
+        for (int i = 0; i < LANES; i++) lanes[i] = mix(lanes[i], words[i]);
+    }
+    memset(words, 0, sizeof words);
+    if (bytes > 0) memcpy(words, data, (size_t)bytes);
+    for (int i = 0; i < LANES; i++) lanes[i] = mix(lanes[i], words[i]);
+    return mix(mix(lanes[0], lanes[1]), mix(lanes[2], lanes[3]));
+}
+
+static int64_t element_bytes(insitu_type type)
+{
+    static const unsigned char bytes[] = {0, 4, 8, 4, 8, 1, 1, 2, 2, 4, 8};
+    return bytes[type];
+}
+
+/* As above, of elements apart, all of one size, which is a constant where this is called from. */
+static inline uint64_t hash_elements(const char *data, int64_t count, int64_t stride, size_t size)
+{
+    uint64_t lanes[LANES] = {1, 2, 3, 4}, bits[LANES] = {0};
+    int64_t i = 0;
+    for (; i + LANES <= count; i += LANES) {
+        for (int k = 0; k < LANES; k++) memcpy(&bits[k], data + (i + k) * stride, size);
+        for (int k = 0; k < LANES; k++) lanes[k] = mix(lanes[k], bits[k]);
+    }
+    for (; i < count; i++) {
+        memcpy(&bits[0], data + i * stride, size);
+        lanes[0] = mix(lanes[0], bits[0]);
+    }
+    return mix(mix(lanes[0], lanes[1]), mix(lanes[2], lanes[3]));
+}
+
+static uint64_t hash_array(uint64_t sum, const insitu_array *array, int64_t count)
+{
+    if (!array->data) return mix(sum, 0);
+    const char *data = array->data;
+    const int64_t size = element_bytes(array->type), stride = array->stride_bytes ? array->stride_bytes : size;
+    sum = mix(mix(sum, (uint64_t)count), (uint64_t)array->type);
+    if (stride == size) return mix(sum, hash_bytes(data, count * size));
+    switch (size) {
+    case 1: return mix(sum, hash_elements(data, count, stride, 1));
+    case 2: return mix(sum, hash_elements(data, count, stride, 2));
+    case 4: return mix(sum, hash_elements(data, count, stride, 4));
+    default: return mix(sum, hash_elements(data, count, stride, 8));
+    }
+}
+
+/* Tells whether the coordinates are x y z x y z ..., without anything between. */
+static bool are_interleaved(const insitu_array coordinates[3])
+{
+    const int64_t size = element_bytes(coordinates[0].type);
+    bool are = coordinates[0].data != NULL;
+    for (int axis = 0; axis < 3 && are; axis++)
+        are = coordinates[axis].data == (const char *)coordinates[0].data + axis * size &&
+              coordinates[axis].type == coordinates[0].type && coordinates[axis].stride_bytes == 3 * size;
+    return are;
+}
+
+uint64_t door_hash_places(const insitu_mesh *mesh)
+{
+    const insitu_array *c = mesh->coordinates;
+    uint64_t sum = 1;
+    if (are_interleaved(c))
+        sum = hash_bytes(c[0].data, 3 * mesh->vertex_count * element_bytes(c[0].type));
+    else
+        for (int axis = 0; axis < 3; axis++) sum = hash_array(sum, &c[axis], mesh->vertex_count);
+    for (int axis = 0; axis < 3 && mesh->lattice; axis++) {
+        uint64_t bits[2];
+        memcpy(&bits[0], &mesh->lattice->origin[axis], sizeof bits[0]);
+        memcpy(&bits[1], &mesh->lattice->spacing[axis], sizeof bits[1]);
+        sum = mix(mix(sum, bits[0]), bits[1]);
+        sum = hash_array(sum, &mesh->lattice->axes[axis], mesh->lattice->cells[axis] + 1);
+    }
+    return sum;
+}
+
+uint64_t door_hash_cells(const insitu_mesh *mesh)
+{
+    uint64_t sum = mix(1, (uint64_t)mesh->cell_type);
+    sum = hash_array(sum, &mesh->cell_types, mesh->cell_count);
+    sum = hash_array(sum, &mesh->connectivity, mesh->connectivity_count);
+    sum = hash_array(sum, &mesh->offsets, mesh->cell_count);
+    sum = hash_array(sum, &mesh->face_offsets, mesh->face_count);
+    sum = hash_array(sum, &mesh->face_connectivity, mesh->face_connectivity_count);
+    return hash_array(sum, &mesh->ghosts, mesh->cell_count);
+}

@@ -1,0 +1,10 @@
+# The door for Conduit's Mesh Blueprint, on a stand-in of the functions that it calls.
+add_library(test_blueprint_fixture OBJECT conduit_stand_in.c test_blueprint_layouts.c)
+target_link_libraries(test_blueprint_fixture PUBLIC test_session_fixture PRIVATE insitu_quick_flags)
+
+foreach(test blueprint blueprint_faults)
+  add_executable(test_${test} test_${test}.c)
+  target_link_libraries(test_${test} PRIVATE
+    insitu_blueprint_objects test_blueprint_fixture test_session_fixture insitu_quick_flags)
+  insitu_add_mpi_test(${test} test_${test} 1 2 WHOLE 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endforeach()

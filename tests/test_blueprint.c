@@ -1,0 +1,406 @@
+/* Nodes of the Mesh Blueprint draw the pictures of the same meshes as the plain header has them, to the bit, in every
+ * layout, packed at odd addresses too, and copy nothing that the header can say. Wrong nodes are reported with their
+ * path, with one status on all ranks. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "conduit_stand_in.h"
+#include "insitu/conduit.h"
+#include "test_blueprint_layouts.h"
+
+static const char scene[] =
+    "images:\n"
+    "  - name: a\n"
+    "    size: [48, 36]\n"
+    "    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n"
+    "    layers:\n"
+    "      - isosurface: {field: braid, values: [0.1], colour_by: {field: vel, component: 1}}\n"
+    "      - surface: {colour_by: {field: radial}, opacity: 0.4}\n"
+    "      - volume: {field: vel, component: magnitude, range: [0, 20], opacity: [[0, 0.3], [1, 0]]}\n"
+    "    outputs: [{path: a.png}]\n";
+/* Without vel, which some layouts do not have. */
+static const char scene_of_two[] = "images:\n"
+                                   "  - name: a\n"
+                                   "    size: [48, 36]\n"
+                                   "    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n"
+                                   "    layers:\n"
+                                   "      - isosurface: {field: braid, values: [0.1]}\n"
+                                   "      - surface: {colour_by: {field: radial}, opacity: 0.4}\n"
+                                   "    outputs: [{path: a.png}]\n";
+
+static const char *write_scene_of(const layout_case *layout)
+{
+    return write_scene(layout->field_count == 3 ? scene : scene_of_two);
+}
+
+/* A session with a door. */
+typedef struct doorway {
+    insitu_session *session;
+    insitu_blueprint *door;
+} doorway;
+
+static doorway open_door(const char *path)
+{
+    doorway d = {open_session(MPI_COMM_WORLD, path), NULL};
+    everywhere(insitu_blueprint_create(d.session, &insitu_conduit_functions, MPI_COMM_WORLD, &d.door) == INSITU_OK);
+    return d;
+}
+
+static void close_door(doorway *d)
+{
+    insitu_blueprint_destroy(&d->door);
+    everywhere(insitu_destroy(&d->session) == INSITU_OK);
+}
+
+static void step_well(doorway *d)
+{
+    forget_pictures();
+    const insitu_status status = insitu_blueprint_step(d->door, NULL, NULL);
+    if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->door));
+    everywhere(status == INSITU_OK);
+    everywhere(insitu_last_report(d->session)->images == 1 && caught_count == (own_rank == 0));
+}
+
+static void set_well(doorway *d, const char *name, const conduit_node *node)
+{
+    const insitu_status status = insitu_blueprint_set(d->door, name, node);
+    if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->door));
+    everywhere(status == INSITU_OK);
+}
+
+/* The picture of the plain header's mesh, and what that copied. */
+static caught_picture draw_plain(const char *path, const layout_case *layout, int64_t *copied)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, path);
+    everywhere(layout_hand_over(session, "mesh", layout) == INSITU_OK);
+    step_is_good(session, 100);
+    *copied = insitu_last_report(session)->bytes_copied;
+    insitu_destroy(&session);
+    return take_caught();
+}
+
+static bool has_colour(const caught_picture *picture)
+{
+    bool has = own_rank != 0;
+    for (int i = 0; !has && i < 4 * picture->width * picture->height; i++) has = picture->rgba[i] > 0.05F;
+    return has;
+}
+
+static void each_layout_is_the_plain_header_s(void **state)
+{
+    (void)state;
+    for (int i = 0; i < layout_kind_count; i++) {
+        layout_case layout;
+        layout_make(&layout_kinds[i], &layout);
+        const char *path = write_scene_of(&layout);
+        int64_t copied;
+        caught_picture truth = draw_plain(path, &layout, &copied);
+        everywhere(has_colour(&truth));
+        for (int packed = 0; packed < 2; packed++) {
+            doorway d = open_door(path);
+            if (packed) stand_in_pack(layout.node);
+            set_well(&d, "", layout.node);
+            step_well(&d);
+            const insitu_blueprint_report *report = insitu_blueprint_last_report(d.door);
+            caught_picture picture = take_caught();
+            const bool is_same = own_rank || same_pictures(&picture, &truth);
+            if (!is_same) fprintf(stderr, "%s%s: another picture\n", layout_kinds[i].name, packed ? ", packed" : "");
+            everywhere(is_same);
+            everywhere(report->meshes == 1 && report->fields == layout.field_count && !*report->left_out);
+            everywhere(report->cells == layout.mesh.cell_count || report->cells > layout.mesh.cell_count);
+            everywhere(layout_kinds[i].is_copied == (report->bytes_copied > 0));
+            everywhere(insitu_last_report(d.session)->cycle == 100);
+            everywhere(insitu_last_report(d.session)->time == 3.1415);
+            free_caught(&picture);
+            close_door(&d);
+        }
+        free_caught(&truth);
+        layout_free(&layout);
+    }
+}
+
+/* Types that are read in place: neither the door nor the session copies more than of the plain header's arrays. */
+static void what_the_header_says_is_not_copied(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"uniform",  "rectilinear", "structured", "strided",  "tris",
+                                        "quads",    "quads_poly",  "tets",       "hexs",     "wedges",
+                                        "pyramids", "hexs_poly",   "polyhedra",  "mixed_2d", "vtkGhostType"};
+    for (size_t n = 0; n < sizeof names / sizeof names[0]; n++)
+        for (int i = 0; i < layout_kind_count; i++) {
+            if (strcmp(layout_kinds[i].name, names[n]) != 0) continue;
+            layout_case layout;
+            layout_make(&layout_kinds[i], &layout);
+            const char *path = write_scene_of(&layout);
+            int64_t copied;
+            caught_picture truth = draw_plain(path, &layout, &copied);
+            doorway d = open_door(path);
+            set_well(&d, "", layout.node);
+            step_well(&d);
+            everywhere(insitu_blueprint_last_report(d.door)->bytes_copied == 0);
+            if (insitu_last_report(d.session)->bytes_copied > copied)
+                fprintf(stderr, "%s: %s\n", names[n], insitu_last_report(d.session)->copied_why);
+            everywhere(insitu_last_report(d.session)->bytes_copied <= copied);
+            forget_pictures();
+            free_caught(&truth);
+            close_door(&d);
+            layout_free(&layout);
+        }
+}
+
+/* ---- several domains, names and steps ---------------------------------------------------------------------------- */
+
+/* Moves what one node has below another, whose it then is. */
+static void adopt(conduit_node *parent, const char *path, conduit_node *child)
+{
+    conduit_node *at = conduit_node_fetch(parent, path);
+    stand_in_swap(at, child);
+    conduit_node_destroy(child);
+}
+
+/* Two domains: of another height on each rank, and the second of other cells. */
+static void domains_are_meshes_of_their_own(void **state)
+{
+    (void)state;
+    layout_case a, b;
+    layout_make(&layout_kinds[0], &a);
+    layout_make(&layout_kinds[16], &b);
+    const char *path = write_scene(scene);
+    insitu_session *session = open_session(MPI_COMM_WORLD, path);
+    everywhere(layout_hand_over(session, "grid/mesh/0", &a) == INSITU_OK);
+    everywhere(layout_hand_over(session, "grid/mesh/1", &b) == INSITU_OK);
+    step_is_good(session, 100);
+    caught_picture truth = take_caught();
+    insitu_destroy(&session);
+    conduit_node *both = conduit_node_create();
+    adopt(both, "domain_000000", a.node);
+    adopt(both, "domain_000001", b.node);
+    doorway d = open_door(path);
+    set_well(&d, "grid", both);
+    step_well(&d);
+    caught_picture picture = take_caught();
+    const bool is_same = own_rank || same_pictures(&picture, &truth);
+    everywhere(is_same);
+    everywhere(insitu_blueprint_last_report(d.door)->meshes == 2);
+    free_caught(&picture);
+    free_caught(&truth);
+    close_door(&d);
+    a.node = conduit_node_create();
+    b.node = conduit_node_create();
+    layout_free(&a);
+    layout_free(&b);
+    conduit_node_destroy(both);
+}
+
+/* A rank without domains, and then a mesh that ceases on all ranks. */
+static void meshes_come_and_go(void **state)
+{
+    (void)state;
+    layout_case a, b;
+    layout_make(&layout_kinds[0], &a);
+    layout_make(&layout_kinds[16], &b);
+    conduit_node *empty = conduit_node_create();
+    const char *path = write_scene(scene);
+    doorway d = open_door(path);
+    for (int step = 0; step < 6; step++) {
+        const bool has_a = step % 3 != 2, has_b = step % 3 != 1, is_here = step < 3 || own_rank == 0;
+        insitu_session *session = open_session(MPI_COMM_WORLD, path);
+        if (has_a && is_here)
+            everywhere(layout_hand_over(session, "a/mesh", &a) == INSITU_OK || true);
+        else
+            everywhere(true);
+        if (has_b) layout_hand_over(session, "b/mesh", &b);
+        step_is_good(session, 100);
+        caught_picture truth = take_caught();
+        insitu_destroy(&session);
+        if (has_a) set_well(&d, "a", is_here ? a.node : empty);
+        if (has_b) set_well(&d, "b", b.node);
+        step_well(&d);
+        caught_picture picture = take_caught();
+        const bool is_same = own_rank || same_pictures(&picture, &truth);
+        everywhere(is_same);
+        free_caught(&picture);
+        free_caught(&truth);
+    }
+    close_door(&d);
+    conduit_node_destroy(empty);
+    layout_free(&a);
+    layout_free(&b);
+}
+
+/* New coordinates, values and flags in the arrays that there were are seen, and of the same ones no tree is built. */
+static void changes_are_found(void **state)
+{
+    (void)state;
+    layout_case l;
+    for (int i = 0; i < layout_kind_count; i++)
+        if (strcmp(layout_kinds[i].name, "vtkGhostType of bits") == 0 || strcmp(layout_kinds[i].name, "hexs") == 0) {
+            layout_make(&layout_kinds[i], &l);
+            const char *path = write_scene(scene);
+            doorway d = open_door(path);
+            double *places = (double *)(uintptr_t)l.mesh.coordinates[0].data;
+            double *values = (double *)(uintptr_t)l.fields[0].values.data;
+            for (int step = 0; step < 5; step++) {
+                for (int64_t v = 0; step == 1 && places && v < l.mesh.vertex_count; v++) places[3 * v] *= 1.25;
+                for (int64_t v = 0; step == 3 && v < l.mesh.vertex_count; v++) values[v] *= -0.5;
+                int64_t copied;
+                caught_picture truth = draw_plain(path, &l, &copied);
+                set_well(&d, "", l.node);
+                step_well(&d);
+                caught_picture picture = take_caught();
+                const bool is_same = own_rank || same_pictures(&picture, &truth);
+                everywhere(is_same);
+                const double built = insitu_last_report(d.session)->build_ms;
+                everywhere(step == 2 || step == 4 ? built == 0 : true);
+                free_caught(&picture);
+                free_caught(&truth);
+            }
+            close_door(&d);
+            layout_free(&l);
+        }
+}
+
+/* Without state/cycle steps are counted on from the last one. */
+static void cycles_are_counted(void **state)
+{
+    (void)state;
+    static const int64_t said[] = {-1, -1, 40, -1}, expected[] = {0, 1, 40, 41};
+    layout_case l;
+    layout_make(&layout_kinds[0], &l);
+    doorway d = open_door(write_scene(scene));
+    for (int step = 0; step < 4; step++) {
+        if (step == 0) stand_in_remove(l.node, "state");
+        if (said[step] >= 0) conduit_node_set_path_int64(l.node, "state/cycle", said[step]);
+        set_well(&d, "", l.node);
+        step_well(&d);
+        everywhere(insitu_last_report(d.session)->cycle == expected[step]);
+        everywhere(insitu_last_report(d.session)->time == (double)expected[step]);
+        if (said[step] >= 0) stand_in_remove(l.node, "state");
+    }
+    forget_pictures();
+    close_door(&d);
+    layout_free(&l);
+}
+
+/* ---- what is left out -------------------------------------------------------------------------------------------- */
+
+typedef void spoil_node(conduit_node *node);
+
+typedef struct left_out_case {
+    const char *layout;
+    spoil_node *spoil;
+    const char *words;
+    int meshes, fields;
+} left_out_case;
+
+static void of_points(conduit_node *n)
+{
+    conduit_node_set_path_char8_str(n, "topologies/mesh/type", "points");
+}
+
+static void of_lines(conduit_node *n)
+{
+    conduit_node_set_path_char8_str(n, "topologies/mesh/elements/shape", "line");
+}
+
+static void of_streams(conduit_node *n)
+{
+    conduit_node_set_path_char8_str(n, "topologies/mesh/elements/element_types/tets/shape", "tet");
+}
+
+static void of_angles(conduit_node *n)
+{
+    static const double at[2] = {0, 1};
+    stand_in_put(n, "coordsets/coords/values/theta", STAND_IN_FLOAT64, at, 2, 0);
+}
+
+static void by_basis(conduit_node *n)
+{
+    stand_in_remove(n, "fields/braid/association");
+    conduit_node_set_path_char8_str(n, "fields/braid/basis", "H1_3D_P2");
+}
+
+static void of_materials(conduit_node *n)
+{
+    stand_in_remove(n, "fields/radial/values");
+    conduit_node_set_path_float64(n, "fields/radial/matset_values/a", 1);
+}
+
+static void ghosts_at_vertices(conduit_node *n)
+{
+    conduit_node_set_path_char8_str(n, "state/metadata/vtk_fields/vel/attribute_type", "Ghosts");
+}
+
+static void of_one_dimension(conduit_node *n)
+{
+    conduit_node_set_path_int64(n, "coordsets/coords/dims/j", 1);
+    conduit_node_set_path_int64(n, "coordsets/coords/dims/k", 1);
+}
+
+static void with_other_strides(conduit_node *n)
+{
+    static const int64_t strides[3] = {1, 5, 23};
+    static const double room[200];
+    stand_in_put(n, "fields/braid/strides", STAND_IN_INT64, strides, 3, 0);
+    stand_in_put(n, "fields/braid/values", STAND_IN_FLOAT64, room, 200, 0);
+}
+
+static const left_out_case left_out_cases[] = {
+    {"tets", of_points, "grid/topologies/mesh/type: points are not drawn", 0, 0},
+    {"tets", of_lines, "grid/topologies/mesh/elements/shape: is \"line\"", 0, 0},
+    {"tets", of_streams, "grid/topologies/mesh/elements/element_types: ", 0, 0},
+    {"rectilinear", of_angles, "grid/coordsets/coords/values/theta: ", 0, 0},
+    {"tets", by_basis, "grid/fields/braid/basis: ", 1, 2},
+    {"tets", of_materials, "grid/fields/radial/values: ", 1, 2},
+    {"tets", ghosts_at_vertices, "grid/fields/vel/values: ghosts at vertices", 1, 2},
+    {"uniform", of_one_dimension, "grid/coordsets/coords/dims: 5 x 1 x 1 vertices", 0, 0},
+    {"uniform", with_other_strides, "grid/fields/braid/strides: has other strides", 1, 2},
+};
+
+static const layout_kind *find_layout(const char *name)
+{
+    for (int i = 0; i < layout_kind_count; i++)
+        if (strcmp(layout_kinds[i].name, name) == 0) return &layout_kinds[i];
+    abort();
+}
+
+static void what_is_left_out_is_named(void **state)
+{
+    (void)state;
+    const char *path = write_scene(scene);
+    for (size_t i = 0; i < sizeof left_out_cases / sizeof left_out_cases[0]; i++) {
+        const left_out_case *c = &left_out_cases[i];
+        layout_case layout;
+        layout_make(find_layout(c->layout), &layout);
+        c->spoil(layout.node);
+        doorway d = open_door(path);
+        const insitu_status status = insitu_blueprint_set(d.door, "grid", layout.node);
+        insitu_blueprint_step(d.door, NULL, NULL);
+        const insitu_blueprint_report *r = insitu_blueprint_last_report(d.door);
+        const bool is_well =
+            !status && strstr(r->left_out, c->words) && r->meshes == c->meshes && r->fields == c->fields;
+        if (!is_well)
+            fprintf(stderr, "%s: \"%s\", %d meshes, %d fields: %s\n", c->words, r->left_out, r->meshes, r->fields,
+                    insitu_blueprint_error(d.door));
+        everywhere(is_well);
+        forget_pictures();
+        close_door(&d);
+        layout_free(&layout);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_layout_is_the_plain_header_s),
+        cmocka_unit_test(what_the_header_says_is_not_copied),
+        cmocka_unit_test(domains_are_meshes_of_their_own),
+        cmocka_unit_test(meshes_come_and_go),
+        cmocka_unit_test(changes_are_found),
+        cmocka_unit_test(cycles_are_counted),
+        cmocka_unit_test(what_is_left_out_is_named),
+    };
+    return run_session_tests(argc, argv, tests, NULL, NULL);
+}

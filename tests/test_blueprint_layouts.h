@@ -1,0 +1,40 @@
+/* Small meshes as nodes of the Mesh Blueprint, in the layouts of Conduit's generator of examples, each with the same
+ * mesh as the plain header has it: fields braid and vel at vertices and radial at elements. Rank r has the block from x
+ * = 20 r on, or its part of a test_mesh. */
+#ifndef TEST_BLUEPRINT_LAYOUTS_H
+#define TEST_BLUEPRINT_LAYOUTS_H
+
+#include "conduit_stand_in.h"
+#include "test_session_fixture.h"
+
+enum { LAYOUT_ARRAYS = 64, LAYOUT_SIDE = 3 };
+
+/* A node and the same in the plain header's terms. */
+typedef struct layout_case {
+    conduit_node *node;
+    insitu_mesh mesh;
+    insitu_lattice lattice;
+    insitu_field fields[3];
+    int field_count;
+    void *arrays[LAYOUT_ARRAYS];
+    int array_count;
+} layout_case;
+
+typedef void layout_function(layout_case *out);
+
+typedef struct layout_kind {
+    const char *name;
+    layout_function *make;
+    bool is_copied; /* the door copies something, because the node lacks it */
+} layout_kind;
+
+extern const layout_kind layout_kinds[];
+extern const int layout_kind_count;
+
+void layout_make(const layout_kind *kind, layout_case *out);
+void layout_free(layout_case *layout);
+
+/* Sets the mesh and its fields as the header has them. */
+insitu_status layout_hand_over(insitu_session *session, const char *name, const layout_case *layout);
+
+#endif
