@@ -1,0 +1,56 @@
+/* The functions of Catalyst's table; catalyst_implementation() makes the table itself. */
+#include <catalyst_impl_insitu.h>
+
+#include "catalyst_door.h"
+#include "insitu/conduit.h"
+
+/* Beyond Catalyst's own numbers, for errors of libinsitu. */
+static enum catalyst_status status_of(insitu_status status)
+{
+    return status ? (enum catalyst_status)(100 + (int)status) : catalyst_status_ok;
+}
+
+static void set_string(void *node, const char *path, const char *value)
+{
+    conduit_node_set_path_char8_str((conduit_node *)node, path, value);
+}
+
+static void set_integer(void *node, const char *path, int64_t value)
+{
+    conduit_node_set_path_int64((conduit_node *)node, path, value);
+}
+
+static void set_real(void *node, const char *path, double value)
+{
+    conduit_node_set_path_float64((conduit_node *)node, path, value);
+}
+
+static const catalyst_writer writer = {set_string, set_integer, set_real};
+
+enum catalyst_status catalyst_initialize_insitu(const conduit_node *params)
+{
+    return status_of(catalyst_door_initialize(&insitu_conduit_functions, params));
+}
+
+enum catalyst_status catalyst_execute_insitu(const conduit_node *params)
+{
+    return status_of(catalyst_door_execute(params));
+}
+
+enum catalyst_status catalyst_finalize_insitu(const conduit_node *params)
+{
+    (void)params;
+    return status_of(catalyst_door_finalize());
+}
+
+enum catalyst_status catalyst_about_insitu(conduit_node *params)
+{
+    catalyst_door_about(&writer, params);
+    return catalyst_status_ok;
+}
+
+enum catalyst_status catalyst_results_insitu(conduit_node *params)
+{
+    catalyst_door_results(&writer, params);
+    return catalyst_status_ok;
+}
