@@ -1,4 +1,4 @@
-/* What a cell adds to the segments of rays (kernel_segments.h): its span in subintervals, between surfaces. */
+/* Cuts a cell's interval on each ray into segments (kernel_segments.h), between surfaces. */
 #ifndef RENDER_KERNEL_CELL_SEGMENTS_H
 #define RENDER_KERNEL_CELL_SEGMENTS_H
 
@@ -22,55 +22,55 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* A stretch of a ray in a cell, cut where the transfer function asks for it: for rays on which no number of equal
- * subintervals is enough. A step of the opacity has no slope that would bound what a field that is somewhat off does to
- * the light, and where a curved field barely reaches the step, the length that is beyond it goes as the root of how
- * far: at 800 optical depths a field that is off by 1e-6 of the function's domain changes such a pixel by a tenth. So
- * all of this is in double, from the coordinates and values as they were handed over and from the ray's place in the
- * picture, a ray at a time, and the same for all instruction sets.
+/* Bisection of a ray's interval in a cell, for rays on which no number of equal subintervals is enough. At a step of
+ * the opacity there is no slope that would bound the effect of a small field error on the light. If a curved field
+ * barely reaches the step, the length beyond the step grows with the square root of the excess: at 800 optical depths a
+ * field error of 1e-6 of the function's domain changes such a pixel by a tenth. So all of this is computed in double,
+ * from the caller's coordinates and values and the ray's position in the picture, one ray at a time, and identically
+ * for all instruction sets.
  *
- * Parts. The field is known at a subinterval's ends, quarters and middle; it is off the chord by no more than d, half
- * as much again as it is there (the three see 7/8 of a cubic's). A cubic is off its chord by s (1 - s) (u + q (s -
- * 1/2)), s from 0 to 1, and its slope off the chord's by u + q / 2 at most, at an end. If it is off by no more than e
- * at the middle and the quarters, then |u| <= 4 e, |u| + |q| / 4 <= 16/3 e, and that slope is 32/3 e at most. Where the
- * chord rises by 12 e or more the field is monotone, with something to spare for maps that bend, and so are all
- * subintervals of it. Its values are then those between its ends, otherwise these widened by d. What the subinterval
- * is:
- *   - of one side of each step, and its chord is close enough: a segment;
- *   - monotone, with a step strictly between its ends: cut where the field is that step's value, to rounding;
- *   - anything else: halved, the nearer half first, to the same questions.
- * So a field that barely reaches a step is halved about its extreme alone, until what is about it is of one side, or so
- * short that it does not show.
+ * Subintervals. The field is known at a subinterval's ends, quarters and middle; its deviation from the chord is taken
+ * as at most d, 1.5 times the largest deviation at these (the three sample 7/8 of a cubic's). A cubic deviates from its
+ * chord by s (1 - s) (u + q (s - 1/2)), s from 0 to 1, and its slope deviates from the chord's by at most u + q / 2, at
+ * an end. If the deviation is at most e at the middle and the quarters, then |u| <= 4 e, |u| + |q| / 4 <= 16/3 e, and
+ * the slope's deviation is at most 32/3 e. So if the chord rises by 12 e or more the field is monotone, with a margin
+ * for nonlinear maps, and so is each part of it. Its values then lie between those at its ends, otherwise between these
+ * widened by d. A subinterval that
+ *   - lies on one side of each step and has a chord that is close enough becomes a segment;
+ *   - is monotone, with a step strictly between its ends, is cut where the field has the step's value, to rounding;
+ *   - is neither is halved, and the halves are treated in the same way, the nearer one first.
+ * So a field that barely reaches a step is halved only about its extremum, until the subinterval there lies on one side
+ * of the step or is too short to be visible.
  *
- * The error of a subinterval of length L, T being the light that comes to it from the stretch's begin
- * (docs/development/error_budget.md has the rest). Over the subinterval's values let extinction be from s0 to s1 and
- * change by no more than s' per value, the colour by c', and let R be the colours' contrast. A field that is off by d
- * on average changes extinction by ds <= s' d, and no more than s1 - s0; light in the subinterval falls at least as
- * exp(-s0 t), so that R ds  is seen for no more than min(L, 1 / s0),    s1 dc  for min(s1 L, 1) / s1: error <= R ds
- * min(L, 1 / s0) + dc min(s1 L, 1), times T. It may be 7/8 of the share that equal subintervals have, a = allowance: T
- * error <= 7/8 a (L / reach + T D / (1 + D)),    D = s0 L, The rest is for subintervals that no bisection makes good,
- * about an extreme that touches a step: where T error of one, by s1 - s0 alone, is no more than a 32nd of a (stretch /
- * reach) it is left as it is. A cubic has two extremes, and four such subintervals are in an eighth. */
+ * The error of a subinterval of length L, T being the light that arrives at it from the interval's begin (see also
+ * docs/development/error_budget.md). Over the subinterval's values let extinction range from s0 to s1 and change by at
+ * most s' per value, the colour by c', and let R be the colours' contrast. A field error of d on average changes
+ * extinction by ds <= s' d, and by at most s1 - s0. Light in the subinterval falls at least as exp(-s0 t), so that R ds
+ * is visible over at most min(L, 1 / s0), and s1 dc over min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) + dc min(s1 L,
+ * 1), times T. The error may be 7/8 of the share that equal subintervals have, with a = allowance: T error <= 7/8 a (L
+ * / reach + T D / (1 + D)), D = s0 L. The rest is for subintervals at an extremum that touches a step, for which no
+ * bisection suffices: a subinterval whose T error, from s1 - s0 alone, is at most 1/32 of a (interval / reach) is left
+ * as it is. A cubic has two extrema, and four such subintervals use the remaining eighth. */
 
-/* KERNEL_BISECTION_DEPTH: 2^-40 of a stretch is nothing to any medium. The count of subintervals is a guard that no
- * function in use comes to: what is left of the stretch is then one subinterval each time. */
+/* KERNEL_BISECTION_DEPTH: 2^-40 of an interval is negligible in any medium. KERNEL_BISECTION_SEGMENTS is a guard that
+ * no function in use reaches: after that many segments the rest of the interval is not cut further. */
 enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTION_SEGMENTS = 8192 };
 
 /* ---- the field on a ray ---- */
 
-/* A place of the ray: the field there, and the cell's own coordinates. */
+/* A point of the ray: depth, field, and reference coordinates in the cell. */
 typedef struct kernel_knot {
     double t, v, r[3];
 } kernel_knot;
 
-/* A stretch under way, of one ray. */
+/* State of the bisection of one ray's interval. */
 typedef struct kernel_bisection {
     const kernel_segment_state *state;
     const kernel_span *span;
-    const kernel_exact_map *map; /* NULL: linear, as the interval has it */
-    double u, v, slope, shift;   /* at depth t the ray is at (u, v) (slope t + shift) */
-    kernel_knot in, out;         /* the interval's ends, as the faces have them */
-    double per_t, length, light; /* unit distances per t, of the stretch; what light gets to the subinterval */
+    const kernel_exact_map *map; /* NULL: the field is linear between the interval's ends */
+    double u, v, slope, shift;   /* the ray's position at depth t is (u, v) (slope t + shift) */
+    kernel_knot in, out;         /* the interval's ends, from the crossings of the faces */
+    double per_t, length, light; /* unit distances per t; the interval's length; light that reaches the subinterval */
     int64_t *map_failures;
     int count;
 } kernel_bisection;
@@ -80,7 +80,7 @@ static inline double kernel_between(double from, double to, double share)
     return from + (to - from) * share;
 }
 
-/* The field at depth t from a guess of r, as kernel_solve() has it. */
+/* Returns the point at depth t by Newton's method from `guess`, as kernel_solve() does it. */
 static kernel_knot kernel_knot_at(const kernel_bisection *h, double t, const double guess[3])
 {
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
@@ -110,8 +110,8 @@ static kernel_knot kernel_knot_between(const kernel_bisection *h, const kernel_k
     return kernel_knot_at(h, kernel_between(a->t, b->t, share), guess);
 }
 
-/* Where the field is x, between two knots on either side of it. By regula falsi that halves the value of an end that
- * stays. */
+/* Returns the point between a and b, whose values lie on either side of x, at which the field is x. It uses regula
+ * falsi that halves the value at an end that stays (the Illinois method). */
 static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b, double x)
 {
     kernel_knot low = *a, high = *b, at = *a;
@@ -136,14 +136,14 @@ static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_kno
     return at;
 }
 
-/* ---- what a subinterval may do to the light ---- */
+/* ---- effect of a subinterval on the light ---- */
 
 /* Bounds of the transfer function over some values. */
 typedef struct kernel_medium_range {
     double least, most, slope, colour_slope; /* least, most: of the extinction */
 } kernel_medium_range;
 
-/* -ln(1 - a), from below and from above: the logarithm's series, and ln(1 + x) <= x (6 + x) / (6 + 4 x). */
+/* Lower and upper bound of -ln(1 - a): the logarithm's series, and ln(1 + x) <= x (6 + x) / (6 + 4 x). */
 static inline double kernel_extinction_least(double a)
 {
     return a + 0.5 * a * a;
@@ -180,7 +180,7 @@ static inline void kernel_medium_range_widen(kernel_medium_range *s, const kerne
         s->colour_slope = fmax(s->colour_slope, fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
 }
 
-/* Bounds them between low and high; by the bins' bounds if these are many. */
+/* Returns bounds of the transfer function between low and high, from the bins' bounds if there are many bins. */
 static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double low, double high)
 {
     const double last = KERNEL_BOUND_BINS - 1, begin = (double)t->bin_low, per_bin = (double)t->bound_inverse;
@@ -207,7 +207,7 @@ static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double
     return out;
 }
 
-/* A subinterval: its ends, middle, by how much its field may be off the chord, and its values. */
+/* A subinterval: its end and middle, its bisection depth, and whether the field is known to be monotone on it. */
 typedef struct kernel_subinterval {
     kernel_knot end, middle;
     int depth;
@@ -218,7 +218,8 @@ typedef struct kernel_subinterval_values {
     double off, low, high;
 } kernel_subinterval_values;
 
-/* By the field at its quarters. */
+/* Computes the subinterval's largest sampled deviation from its chord, and the range of its values, from the field at
+ * its middle and quarters. */
 static kernel_subinterval_values kernel_subinterval_look(const kernel_bisection *h, const kernel_knot *from,
                                                          kernel_subinterval *sub, const kernel_knot *first,
                                                          const kernel_knot *third)
@@ -236,7 +237,8 @@ static kernel_subinterval_values kernel_subinterval_look(const kernel_bisection 
     return out;
 }
 
-/* What the subinterval does wrong as a segment, as light; all: whatever its field is off by. */
+/* Returns a bound of the light's error if the subinterval becomes one segment; *all: a bound for any deviation of the
+ * field. */
 static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval_values *sub,
                                        const kernel_medium_range *s, double length, double *all)
 {
@@ -249,7 +251,7 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 
 /* ---- steps ---- */
 
-/* The nearest step strictly between two values; NULL: none. */
+/* Returns the nearest step strictly between two values, or NULL if there is none. */
 static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
     const kernel_step *steps = h->state->pieces->steps + h->span->first_step;
@@ -258,8 +260,7 @@ static const kernel_step *kernel_step_between(const kernel_bisection *h, double 
     return NULL;
 }
 
-/* Pieces end at steps that are rounded to float: of the values there that are beside the step on the same side as
- * inside, the least and the most. */
+/* Range of the float values between the two steps on either side of a value. Pieces end at steps, rounded to float. */
 typedef struct kernel_side_values {
     float low, high;
 } kernel_side_values;
@@ -270,12 +271,12 @@ static kernel_side_values kernel_step_side(const kernel_bisection *h, double ins
     kernel_side_values out = {-3e38f, 3e38f};
     int n = 0;
     for (; n < h->state->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
-    /* A level segment at a step is beyond it; one that is not must not come to be there by rounding. */
+    /* A constant segment at a step's value counts as beyond the step; rounding must not move another segment there. */
     if (n < h->state->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
     return out;
 }
 
-/* A value x in float, on its side, and what that loses. */
+/* Rounds x to float, clamped to its side of the steps; *rest: the rounding error. */
 static void kernel_step_round(const kernel_side_values *side, double x, float *v, double *rest)
 {
     const double active = fmax(fmin(x, (double)side->high), (double)side->low);
@@ -283,7 +284,8 @@ static void kernel_step_round(const kernel_side_values *side, double x, float *v
     *rest = side->low < *v && *v < side->high ? active - (double)*v : 0;
 }
 
-/* The function over the subinterval's values, of which inside is one; step: what is between them. */
+/* Returns bounds of the transfer function over the subinterval's values, of which `inside` is one. step: a step between
+ * them, or NULL. */
 static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, const kernel_subinterval_values *values,
                                                     double inside, const kernel_step *step)
 {
@@ -298,7 +300,7 @@ static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, c
 
 /* ---- segments ---- */
 
-/* From the subinterval's begin to its end, in so many equal subintervals as mixing asks for. */
+/* Emits the subinterval as `subdivisions` equal segments. */
 static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
                                     const kernel_knot *to, const double values[2], double subdivisions)
 {
@@ -318,8 +320,8 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
     }
 }
 
-/* The subinterval as segments on its chord: raised to the field's mean, as equal subintervals are, it might come to
- * values that have not been looked at. */
+/* Adds the subinterval's segments, on its chord. They are not raised to the field's mean, as equal subintervals are,
+ * because they might then reach values that have not been checked. */
 static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
                                    const kernel_subinterval *sub, const kernel_subinterval_values *values,
                                    const kernel_medium_range *s)
@@ -354,7 +356,7 @@ static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, 
     kernel_segments_add(h->state->pieces, list, lane, &i, list->is_double ? &precise : NULL);
 }
 
-/* ---- a stretch ---- */
+/* ---- an interval ---- */
 
 static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval_values *values,
                                        const kernel_medium_range *s, double length, bool is_cut, bool is_monotone)
@@ -367,7 +369,7 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
     return (is_cut || !is_monotone) && h->light * all <= a * h->length / (32 * reach);
 }
 
-/* All subintervals of a stretch whose ends and middle are known. */
+/* Cuts an interval, whose ends and middle are known, into subintervals and adds their segments. */
 static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
                                  kernel_subinterval whole)
 {
@@ -406,7 +408,7 @@ static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane
     }
 }
 
-/* The stretches from t0 to t1 of the rays, as segments; those that begin in the window are kept. */
+/* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
 static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p, const kernel_segment_state *state,
                                                                const kernel_span *span, vm rays, vf t0, vf t1)
 {
@@ -454,16 +456,16 @@ static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p,
 
 /* ---- a cell's segments ---- */
 
-/* A stretch in equal subintervals: the field at three of their ends in turn. */
+/* State of a walk through an interval's equal subintervals: the field at three consecutive ends. */
 typedef struct kernel_parts {
     vf t0, t1, span, count;
-    vf last;                 /* the value at t1 */
-    vf from, to;             /* the current part, */
-    vf before, after, ahead; /* the field at its ends and at the end of the next, */
-    vf bend, next_bend;      /* second differences at its ends */
+    vf last;                 /* field at t1 */
+    vf from, to;             /* ends of the current subinterval */
+    vf before, after, ahead; /* field at these two ends and at the next one */
+    vf bend, next_bend;      /* second differences of the field at the two ends */
 } kernel_parts;
 
-/* The n-th end, and the field there. */
+/* Returns t at the n-th end of the subintervals, and stores the field there. */
 SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_span *span, const kernel_parts *s, vm rays, int n,
                                 vf *value)
 {
@@ -474,8 +476,8 @@ SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_span *span, const
     return t;
 }
 
-/* By how much to raise a subinterval's chord so that the mean along it is the field's: where the field is a parabola,
- * by a twelfth of its second difference, which the subintervals beside it tell; a single subinterval tells none. */
+/* Returns by how much to raise a subinterval's chord so that its mean is the field's: for a parabola a twelfth of its
+ * second difference, which is estimated from the adjacent subintervals. A single subinterval is not raised. */
 SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
 {
     const vf zero = vf_set(0), both = 0.5f * (s->bend + s->next_bend);
@@ -483,7 +485,7 @@ SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
     return bend * (-1.0f / 12);
 }
 
-/* The stretch from t0 to t1 of an interval in double, as one segment where it begins in the window. */
+/* Adds a tet's interval from t0 to t1, in double, as one segment if it begins in the window. */
 SIMD_INLINE void kernel_span_double(kernel_segment_state *state, const kernel_span *span, vm rays, vf t0, vf t1)
 {
     const kernel_interval *i = span->interval;
@@ -496,7 +498,7 @@ SIMD_INLINE void kernel_span_double(kernel_segment_state *state, const kernel_sp
     kernel_segments_add(state->pieces, state->list, vm_and(rays, mine), &sub, &own);
 }
 
-/* The stretch from t0 to t1 as segments; those that begin in the window are kept. */
+/* Adds the segments of the interval from t0 to t1 that begin in the window. */
 SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *state, const kernel_span *span, vm rays,
                                       vf t0, vf t1)
 {
@@ -544,13 +546,13 @@ SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *st
     }
 }
 
-/* The interval's stretches between surfaces that begin in the window. */
+/* Adds the segments of the interval's parts between surfaces, if they begin in the window. */
 SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, const kernel_span *span)
 {
     const kernel_interval *i = span->interval;
     const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
-    /* To be mixed, segments are whole, whatever surfaces this rank knows of: the same on any partition. */
+    /* Segments that are to be mixed are not cut at this rank's surfaces, so that they are the same on any partition. */
     const vf end = vf_min(i->t_out, state->mixing > 0 ? p->clip_out : p->t_far);
     vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
     while (vm_any(open)) {
@@ -563,7 +565,7 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
     }
 }
 
-/* The rays of a tet's interval that surfaces cut, or on which it is to be mixed with others. */
+/* Adds a tet's segments on rays whose interval is cut by surfaces or is to be mixed with others. */
 static __attribute__((noinline)) void kernel_tet_course(kernel_packet *p, kernel_segment_state *state,
                                                         const kernel_cell *c, const kernel_double_cell *double_cell,
                                                         kernel_interval i)
@@ -579,7 +581,7 @@ static __attribute__((noinline)) void kernel_tet_course(kernel_packet *p, kernel
     kernel_span_run(p, state, &span);
 }
 
-/* A tet is one segment, cut by surfaces alone. double_cell is looked at where the list is in double. */
+/* Adds a tet's interval as one segment, which only surfaces cut. double_cell is read only if the list is in double. */
 static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segment_state *state,
                                                           const kernel_cell *c, const kernel_double_cell *double_cell,
                                                           vm rays)
@@ -603,14 +605,14 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     if (!vm_any(mine)) return;
     kernel_double precise;
     if (list->is_double) {
-        /* Many segments whose ends float32 does not tell apart may lie on one ray. */
+        /* One ray may have many segments whose ends are equal in float32. */
         precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
         mine = vm_and(mine, vf_lt(vf_set(0), precise.length));
     }
     kernel_segments_add(state->pieces, list, mine, &i, list->is_double ? &precise : NULL);
 }
 
-/* Cells with quads. map NULL: of one value. */
+/* Adds the segments of a cell with quads. map: NULL if the field is constant. */
 static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, kernel_segment_state *state,
                                                              const kernel_cell *c, const kernel_map *map)
 {
@@ -624,15 +626,15 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
     }
 }
 
-/* Volumes in polyhedra: samples on the profile. */
+/* Volumes in polyhedra are sampled on the piecewise linear profile of the ray. */
 
 SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
 {
     for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
-/* The samples of the window, from begin on to end, that the stay owns and that are in the piece. One that another cell
- * owns too stays the other's, as in kernel_fill(). */
+/* Fills the window's samples begin .. end - 1 that lie in the piece and that the interval owns. A sample that another
+ * cell already owns keeps its value, as in kernel_fill(). */
 static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
                                    const kernel_profile_piece *piece, int begin, int end)
 {
@@ -671,7 +673,7 @@ static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state,
     }
 }
 
-/* The cell in the layer's domain, placed; NULL where it does not show. */
+/* Returns the cell with its values in the layer's domain, transformed; NULL if it is invisible or memory fails. */
 static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int part, uint32_t index)
 {
     const kernel_transfer *transfer = &p->frame->volumes[volume];
@@ -696,7 +698,7 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
     while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, &r, &stay);
 }
 
-/* Segments are the profile's pieces, on which the field is linear: exact. */
+/* Adds the segments of a polyhedron. They are the pieces of the ray's profile, on which the field is exactly linear. */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);

@@ -7,10 +7,10 @@
  * Gauss collocation method), and
  *     colour = length * sum w_j colour(c_j) sigma_j exp(-depth_j),    transmittance = exp(-length * sum w_j sigma_j).
  *
- * Why quadrature and not the closed forms of a linear extinction (erfcx, Dawson): the documented function has opacity
- * linear, and an extinction that is linear between knots follows it to 1e-7 only with some 2,000 knots a ramp, each of
- * which costs a step. Three nodes follow the logarithm itself. The sums have positive terms alone: nothing cancels, be
- * the optical depth 1e-8 or 1e3.
+ * Why quadrature and not the closed forms of a linear extinction (erfcx, Dawson): the documented function has linear
+ * opacity. An extinction that is linear between knots follows it to 1e-7 only with some 2,000 knots per ramp, each of
+ * which costs a step. Three nodes follow the logarithm itself. The sums have only positive terms, so nothing cancels,
+ * whether the optical depth is 1e-8 or 1e3.
  *
  * Errors of a step with 3 nodes, in float: with u = 1 - opacity, |u1 - u0| <= 0.3 u0 makes the remainder of sigma's
  * integral, 5e-7 * 120 (du / u)^6 over the length with u at the middle, less than 1.2e-7 of the step's length in unit
@@ -22,13 +22,13 @@
  * nodes miss only 5 % of its length (the integral of -ln s from 0 to 1 comes out as 0.948), so that none need be
  * shorter than KERNEL_SHORT, in unit distances and as a share of the ray's way in the piece.
  *
- * A ray's place in a piece is kept as its distances to the piece's ends, opacity and 1 - opacity are weighed from both
- * ends, and the length in a piece comes from the values it takes there, not from the places of its ends on the segment:
- * each is then exact to a few units of its own size, where a value and a place on the segment would bring the rounding
- * of 1 to the steepest slope of the function and to its narrowest piece.
+ * A ray's position in a piece is stored as its distances to the piece's two ends, and opacity and 1 - opacity are
+ * interpolated from both ends. The length in a piece is computed from the values that the ray takes there, not from
+ * positions on the segment. Each quantity is then exact to a few units of its own size; a value and a position on the
+ * segment would bring the rounding of 1 to the steepest slope of the function and to its narrowest piece.
  *
- * The file is compiled a second time by the tests on doubles with more nodes (KERNEL_REAL_IS_DOUBLE), which shows
- * that what it computes is the integral and not something near it. */
+ * Tests compile this file a second time for doubles with more nodes (KERNEL_REAL_IS_DOUBLE), to show that it converges
+ * to the integral itself. */
 #ifndef RENDER_KERNEL_INTEGRAL_H
 #define RENDER_KERNEL_INTEGRAL_H
 
@@ -47,8 +47,8 @@ static const struct {
                    {0.30026319f, 0.22222222f, -0.022485417f},
                    {0.26798833f, 0.48042111f, 0.13888889f}}};
 
-/* Returns -ln(1 - a) to a relative 3e-7, for a in [0, 1] and clear = 1 - a as the caller knows it. Where a is small,
- * the rounding of clear is put back to first order. */
+/* Returns -ln(1 - a) with a relative error of 3e-7, for a in [0, 1]. clear: 1 - a, rounded or better. If a is small,
+ * the rounding error of clear is corrected to first order. */
 SIMD_INLINE vf kernel_extinction(vf a, vf clear)
 {
     const vf rest = vf_select(vf_lt(a, vf_set(0.5f)), (1.0f - clear) - a, vf_set(0));
@@ -60,28 +60,28 @@ SIMD_INLINE vf kernel_exp(vf x)
     return vf_exp2(x * 1.4426950f);
 }
 
-/* Where among `swings` the stretch of the values from low to high is, in floats. */
+/* Returns the offset, in floats, of the entry of `swings` for the values from low to high. */
 SIMD_INLINE vi kernel_swing_entry(const kernel_pieces *t, vf low, vf high)
 {
     const vf zero = vf_set(0), last = vf_set(KERNEL_SWING_BINS - 1);
     const vf begin = vf_clamp((low - t->bin_low) * t->swing_inverse, zero, last);
     const vf end = vf_clamp((high - t->bin_low) * t->swing_inverse, begin, last);
-    /* By quarters of an octave of one more than their number of bins. */
+    /* The interval's number of bins plus 1 is classified by quarters of an octave. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
     return (width * KERNEL_SWING_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_swing) / sizeof(float));
 }
 #endif
 
-/* Limits of a step (see above). */
+/* Limits of a step, derived above. */
 #define KERNEL_STEP_DEPTH ((kernel_real)0.35)
 #define KERNEL_STEP_CHANGE ((kernel_real)0.1)
 #define KERNEL_STEP_RATIO ((kernel_real)0.3)
-/* The extinction where the opacity is 1 throughout. */
+/* Extinction of a piece whose opacity is 1 everywhere. */
 #define KERNEL_OPAQUE ((kernel_real)1e6)
-/* Logarithms are taken of no less, and a smaller change of the value counts as none. */
+/* Least argument of logarithms, and least change of a value that counts as a change. */
 #define KERNEL_TINY ((kernel_real)1e-30)
 
-/* A segment's light: its premultiplied colour and its transmittance. */
+/* Light of a segment: premultiplied colour and transmittance. */
 typedef struct kernel_light {
     vf colour[3], depth; /* depth: -ln(transmittance), whose sums round less than products near 1 */
     vf transmittance;
@@ -92,8 +92,9 @@ SIMD_INLINE kernel_light kernel_clear(void)
     return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(0), vf_set(1)};
 }
 
-/* A segment: its length in unit distances, and the values at its ends in the transfer's domain. Each is v + rest, where
- * rest is what v lost to its rounding, as far as that is known: a step or a pole of the function magnifies it. */
+/* A segment: its length in unit distances, and the values at its ends in the transfer function's domain. Each value is
+ * v + rest; rest is the rounding error of v, as far as it is known. It matters as a step or a pole of the function
+ * magnifies it. */
 typedef struct kernel_run {
     vf length, v_in, v_out, rest_in, rest_out;
 } kernel_run;
@@ -103,7 +104,7 @@ SIMD_INLINE kernel_run kernel_run_of(vf length, vf v_in, vf v_out)
     return (kernel_run){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
-/* Pieces that rays are in: most often one for all, which saves the gathers. */
+/* The piece that each ray is in. If all rays share a piece, `common` points to it, which saves the gathers. */
 typedef struct kernel_piece_place {
     vi at;
     const kernel_piece *common;
@@ -123,7 +124,7 @@ SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_pla
     return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
 }
 
-/* A piece's ends. */
+/* Values at a piece's two ends, and their rounding errors. */
 typedef struct kernel_piece_ends {
     vf low, high, low_rest, high_rest;
 } kernel_piece_ends;
@@ -139,7 +140,8 @@ SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const
     return out;
 }
 
-/* The piece that holds value x + rest; at a knot the one above, or (where falling) below. */
+/* Returns the number of the piece that contains x + rest; at a knot the upper one, or the lower one for rays in
+ * `falling`. */
 SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest, vm falling)
 {
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
@@ -163,18 +165,18 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 
 /* A ray's position in a piece. */
 typedef struct kernel_way {
-    vf below, above; /* to the piece's low and high end */
-    vf todo;         /* how far the value goes on in the piece */
-    vf left;         /* the same in unit distances */
-    vf shortest;     /* no step need be shorter, in unit distances */
-    vf edge, rest;   /* the end ahead; at first where the segment begins, and what that lost to rounding */
-    vm is_last;      /* the segment ends before it */
+    vf below, above; /* distances of the value to the piece's low and high end */
+    vf todo;         /* change of the value that is left in this piece */
+    vf left;         /* the length of that change, in unit distances */
+    vf shortest;     /* lower limit of a step's length, in unit distances */
+    vf edge, rest;   /* value and rounding error at the end ahead; initially at the segment's begin */
+    vm is_last;      /* the segment ends in this piece */
 } kernel_way;
 
-/* A segment's properties that all its pieces share. */
+/* Properties of a segment that are the same in all its pieces. */
 typedef struct kernel_leg {
     vm falling, level;
-    vf turn; /* 1 or -1 */
+    vf turn; /* sign of the value's change: 1 or -1 */
     vf v_out, rest_out, length, per_value;
 } kernel_leg;
 
@@ -189,7 +191,7 @@ SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
     return out;
 }
 
-/* Rays of fresh enter their piece where they are. */
+/* Sets the positions of the rays of `fresh`, which enter the piece with `ends`. */
 SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, const kernel_piece_ends *ends)
 {
     const vf v = way->edge, zero = vf_set(0);
@@ -208,7 +210,7 @@ SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fre
     way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
-/* Interpolates from both ends, so that near an end where it is 0 it is as exact as the distance to that end. */
+/* Interpolates from both ends. Near an end with value 0 the result is as exact as the distance to that end. */
 SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -217,12 +219,12 @@ SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf
     return vf_min(from_low + from_high, one);
 }
 
-/* A step on the way. */
+/* One integration step in a piece. */
 typedef struct kernel_stretch {
-    vf opacity, clear; /* at its begin, and 1 - it */
-    vf rise;           /* the opacity's, over the whole way in the piece */
-    vf share;          /* the share of the way that is taken now */
-    vf length;         /* taken now, in unit distances */
+    vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
+    vf rise;           /* change of the opacity over the rest of the piece */
+    vf share;          /* share of the rest of the piece that the step covers */
+    vf length;         /* length of the step, in unit distances */
     vm is_opaque;
 } kernel_stretch;
 
@@ -279,7 +281,8 @@ SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
     return depth;
 }
 
-/* Add a step over which the value changes by move, from below above the piece's low end. */
+/* Adds the light of a step over which the value changes by `move`. below: the value's distance above the piece's low
+ * end at the step's begin. */
 SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_place *at, vm open, vf below, vf move,
                                    const kernel_stretch *st, kernel_light *light)
 {
@@ -296,7 +299,7 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_pl
     light->transmittance = kernel_exp(-light->depth);
 }
 
-/* Add the segment, behind what light holds. */
+/* Integrates the segment and adds it behind the light that `light` holds. */
 SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_run *run, kernel_light *light)
 {
     const kernel_leg leg = kernel_leg_of(run);

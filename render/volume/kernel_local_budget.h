@@ -1,42 +1,45 @@
-/* What segments of a ray in a hex, a wedge or a pyramid make wrong, and so how many there are to be
- * (kernel_local_segments.h has what they are, docs/development/error_budget.md what they may make wrong).
+/* Errors of the segments of a ray in a hex, a wedge or a pyramid, and from these the number of segments
+ * (kernel_local_segments.h defines the segments, docs/development/error_budget.md the allowed error).
  *
- * Let f be the field, v what segments have instead. Light changes by the integral of T g (v - f) along the ray, with g
- * = (s c)' - s' b, where b is the light of all that lies behind. On each segment v - f is of mean zero, but for what
- * the polynomial is off, so that of T g only what varies along the segment counts: the error is at most half the
- * oscillation of T g times the integral of |v - f|. g changes with the value and with b. Over a stretch of values it is
- * at most `cost`, and varies by `swing` while b stays; g is linear in b, so both are known from b's two bounds
- * (kernel_swing). Let D be the segment's depth and R the colours' contrast. Along it T falls by min(D, 1), and b
+ * Let f be the field and v the segments' approximation of it. Light changes by the integral of T g (v - f) along the
+ * ray, with g = (s c)' - s' b, where b is the light from behind. On each segment v - f has mean zero, apart from the
+ * polynomial's own error, so that only the variation of T g along the segment counts: the error is at most half the
+ * oscillation of T g times the integral of |v - f|. g depends on the value and on b. Over a range of values it is at
+ * most `cost`, and varies by `swing` for fixed b; g is linear in b, so both follow from b's two bounds (kernel_swing).
+ * Let D be the segment's depth and R the colours' contrast. Along the segment T falls by min(D, 1), and b changes by R
+ * min(D, 1):
  * changes by R min(D, 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
- * The mean of |v - f| is 0.26 of a parabola's most at the middle, P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at
- * the quarters, 1.09 (0.67 of one chord, which crosses it in the middle; 1.082 at most, times n^2, of n >= 2); and of
- * the quartic's no more than four times E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2.
+ * The mean of |v - f| is: 0.26 P for a parabola, P = |d2| being its maximum, at the middle; 1.09 A for the cubic part,
+ * A = |d3 - d1| / 2 at the quarters (0.67 for one chord, which the cubic crosses in the middle; at most 1.082, times
+ * n^2, for n >= 2); and at most 4 E for the quartic part, E = |(d1 + d3) / 2 - 3/4 d2|. With n equal segments all three
+ * are divided by n^2.
  *
- * What the polynomial itself is off is not of mean zero: 3.1 E on average, but no more than E in the ray's mean. So it
- * costs E, and half the oscillation of T g times 3.1 E, which of one segment the four times E hold; or 3.1 E in all
- * where that is less. What Newton's method leaves counts whole.
+ * The polynomial's own error does not have mean zero. It is 3.1 E on average, but at most E in the ray's mean. So it
+ * costs E, plus half the oscillation of T g times 3.1 E, which the 4 E of a single segment include; or 3.1 E in all if
+ * that is less. The residual of Newton's method counts in full.
  *
- * Bounds are those of the cell's values, and where these ask for more than one segment, of the ray's own, which are a
- * third of them: from the lesser to the greater of those at the faces, on the parabola's side 1.17 P more (the ends of
- * chords are raised by P / 6), and on both 1.7 A (the cubic has 1.03 A, chords' ends 0.67 A more) and 10 E (1.33 E and
- * 0.71 E of the quartic, the rest what the polynomial is off).
+ * Bounds are first taken over the cell's values. If these require more than one segment, they are taken over the ray's
+ * own values, whose range is about a third of the cell's: from the lesser to the greater of the values at the faces,
+ * extended by 1.17 P on the parabola's side (the ends of chords are raised by P / 6), and on both sides by 1.7 A (the
+ * cubic has 1.03 A, chords' ends 0.67 A more) and 10 E (1.33 E and 0.71 E of the quartic, the rest for the polynomial's
+ * error).
  *
- * E may vanish where higher orders do not, and of hexes P and A may as well: values at eight vertices can be such that
- * the field is on its chord at all three places. So E is taken to be no less than 0.01 (P + A) N^2 + e N^2 S, where N
- * is the bend, S the sum of |h| times the bent terms' slopes (kernel_local_deviation.h), and e is 0.0011 in hexes and
+ * E may vanish although higher orders do not, and in hexes P and A may vanish too: values at eight vertices can be such
+ * that the field is on its chord at all three places. So E is taken as at least 0.01 (P + A) N^2 + e N^2 S, where N is
+ * the bend, S the sum of |h| times the nonlinear terms' slopes (kernel_local_deviation.h), and e is 0.0011 in hexes and
  * 0.0004 in wedges. Along a ray in a pyramid the field is a linear function and a piece of a conic section, whose three
- * numbers the three places tell: e is 0. What may hide from the looks is of the fifth order at least, so that of a part
- * of the way, a share of p, 2 p^4 e is enough.
+ * numbers the three places determine: e is 0. A deviation that the three places do not show is of at least the fifth
+ * order, so that 2 p^4 e is enough for a part of the interval with share p.
  *
- * That is measured. Of random rays in 5,000 random cells with bends up to 0.89, and the fields that have E = 0 or all
- * three places on the chord, and their mean as far off as can be, the polynomial's mean was off by no more than 0.54 E
- * on the whole way, 0.57 E on halves, 0.72 E on quarters and 0.36 E on eighths. The field itself was off by 3.1 E on
- * average at most, but for 19 of 133,000 of these fields, 5.8 E, and by 50 E where all of E, P and A were sought to be
- * nothing in hexes that are hardly bent (N < 0.05). What one segment is charged for the mean of |v - f| held in all of
- * them; what several are charged for it is too little there. */
+ * These constants are measured. The test set was random rays in 5,000 random cells with bends up to 0.89, and the
+ * fields that have E = 0, or all three places on the chord, and the largest possible error of the mean. The
+ * polynomial's mean erred by at most 0.54 E on whole intervals, 0.57 E on halves, 0.72 E on quarters and 0.36 E on
+ * eighths. The field itself deviated by at most 3.1 E on average, except for 19 of 133,000 of these fields (5.8 E), and
+ * by 50 E for fields optimized to make E, P and A vanish in hexes that are hardly bent (N < 0.05). The bound of the
+ * mean of |v - f| for one segment held in all of them; the bound for several segments is too small there. */
 #ifndef RENDER_KERNEL_LOCAL_BUDGET_H
 #define RENDER_KERNEL_LOCAL_BUDGET_H
 
@@ -52,32 +55,32 @@
 
 enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32 };
 
-/* The share of the allowed error that Newton's method may leave. */
+/* Share of the allowed error that the residual of Newton's method may use. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Lane by lane, what a field that is off does to the light over the cell's values (kernel_swing). */
+/* Per lane: bounds of the change of light by a field error, over the cell's values (kernel_swing). */
 typedef struct kernel_local_bounds {
     float cost[SIMD_WIDTH];
     float sway[SIMD_WIDTH];
-    float fade[SIMD_WIDTH]; /* cost and R |s'| */
+    float fade[SIMD_WIDTH]; /* cost + R |s'| */
     float extinction[SIMD_WIDTH];
-    float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* the bounds hold between these values */
+    float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* range of values for which the bounds hold */
 } kernel_local_bounds;
 
-/* What the rays in a vector of cells may spend. */
+/* Error budget of the rays in a vector of cells. */
 typedef struct kernel_local_budget {
     const kernel_pieces *pieces;
     float allowance, reach;
     kernel_local_bounds bounds;
     kernel_local_nonlinear nonlinear;
-    float per_t[KERNEL_LOCAL_PIXELS]; /* by packet and lane: unit distances per t */
+    float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances per t, by packet and lane */
 } kernel_local_budget;
 
 /* ---- cells ---- */
 
-/* The lanes' bounds by the values at their vertices. Chords end beyond the cell's values: one chord by no more than
- * three sixteenths of their range (kernel_local_strays()), several by a sixth of the parabola's most, which is less
- * than that range. */
+/* Sets the lanes' bounds from the values at their vertices. The ends of chords may lie outside the cell's values: those
+ * of one chord by at most three sixteenths of the values' range (kernel_local_strays()), those of several by a sixth of
+ * the parabola's maximum, which is less than that range. */
 SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
 {
     const kernel_pieces *t = b->pieces;
@@ -98,7 +101,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     vf_store(b->bounds.extinction, extinction);
     vf_store(b->bounds.low, low);
     vf_store(b->bounds.high, high);
-    /* A share of what the ray's length alone allows. */
+    /* The residual may use a share of the error that the ray's length alone allows. */
     const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(b->nonlinear.sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(b->nonlinear.residual_limit));
     vf_store(b->nonlinear.tolerance, tolerance);
@@ -106,25 +109,25 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
 
 /* ---- rays in cells ---- */
 
-/* A vector of rays, each in its cell. */
+/* A vector of rays, each with its cell. */
 typedef struct kernel_local_pairs {
     kernel_local_rays rays;
     kernel_point ends[2];
     kernel_local_deviations off_chord;
     vm active;
-    vf begin;     /* for the window */
-    vf count;     /* segments */
-    float unseen; /* the share that is taken of kernel_local_nonlinear's */
+    vf begin;     /* begin of the ray's window */
+    vf count;     /* number of segments */
+    float unseen; /* factor of kernel_local_nonlinear.unseen */
 } kernel_local_pairs;
 
-/* By how much one chord is raised to the field's mean. */
+/* Returns by how much a single chord is raised so that its mean is the field's. */
 SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
 {
     const vf *d = p->off_chord.field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
 }
 
-/* Rays of which one chord would end among values that have not been looked at. */
+/* Returns the rays whose single chord would end outside the values over which the bounds hold. */
 SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
@@ -133,13 +136,13 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_lo
                  vf_lt(kernel_take(b->bounds.high, p->rays.lane), high));
 }
 
-/* What makes one segment for all of a ray's way through its cell wrong. */
+/* Error terms if one segment replaces a ray's whole interval in its cell. */
 typedef struct kernel_local_wrong {
-    vf mean;    /* how far it is off in the mean: by that over the square of their number, if there are more */
+    vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
     vf quartic; /* E */
-    vf unknown; /* what Newton's method leaves */
+    vf unknown; /* residual of Newton's method */
     vf length;  /* unit distances */
-    vf fade;    /* what T and b make g vary by */
+    vf fade;    /* variation of g caused by T and b */
 } kernel_local_wrong;
 
 SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kernel_local_pairs *p,
@@ -159,14 +162,14 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kerne
     out->fade = kernel_take(b->bounds.fade, lane) * depth;
 }
 
-/* What one segment makes wrong a unit distance: by what varies along it, and by its mean. */
+/* Returns the error of one segment per unit distance: the part that varies along it, and the part of its mean. */
 SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, vf cost)
 {
     const vf half = vf_min(0.5f * (sway + w->fade), cost);
     return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
 }
 
-/* The bounds over the ray's own values: of the field and of chords (see above). */
+/* Computes the bounds over the ray's own values, of the field and of chords (see the top of this file). */
 SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic, vf *sway,
                                         vf *cost)
 {
@@ -177,7 +180,7 @@ SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_loc
     vf_gather_pair(&t->swings->swing, kernel_swing_entry(t, low, high), sway, cost);
 }
 
-/* Into how many segments, and the rays for which no number will do. */
+/* Sets the number of segments per ray; returns the rays for which no number is enough. */
 static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_tile_trace *t,
                                                                 const kernel_local_budget *b,
                                                                 const kernel_local_wrong *wrong, vf least,
@@ -191,7 +194,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
     kernel_local_own_bound(b->pieces, p, wrong->quartic, &sway, &cost);
-    /* A unit distance. */
+    /* Per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
     const vm few = vf_le(kernel_local_wrong_by_one(wrong, sway, cost), allowed);
     const vf half = vf_min(0.5f * (sway + wrong->fade), cost), made = half * wrong->mean;
@@ -202,8 +205,8 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
     return vm_andnot(fails, few);
 }
 
-/* As above, but asks first by the ray's length alone, and by the bounds over all of the cell's values, whether one
- * segment is enough. */
+/* As kernel_local_count_by_depth(), but first checks, with the ray's length alone and the bounds over all of the cell's
+ * values, whether one segment is enough. */
 SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_budget *b, kernel_local_pairs *p)
 {
     kernel_local_wrong wrong;

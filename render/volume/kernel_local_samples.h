@@ -1,14 +1,14 @@
-/* Samples of volumes, one a lane, whatever their cells and rays. A cell of a few pixels leaves most of a packet without
- * anything to do, and a sample's value takes an inverse map; so samples of several cells are put side by side:
+/* Samples of volumes, one per lane, of any rays and cells. A cell of a few pixels leaves most lanes of a packet idle,
+ * and a sample's value takes an inverse map; so samples of several cells are put side by side:
  *
  *     cells of one type       where are they, and what map have they?     kernel_local.h
  *     pixels of their boxes   which samples may be in the cell?           by planes about it
  *     samples                 where in the cell, and what is the field?   Newton's method
  *
- * A sample belongs to the cell that has it inside by the cell's own coordinates. Faces are where one of
- * these is at its end, and so that is what the crossings of faces say, but for rounding: samples near a face are
- * decided by these (kernel_crossings.h), which neighbours have in common to the bit. Cells that are bent too much go
- * that way whole. */
+ * A sample belongs to the cell that contains it by the cell's reference coordinates. At a face one of these is at its
+ * limit, so that the crossings of faces give the same result up to rounding: for samples near a face the crossings
+ * decide (kernel_crossings.h), as neighbouring cells share their bits. For cells that are bent too much the crossings
+ * decide all samples. */
 #ifndef RENDER_KERNEL_LOCAL_SAMPLES_H
 #define RENDER_KERNEL_LOCAL_SAMPLES_H
 
@@ -33,36 +33,37 @@
 typedef struct kernel_tile_ray_samples {
     kernel_samples samples;
     kernel_blend blend;
-    vm active; /* the packet's, whose own is narrowed to the rays that are lit */
+    vm active; /* the packet's active rays; the packet's own mask is narrowed to lit rays */
 } kernel_tile_ray_samples;
 
 enum {
     KERNEL_LOCAL_SAMPLES = 1024,
     KERNEL_TILE_PIXELS = KERNEL_TILE * KERNEL_TILE,
-    KERNEL_LOCAL_LANE = 8,   /* a sample's bits: its pixel in the tile from the first on, its cell's lane from here, */
-    KERNEL_LOCAL_NUMBER = 16 /* and its number in the window from here */
+    /* bits of a sample: its pixel in the tile from bit 0 on, its cell's lane from this bit on, */
+    KERNEL_LOCAL_LANE = 8,
+    KERNEL_LOCAL_NUMBER = 16 /* its number in the window from this bit on */
 };
 
 typedef struct kernel_local_batch {
-    kernel_tile_ray_samples *packets; /* the tile's */
+    kernel_tile_ray_samples *packets; /* the tile's packets */
     kernel_local_lanes lanes;
-    int first, count; /* the window's samples */
+    int first, count; /* range of the window's sample numbers */
     kernel_pixel_list rays;
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
-    /* By packet and lane: the first sample of all and the step side by side, and where the window ends the ray. */
+    /* By packet and lane: depth of sample 0 and the step, side by side; and where the window ends on the ray. */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
     float pad; /* kernel_samples.pad */
 } kernel_local_batch;
 
-/* Are cells of this type for lanes in this frame? Not beside surfaces, where ranks ask which cells touch and so for the
- * ends of intervals (kernel_blend_breaks()), nor where samples are kept apart. */
+/* Returns whether cells of this type are sampled in lanes. Not if there are surfaces, for which the intervals' ends are
+ * needed (kernel_blend_breaks()), nor if samples are separate. */
 SIMD_INLINE bool kernel_local_fits(const kernel_frame *f, int type)
 {
     return !f->surface_count && !f->job->separate_samples && kernel_local_queue_of(type) >= 0;
 }
 
-/* The window's samples, of packets that are ready for it, of the volume. */
+/* Begins the volume's samples of a window for which the packets of the blocks are set up. */
 SIMD_INLINE void kernel_local_begin(const kernel_tile_trace *t, kernel_local_batch *b, kernel_tile_ray_samples *packets,
                                     unsigned blocks, int volume, kernel_tile_take *take)
 {
@@ -89,7 +90,8 @@ SIMD_INLINE void kernel_local_begin(const kernel_tile_trace *t, kernel_local_bat
 
 /* ---- samples ---- */
 
-/* A sample near the border is the cell's or not by the crossings of its faces. */
+/* Decides by the crossings of the cell's faces whether a sample near its border belongs to the cell, and if so sets its
+ * value. */
 static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trace *t, kernel_local_batch *b,
                                                                 const kernel_local_queue *q, int lane, int at,
                                                                 int number)
@@ -106,7 +108,7 @@ static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trac
         kernel_fill_some(p, &state, cells->cell.is_constant ? NULL : &cells->map, &list[k], number, number + 1);
 }
 
-/* Gives those of a vector of samples, from n on, that are inside their cells their values. */
+/* Computes the values of a vector of samples, from index n on, that lie inside their cells. */
 SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batch *b, const kernel_local_queue *q,
                                          int type, int n)
 {
@@ -176,14 +178,15 @@ SIMD_INLINE void kernel_local_fill(kernel_tile_trace *t, kernel_local_batch *b, 
 
 /* ---- pixels ---- */
 
-/* The window's sample to begin with, of its number negated. Rays that miss the window may have any number: they begin
- * beyond its last sample, so that no lane's number is too large for an int. */
+/* Returns the first sample number in the window, from the negated number of the interval's first sample. Rays that miss
+ * the window may have any number; they get the number behind the last sample, so that no lane's number overflows an
+ * int. */
 SIMD_INLINE vf kernel_local_first(const kernel_local_batch *b, vf negated)
 {
     return vf_min(vf_max(-negated, vf_set(0)), vf_set((float)b->count));
 }
 
-/* The samples that rays from n on may have in their cells. */
+/* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
 SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batch *b, int type, int n)
 {
     const int left = b->rays.count - n;
@@ -233,7 +236,7 @@ static __attribute__((noinline)) unsigned kernel_local_fetch_any(kernel_local_ba
     return KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
 }
 
-/* The first cells that wait in a queue. */
+/* Processes the first cells of a queue. */
 static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_batch *b, int queue)
 {
     kernel_local_queue *q = &b->lanes.queues[queue];
@@ -265,7 +268,7 @@ SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_batch *b)
         while (b->lanes.queues[i].count) kernel_local_run(t, b, i);
 }
 
-/* A cell of a type that fits waits. */
+/* Queues a cell of a type for which kernel_local_fits() is true. */
 SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_batch *b, int part, int type, uint32_t cell,
                                    unsigned blocks, unsigned box)
 {

@@ -1,21 +1,4 @@
-/* Segments of hexes, wedges and pyramids, a ray and its cell a lane (kernel_segments.h has what segments are for):
- *
- *     cells                    where are they, and what map have they?     kernel_local.h
- *     pixels of their boxes    may the ray meet the cell in the window?    by planes about it
- *     rays in cells            where do they come in and go out?           kernel_local_crossings.h
- *     and                      what is the field between?                  kernel_local_deviation.h
- *
- * Rays that cross not just two faces once each, or are cut by clips or surfaces, and cells among whose values opacity
- * steps or rises steeply, go the way of other cells (kernel_cell_segments.h).
- *
- * The field along the ray. At the first quarter, the middle and the third quarter it is off the chord between its
- * values at the faces by d1, d2 and d3. It is taken for the polynomial through all five values, for u from -1/2 to 1/2
- *
- *     d = (1/4 - u^2) (a + b u + c u^2),   a = 4 d2,   b = 32/3 (d3 - d1),   c = 16 (8/3 (d1 + d3) - a),
- *
- * and segments are its chords, each raised or lowered to the polynomial's mean. How many, kernel_local_budget.h says.
- * Where it says that no number is enough, because the polynomial itself may be off by too much, the ray's way is
- * halved, quartered or cut in eighths, and each part has a polynomial through five values of its own. */
+/* Segments of hexes, wedges and pyramids, one ray-cell pair per lane (kernel_segments.h explains segments): */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -46,16 +29,16 @@ typedef struct kernel_tile_ray_segments {
     kernel_segments list;
     kernel_segment_state state;
     kernel_blend blend;
-    vf t_last; /* where the ray ends: at what is opaque, or behind all cells */
-    vm active; /* the packet's, whose own is narrowed to the rays that are under way */
+    vf t_last; /* where the ray ends: at an opaque surface, or behind all cells */
+    vm active; /* the packet's active rays; the packet's own mask is narrowed to rays that have not ended */
 } kernel_tile_ray_segments;
 
 /* Adds the cell's segments on the packet's active rays. map is NULL for a constant field. */
 typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
                                       const kernel_map *map);
 
-/* Rays that have come so far, a word each: the pixel in the tile from the first bit on, the cell's lane from
- * KERNEL_LOCAL_CELL on, and the faces that are crossed from KERNEL_LOCAL_FACES on, three bits each. */
+/* Rays that have passed a stage, one word each: bits of the pixel in the tile from bit 0 on, of the cell's lane from
+ * KERNEL_LOCAL_CELL on, and of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
 typedef struct kernel_local_list {
     int count;
     float words[KERNEL_LIST_ROOM];
@@ -64,25 +47,25 @@ typedef struct kernel_local_list {
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
 typedef struct kernel_local_stretches {
-    kernel_tile_ray_segments *packets; /* the tile's */
-    unsigned blocks;                   /* that are under way */
-    kernel_ray_segments_take *alone;   /* takes rays that are not for lanes */
+    kernel_tile_ray_segments *packets; /* the tile's packets */
+    unsigned blocks;                   /* blocks of the current window */
+    kernel_ray_segments_take *alone;   /* processes rays on the scalar path */
     kernel_local_lanes lanes;
     kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_pixel_list rays;
-    kernel_local_list met, crossed[2]; /* crossed: by whether the first of the two faces is a triangle */
-    /* By packet and lane: where the window begins and ends, side by side; the same of the ray. */
+    kernel_local_list met, crossed[2]; /* crossed: two lists, [1] for rays whose first crossed face is a triangle */
+    /* By packet and lane, side by side: begin and end of the window, and of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_local_stretches;
 
-/* Are segments of cells of this type for lanes in this frame? */
+/* Returns whether segments of cells of this type are computed in lanes in this frame. */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
     return kernel_segments_fit(f) && f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
 }
 
-/* The packets' windows. */
+/* Copies the packets' windows and the limits of their rays into arrays per pixel. */
 static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
                                         kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
                                         kernel_ray_segments_take *alone)
@@ -113,7 +96,8 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local
     }
 }
 
-/* One of the lane's rays has a segment, which does not begin before the window. */
+/* Adds a segment to the list of the ray at `at`, if it begins before the window's end. It must not begin before the
+ * window. */
 SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const kernel_segment *s)
 {
     kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
@@ -126,7 +110,8 @@ SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const
     kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
 }
 
-/* The polynomial's deviation, and its integral from the middle on. */
+/* Coefficients of the polynomial; kernel_local_deviation() returns it at u, kernel_local_primitive() its integral from
+ * 0 to u. */
 typedef struct kernel_local_polynomial {
     vf a, b, c;
 } kernel_local_polynomial;
@@ -143,7 +128,7 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
     return u * odd + p->b * square * (0.125f - 0.25f * square);
 }
 
-/* A segment a lane, of rays in their windows. */
+/* Adds one segment per lane, on the given rays. ends: t_in, t_out, v_in, v_out. */
 SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
@@ -156,7 +141,7 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places
     }
 }
 
-/* Makes the segments of rays for which one is enough. */
+/* Adds the segments of rays for which one segment is enough. */
 SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
@@ -164,7 +149,7 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const ke
     kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
 
-/* Makes those of the other rays. */
+/* Adds the segments of rays that need several. */
 static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
                                                              const kernel_local_pairs *p, vm rays)
 {
@@ -203,7 +188,8 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel
 
 enum { KERNEL_LOCAL_PARTS = 8 };
 
-/* Ways in equal parts, one after the other: of the parts' ends t and v are their own, r the whole way's. */
+/* A division of intervals into equal parts, in order. In the ends of each part, t and v are the part's own and r is the
+ * whole interval's. */
 typedef struct kernel_local_division {
     kernel_local_chord chord;
     kernel_local_part at; /* the end of the last part */
@@ -228,8 +214,8 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
     }
 }
 
-/* Segments of rays on which one polynomial does not tell enough: halves, quarters or eighths of their ways have one
- * each. Returns those of which these do not either. */
+/* Adds the segments of rays for which one polynomial is not accurate enough: halves, quarters or eighths of their
+ * intervals get a polynomial each. Returns the rays for which eighths are not accurate enough either. */
 SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_stretches *b,
                                      const kernel_local_pairs *whole, vm rays, int type)
 {
@@ -258,7 +244,7 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 
 /* ---- rays ---- */
 
-/* Rays that are for the cell alone. */
+/* Processes the wanted rays cell by cell on the scalar path. */
 static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                   const kernel_local_queue *q,
                                                                   const kernel_local_rays *rays, unsigned wanted)
@@ -293,7 +279,7 @@ SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi word
     list->count += vf_compress(list->words + list->count, rays, vf_from_bits(words));
 }
 
-/* The rays of a list from n on; returns the lanes that have one. */
+/* Loads the rays of a list from index n on; returns the lanes that have one. */
 SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
                                       kernel_local_rays *rays)
 {
@@ -304,7 +290,8 @@ SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kerne
     return all;
 }
 
-/* Lists those of a vector of rays that cross two faces of their cells. */
+/* Lists the rays of a vector, from index n on, that cross two faces of their cells; processes doubtful ones on the
+ * scalar path. */
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_stretches *b,
                                              const kernel_local_queue *q, int type, int n)
 {
@@ -320,7 +307,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     if (__builtin_expect(vm_any(crossed.alone), 0)) kernel_local_segments_alone(t, b, q, &rays, vm_bits(crossed.alone));
 }
 
-/* The segments of rays from n on that cross two faces. */
+/* Adds the segments of rays from index n on that cross two faces. */
 SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
                                              const kernel_local_queue *q, const kernel_local_list *list, int type,
                                              int n)
@@ -347,7 +334,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
 }
 
-/* Lists those of the rays from n on that may meet their cells in the window. */
+/* Lists the rays from index n on that may meet their cells in the window. */
 SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
 {
     const int left = b->rays.count - n;
@@ -408,7 +395,8 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* ---- batches ---- */
 
-/* Places the queue's cells; returns those that show, and in lanes those of them that are for lanes. */
+/* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
+ * processed in lanes. */
 SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, kernel_local_stretches *b,
                                                     unsigned *lanes, int type)
 {
@@ -420,7 +408,7 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
     return showing;
 }
 
-/* Lanes of cells among whose values are steps of the opacity or steep ramps. */
+/* Returns the lanes whose cells have a step of the opacity or a steep ramp among their values. */
 SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
 {
     const kernel_segment_state state = {.pieces = b->pieces};
@@ -441,7 +429,7 @@ static __attribute__((noinline)) unsigned kernel_local_segments_place(const kern
     return showing;
 }
 
-/* The farthest of the block's rays' ends of the window. */
+/* Returns the farthest end of window of the block's active rays. */
 SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kernel_tile_ray_segments *packets,
                                           int block)
 {
@@ -453,7 +441,7 @@ SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kern
     return vf_reduce_max(end);
 }
 
-/* Blocks of which windows have ended early meanwhile end there. */
+/* Lowers the far limit of the blocks in which a ray's window has been shortened. */
 SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_stretches *b)
 {
     for (unsigned blocks = b->blocks; blocks; blocks &= blocks - 1) {
@@ -469,7 +457,7 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
     }
 }
 
-/* Traces the first cells of a queue. */
+/* Processes the first cells of a queue. */
 static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                 int queue)
 {
@@ -502,7 +490,7 @@ SIMD_INLINE void kernel_local_segments_end(kernel_tile_trace *t, kernel_local_st
         while (b->lanes.queues[i].count) kernel_local_segments_run(t, b, i);
 }
 
-/* Queues a cell of a type that fits. */
+/* Queues a cell of a type for which kernel_local_segments_fit() is true. */
 SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_stretches *b, int part, int type,
                                             uint32_t cell, unsigned blocks, unsigned box)
 {

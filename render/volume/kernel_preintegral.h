@@ -1,33 +1,34 @@
-/* Emission and absorption along a segment by sums over the transfer function's values, where an error may be made
- * (max_error). Along a segment of length L on which the field goes from v0 to v1, optical depth and emission (as if
- * nothing absorbed it) are
+/* Emission and absorption along a segment by sums over the transfer function's values, if an error is allowed
+ * (max_error). Along a segment of length L on which the field goes from v0 to v1, optical depth and emission (without
+ * absorption) are
  *     D = L (S(v1) - S(v0)) / (v1 - v0),    E = L (K(v1) - K(v0)) / (v1 - v0),
- * S and K being the integrals of the extinction s and of s times the colour c over the values (Max, Hanrahan and
- * Crawfis 1990; Engel, Kraus and Ertl 2001): two ends are looked up, and what is between them costs nothing, be it ever
- * so many knots. Neighbouring segments share an end.
+ * where S and K are the integrals of the extinction s, and of s times the colour c, over the values (Max, Hanrahan and
+ * Crawfis 1990; Engel, Kraus and Ertl 2001). Two ends are looked up; the cost does not depend on the number of knots
+ * between them. Neighbouring segments share an end.
  *
- * What the segment itself absorbs of E. Were the colour c its mean E / D throughout, the light would be A E / D, with
- * A = 1 - exp(-D). What that is too much by is the integral of c (m - exp(-t)) dt over the depth t from 0 to D, m = A /
- * D. The bracket is negative first and positive then, so that of all c of a range R the one that leaps from the least
- * to the most where it is zero makes the most of it: R (1 - m + m ln m), which for u = 1 - m is R u^2 (1 / 2 + u / 6 +
- * u^2 / 12 + ...) <= R U / 2, U = u^2 (1 + u). If c runs in a line over the values, from c0 to c1, it is monotone in t
- * however the depth is spread, so that the excess is between 0 and (c1 - c0) U / 2: half of that is taken off, and no
- * more than |c1 - c0| U / 4 is wrong. Of a c that is off that line by no more than b, b U is missed beside that.
+ * How much of E the segment itself absorbs. If the colour c were E / D throughout, the light would be A E / D, with A =
+ * 1 - exp(-D). The excess of this is the integral of c (m - exp(-t)) dt over the depth t from 0 to D, m = A / D. The
+ * bracket is negative first, then positive. So among all c with values in a range R, the integral is largest if c jumps
+ * from its minimum to its maximum where the bracket is zero. It is then R (1 - m + m ln m), or with u = 1 - m: R u^2 (1
+ * / 2 + u / 6 + u^2 / 12 + ...) <= R U / 2, U = u^2 (1 + u). If c is linear in the value, from c0 to c1, it is monotone
+ * in t however the depth is distributed, so that the excess is between 0 and (c1 - c0) U / 2: half of that is
+ * subtracted, and the error is at most |c1 - c0| U / 4. If c deviates from that line by at most b, the error grows by b
+ * U.
  *
- * The deviation b from a chord over an interval of width h: a bend of the colour table by k at x in it adds k times at
- * most (x - low) (high - x) / h, which over bends a distance d apart sums to k (h^2 / (6 d) + h / 4), and at the ends
- * of the table, beyond which colours are constant, to k h / 4 more.
+ * The deviation b from a chord over an interval of width h: a bend of the colour table by k at x in the interval adds
+ * at most k (x - low) (high - x) / h, which over bends a distance d apart sums to k (h^2 / (6 d) + h / 4). At the ends
+ * of the table, beyond which colours are constant, a bend adds k h / 4 more.
  *
- * The tables. S and K are exact at the borders of bins and linear within: in a bin whose extinction varies by o it is
- * off by no more than o, and S / w by o / 4, w the bin's width. So the mean over an interval of n bins is off by no
- * more than the sum of both ends' o times min(1, 1 / (2 n)). K likewise. S and K are whole numbers, whose differences
- * are exact; their own rounding is in o. The mean is taken as one of positive terms, so that nothing cancels however
- * close the two ends are.
+ * The tables. S and K are exact at the borders of bins and linear within. In a bin of width w whose extinction varies
+ * by o, the linear extinction errs by at most o, and S / w by o / 4. So the mean over an interval of n bins errs by at
+ * most the sum of both ends' o times min(1, 1 / (2 n)); the same holds for K. S and K are stored as integers, so that
+ * their differences are exact; o includes their rounding. The mean is computed as a sum of positive terms, so that
+ * nothing cancels however close the two ends are.
  *
- * The budget (docs/development/error_budget.md). A segment may be wrong by 0.15 max_error A + 0.05 max_error L / reach,
- * both times the light that gets there: summed over a ray no more than 0.2 max_error. A segment for which that does not
- * suffice is cut into subintervals, equal in values; what is wrong of the absorption falls with the square of their
- * number. Where they would be too many, and where a bin is not fine enough, kernel_integrate() has it. */
+ * The budget (docs/development/error_budget.md). A segment may err by 0.15 max_error A + 0.05 max_error L / reach, both
+ * times the light that arrives there: summed over a ray at most 0.2 max_error. If that does not suffice, the segment is
+ * cut into subintervals of equal value ranges; the error of the absorption falls with the square of their number. If
+ * too many would be needed, or a bin is too coarse, kernel_integrate() computes the segment. */
 #ifndef RENDER_KERNEL_PREINTEGRAL_H
 #define RENDER_KERNEL_PREINTEGRAL_H
 
@@ -35,20 +36,21 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* The most subintervals of a segment. */
+/* Maximum number of subintervals of a segment. */
 #define KERNEL_PRE_PARTS 32.0f
 
-/* A ray's place in the tables. */
+/* A value's position in the tables. */
 typedef struct kernel_pre_end {
-    vf value, bin, place; /* place in the bin: beyond 0 and 1 in the first and the last */
-    vf own[4], rough;     /* the bin's own sums: of the extinction, and of the emission */
-    vi before[4], colour; /* those of the bins before it */
+    vf value, bin, place; /* place: position in the bin, 0 .. 1; may be outside in the first and the last bin */
+    vf own[4], rough;     /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
+    vi before[4], colour; /* before: the sums of all earlier bins */
 } kernel_pre_end;
 
 /* A segment, or a subinterval of it. */
 typedef struct kernel_pre_subinterval {
     vf colour[3], depth, absorbed;
-    vf error, rough, allowed; /* error: of the absorption within; rough: of the tables */
+    /* error: of the absorption within the segment; rough: of the tables; allowed: the budget */
+    vf error, rough, allowed;
 } kernel_pre_subinterval;
 
 SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_pre_end *e)
@@ -70,7 +72,7 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
     e->colour = vi_from_bits(rest[0]);
 }
 
-/* 1 - exp(-y), and that over y. Near 0 by its own series, whose first term left out is y^6 / 5040. */
+/* Returns 1 - exp(-y); *share: that divided by y. Near 0 it uses the series, whose first omitted term is y^6 / 5040. */
 SIMD_INLINE vf kernel_gone(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
@@ -93,7 +95,7 @@ SIMD_INLINE vf kernel_pre_channel(const kernel_preintegral *t, vi colour, int ch
     return vf_from_vi(colour >> (10 * channel) & 1023) * t->colour_unit;
 }
 
-/* Bounds how far a channel of the colour is off its chord between two values. */
+/* Returns an upper bound of the deviation of a colour channel from its chord between two values. */
 SIMD_INLINE vf kernel_pre_bend(const kernel_preintegral *t, vf v0, vf v1)
 {
     const vf width = vf_abs(v1 - v0), low = vf_min(v0, v1), high = vf_max(v0, v1);
@@ -132,8 +134,8 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
 
-/* Integrates the segment in count subintervals, equal in values. Each ray has its own count and so does not depend on
- * its neighbours. */
+/* Integrates the segment in `count` subintervals of equal value ranges. Each ray has its own count, and so its result
+ * does not depend on other lanes. */
 static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preintegral *t, const kernel_pre_end *from,
                                                            vf v_out, vf length, vf count, int most,
                                                            kernel_pre_subinterval *all)
@@ -173,7 +175,7 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_subinterval 
     return out;
 }
 
-/* Integrates the rays for which one subinterval is too coarse. */
+/* Integrates the rays for which one subinterval is not accurate enough. */
 static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
                                                         const kernel_pre_end *from, const kernel_run *run,
                                                         const kernel_pre_subinterval *whole, kernel_light *light)
@@ -200,8 +202,8 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }
 
-/* Returns what kernel_integrate() gives for the segment alone, within the budget. end holds where the rays' last
- * segments ended and is moved to where this one ends. */
+/* Returns the result of kernel_integrate() for the segment alone, within the error budget. *end: the end of the rays'
+ * last segments; it becomes the end of this one. */
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_run *run,
                                               kernel_pre_end *end)
 {

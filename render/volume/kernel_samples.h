@@ -1,8 +1,8 @@
-/* Samples of volumes in one cell (thesis, section 4.4). In a cell the rays' intervals are found once, and each of the N
- * samples that an interval owns, t_in <= t < t_out, gets its value.
+/* Samples of volumes in one cell (thesis, section 4.4). In a cell the rays' intervals are computed once, and each
+ * sample that an interval owns, t_in <= t < t_out, gets its value.
  *
- * A sample's place depends on its number and its ray alone, so that every rank means the same samples; each sample has
- * one owner, for neighbours share the bits of t at their face. Only where cells overlap has it several. */
+ * A sample's position depends only on its number and its ray, so that all ranks use the same samples. Each sample has
+ * one owner, as neighbouring cells share the bits of t at their face; only if cells overlap it has several. */
 #ifndef RENDER_KERNEL_SAMPLES_H
 #define RENDER_KERNEL_SAMPLES_H
 
@@ -20,20 +20,20 @@
 #include "render_face_error.h"
 #include "simd.h"
 
-/* The light left in front of a place below which what is there and behind it is left out. From there on colours of at
- * most 1 are seen through that much, with what is left out and without it, so that a channel is off by no more: a tenth
- * of the 1e-6 that partitions may differ by, of which rounding takes most. A rank counts its own cells alone. Other
- * ranks' only take more light, so that it leaves out less than one rank would that has all, and the bound holds of all
- * ranks together: the first place that any of them leaves out has no more light than its own cells leave. */
+/* Light below which a rank drops a sample and everything behind it. Colours of at most 1 change by at most this much
+ * light, so that a channel errs by at most this: a tenth of the 1e-6 by which partitions may differ, of which rounding
+ * takes most. A rank counts only its own cells. Other ranks' cells absorb more light, so a rank drops less than one
+ * rank with all cells would, and the bound holds for all ranks together: at the first sample that any rank drops, its
+ * own cells already leave no more light than this. */
 #define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
-/* The samples of a window: NaN where this rank has none. */
+/* The samples of a window; NaN if this rank has none. */
 typedef struct kernel_samples {
     int first, count;
-    float pad; /* numbers of samples are known to so much */
+    float pad; /* error bound of sample numbers that are computed from t */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* the owning interval's ends; only if contact matters */
-    vf marked; /* where the rays' nearest sample with two owners is, of those of this window and before */
+    vf marked; /* depth of the ray's nearest sample with two owners, in this window and earlier ones */
 } kernel_samples;
 
 typedef struct kernel_volume_state {
@@ -46,9 +46,9 @@ SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
     return p->sample_base + p->sample_step * (float)m;
 }
 
-/* Sets the window to samples first .. first + count - 1. A number found from t has three roundings; a t found from the
- * number m has one of step * m and one of t. So they are apart by no more than 6e-8 (4 m + t / step), and t / step is
- * at most m + base / step. */
+/* Sets the window to samples first .. first + count - 1. A number computed from t has three roundings; a t computed
+ * from the number m has two, of step * m and of t. So they differ by at most 6e-8 (4 m + t / step), and t / step is at
+ * most m + base / step. */
 SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
 {
     const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
@@ -57,7 +57,7 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
     s->pad = 1e-4f + 4e-7f * ((float)((first < 0 ? -first : first) + count) + base);
 }
 
-/* Finds the window's samples, as indices into it, that may be in the interval of some ray. */
+/* Finds the window's samples that may be in the interval of some ray, as indices begin .. end - 1 into the window. */
 SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
                                     int *begin, int *end)
 {
@@ -72,9 +72,10 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     *end = (int)last;
 }
 
-/* Emits a sample as a fragment of its own, in front of opaque surfaces. Samples that another cell owns too mark their
- * ray (render.h). Only the nearest of them counts, as others may be behind another rank's opaque surface; a clear one
- * beside it makes sure that it overlaps something. cell: the ray's interval in the sample's cell. */
+/* Emits a sample as a fragment of its own, in front of opaque surfaces. If another cell already owns the sample, this
+ * marks the ray as overlapping (render.h). Only the nearest such sample is emitted, as others may be behind another
+ * rank's opaque surface; a clear fragment is emitted with it, so that there is something that it overlaps. cell: the
+ * ray's interval in the sample's cell. */
 static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
@@ -104,7 +105,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     kernel_emit(p, mask, kind, &sample);
 }
 
-/* Fills those of the window's samples begin .. end - 1 that are in the interval. A sample keeps its first owner. */
+/* Fills those of the window's samples begin .. end - 1 that are in the interval. A sample keeps its first owner's
+ * value. */
 SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
                                   const kernel_interval *i, int begin, int end)
 {
@@ -144,19 +146,20 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
-/* The open fragment on each ray. */
+/* The current fragment of each ray, to which samples or segments are added. */
 typedef struct kernel_blend {
     vm open;
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
-    vf depth, lost[3]; /* for segments: -ln(transmittance), and what colour has lost to rounding */
-    vf light;          /* what reaches this rank's next sample through all its samples so far */
-    /* Used where all samples and segments go to the fold (render_fold.h): the last one's stretch, and the light that
-     * passes all so far. light is then the light at the last stretch's end. */
+    vf depth, lost[3]; /* for segments: -ln(transmittance), and the sums' accumulated rounding errors */
+    vf light;          /* light that passes all of this rank's samples so far */
+    /* Used if all samples and segments go to the fold (render_fold.h): the last sample's interval of
+     * FRAGMENT_STRETCHES, and the light that passes all samples so far. `light` is then the light at the end of the
+     * last interval. */
     vf stretch, within;
 } kernel_blend;
 
-/* End the fragments of the rays in mask. */
+/* Ends the fragments of the rays in mask. */
 SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vm closing = vm_and(b->open, mask);
@@ -167,8 +170,8 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     b->open = vm_andnot(b->open, closing);
 }
 
-/* Emits each sample or segment as a fragment for the fold, and says where something may come between it and the one
- * before. The open fragment then has no light of its own, so that closing it emits nothing. */
+/* Emits each sample or segment as a fragment for the fold, and marks those before which another rank may have
+ * fragments. The current fragment then has no light of its own, so that closing it emits nothing. */
 SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
                                     vf clear)
 {
@@ -186,7 +189,8 @@ SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, v
     b->open = vm_or(b->open, has);
 }
 
-/* Rays whose fragment must end before the sample at t: a surface is in between, or may be, on another rank. */
+/* Returns the rays whose fragment must end before the sample at t, because a surface lies in between, or may lie there
+ * on another rank. */
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
                                    const kernel_hits *hits, vf t)
 {
@@ -200,7 +204,7 @@ SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b
     return broken;
 }
 
-/* Colour (premultiplied) and transmittance of the samples of all volumes at one place. */
+/* Computes the premultiplied colour and the transmittance of all volumes' samples at one position. */
 SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_samples *s, int n, vf colour[3], vf *clear)
 {
     const kernel_frame *f = p->frame;
@@ -219,7 +223,8 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         all += through * absorbed;
         through *= left;
     }
-    /* Several media at one place share what all of them absorb in proportion to what each would. */
+    /* Several media at one position share the light that they absorb together, in proportion to what each would absorb
+     * alone. */
     const vf share = f->volume_count == 1 ? vf_set(1) : vf_select(vf_lt(vf_set(0), weight), all / weight, vf_set(0));
     for (int a = 0; a < 3; a++) colour[a] = sum[a] * share;
     *clear = through;

@@ -1,5 +1,5 @@
-/* What a ray keeps of its segments until all that lies in front of them is known: a list a ray, as they come, with room
- * for so many; and where surfaces cut them. How windows make do with that room: kernel_segments.h. */
+/* Segments that a ray keeps until everything in front of them is known: one unsorted list of bounded length per ray,
+ * and the depths at which surfaces cut them. kernel_segments.h explains how windows make do with this length. */
 #ifndef RENDER_KERNEL_SEGMENT_LIST_H
 #define RENDER_KERNEL_SEGMENT_LIST_H
 
@@ -22,44 +22,45 @@ typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
 
-/* What a segment has beside that where no error is allowed: a lane of kernel_double; as large, so that one index finds
- * both. */
+/* Additional data of a segment if no error is allowed (one lane of kernel_double). It is as large as kernel_segment, so
+ * that one index serves both. */
 typedef struct kernel_segment_double {
     float length, rest_in, rest_out, unused;
 } kernel_segment_double;
 
-/* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
+/* Crossings of transparent surfaces. Row n holds the n-th crossing of each ray, sorted by depth; +inf if a ray has
+ * fewer. */
 typedef struct kernel_cuts {
     int row_count;
-    bool is_whole;       /* else the rest is looked for in the fragments */
-    int64_t first, last; /* the tile's fragments of surfaces */
+    bool is_whole;       /* if false, cuts are searched in the fragments */
+    int64_t first, last; /* range of the tile's surface fragments */
     float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
 } kernel_cuts;
 
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
-    kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* each ray's, as they come */
+    kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* each ray's segments, unsorted */
     kernel_segment_double precise[SIMD_WIDTH][KERNEL_WINDOW];
-    bool is_double; /* ends are known in double; */
-    int room;       /* for half as many segments then, so that a tile's lists stay in the cache */
+    bool is_double; /* the segments' ends are known in double */
+    int room;       /* capacity per ray; halved in double, so that a tile's lists stay in the cache */
     kernel_double_rays rays;
-    /* Meshes that overlap to no end: of segments that begin at one place, where no order is meant, those for which
-     * there is no room are integrated at once, and blended behind the window's. */
+    /* Overflow for meshes that overlap many times. Segments that begin at the same t have no order; those that do not
+     * fit into the list are integrated here at once and blended behind the window. */
     kernel_light heap;
-    vf t_begin, t_end; /* the window */
-    bool is_shortened; /* t_end has been lowered since this was last made false */
+    vf t_begin, t_end; /* the window's interval */
+    bool is_shortened; /* t_end has been lowered since this flag was last cleared */
     vf per_t;          /* unit distances per t */
     kernel_cuts cuts;
 } kernel_segments;
 
-/* May segments be made a ray and its cell a lane? Not where transparent surfaces cut them, nor where each is a fragment
- * of its own. */
+/* Returns whether segments can be integrated one ray-cell pair per lane: not if transparent surfaces cut them, nor if
+ * each becomes a fragment of its own. */
 SIMD_INLINE bool kernel_segments_fit(const kernel_frame *f)
 {
     return !f->has_transparent && !f->job->separate_samples;
 }
 
-/* Returns the lane of the pixel; -1: it is none of the packet's. */
+/* Returns the lane of the pixel, or -1 if it is not in the packet. */
 SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
 {
     const int width = p->frame->job->camera.width, left = width - p->x0;
@@ -70,7 +71,7 @@ SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
     return -1;
 }
 
-/* first: the tile's first fragment in the thread's list. */
+/* Collects the cuts of the packet's rays. first: the tile's first fragment in the thread's list. */
 SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_cuts *cuts)
 {
     int count[SIMD_WIDTH] = {0};
@@ -80,7 +81,7 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     cuts->last = p->thread->out->count;
     for (int64_t i = first; p->frame->has_transparent && i < cuts->last; i++) {
         const fragment *hit = &p->thread->out->items[i];
-        if (hit->kind < FRAGMENT_SURFACE) continue; /* a volume's, of an earlier stretch between clips */
+        if (hit->kind < FRAGMENT_SURFACE) continue; /* a volume's fragment, of an earlier interval between clips */
         const int lane = kernel_lane_of(p, hit->pixel);
         if (lane < 0) continue;
         int at = count[lane];
@@ -98,7 +99,7 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     }
 }
 
-/* A ray of more cuts than there are rows: its fragments are looked through. */
+/* Finds the next cuts of rays that have more cuts than there are rows, by a search of all the tile's fragments. */
 static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
@@ -115,7 +116,7 @@ static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts
     return vf_load(next);
 }
 
-/* The first cut at or, if asked, beyond t. */
+/* Returns each ray's first cut at or behind t; only behind t if `beyond` is set. */
 SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
 {
     vf next = vf_set(INFINITY);
@@ -160,8 +161,8 @@ SIMD_INLINE void kernel_heap_clear(kernel_light *heap, int lane)
     heap->transmittance[lane] = 1;
 }
 
-/* Make room in a full ray for the segment, where it is of the window: that now ends at the begin of one of its farther
- * segments, which go. False where there is no room: all begin where it does. */
+/* Makes space in a full list: ends the window at the begin of one of its farther segments, and drops those from there
+ * on. Returns false if all segments begin where the new one does. */
 static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane,
                                                                     const kernel_segment *s)
 {
@@ -186,7 +187,7 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
     return true;
 }
 
-/* False where there is no room: more segments begin at one place than a window holds. */
+/* Adds a segment to a ray's list. Returns false if the list is full and all its segments begin at the same t. */
 SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kernel_segment *s,
                                      const kernel_segment_double *precise)
 {
@@ -199,7 +200,8 @@ SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kern
     return true;
 }
 
-/* Adds segments of rays whose windows they begin in. precise: NULL unless the list is in double. */
+/* Adds the segment of each given ray to its list. The segments must begin in the rays' windows. precise: NULL unless
+ * the list is in double. */
 SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
                                      const kernel_interval *i, const kernel_double *precise)
 {
@@ -231,11 +233,11 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
     }
 }
 
-/* The packet's segments by t_in: rows of the n-th of each ray. */
+/* The packet's segments sorted by t_in: row n holds the n-th segment of each ray. */
 typedef struct kernel_sorted {
     int row_count;
-    vf t_in[KERNEL_WINDOW]; /* +inf where there are no more */
-    vi item[KERNEL_WINDOW]; /* where it is among the ray's, in floats from list->items on */
+    vf t_in[KERNEL_WINDOW]; /* +inf if a ray has fewer segments */
+    vi item[KERNEL_WINDOW]; /* index of the segment, in floats from list->items on */
 } kernel_sorted;
 
 SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
@@ -243,14 +245,15 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
     return vf_gather(&list->items[0][0].t_in + member, item);
 }
 
-/* Rays whose two segments begin at one place, and the first of them, of no length in float32, ends there. */
+/* Returns the rays whose two segments begin at the same t and whose `item` ends before `earlier`: it has length 0 in
+ * float32 and comes first. */
 static __attribute__((noinline, cold)) vm kernel_segments_tied(const kernel_segments *list, vm same, vi item,
                                                                vi earlier)
 {
     return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
 }
 
-/* By insertion, all rays at once: cells come nearly in order, for the traversal is front to back. */
+/* Sorts by insertion, for all rays at once. Cells come nearly in order, as the traversal is front to back. */
 static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out)
 {
     enum { FLOATS = sizeof(kernel_segment) / sizeof(float) };
@@ -289,36 +292,37 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
     }
 }
 
-/* A ray's span in a cell: how its field is known, and how finely a stretch of it is cut into segments with a
- * linear field each (kernel_segments.h): into equal subintervals, or, where these do not suffice, by bisection
+/* A ray's interval in a cell: how the field is known on it, and how finely it is cut into segments with a linear field
+ * each (kernel_segments.h). It is cut into equal subintervals or, if these do not suffice, by bisection
  * (kernel_cell_segments.h). */
 
-/* The most equal subintervals. */
+/* Maximum number of equal subintervals. */
 enum { KERNEL_MAX_SUBDIVISIONS = 256 };
-/* exp(-it) is KERNEL_BLACK, or a little more. */
+/* Optical depth at which exp(-depth) is KERNEL_BLACK or slightly more. */
 #define KERNEL_DARK_DEPTH 18.4f
 
 typedef struct kernel_segment_state {
     kernel_segments *list;
     const kernel_pieces *pieces;
     int volume;
-    float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: subintervals by step */
-    float mixing;    /* > 0: segments go out as they are met, to be mixed with others: see kernel_span_mixed() */
-    float reach;     /* no ray is longer in the cells, unit distances */
+    /* error allowed per unit distance and per unit of optical depth; 0: subintervals have the sampling step's length */
+    float allowance;
+    float mixing; /* > 0: segments are emitted at once, to be mixed with others (kernel_span_mixed()) */
+    float reach;  /* upper bound of a ray's length in the cells, in unit distances */
 } kernel_segment_state;
 
-/* A cell under way: how its field is known, and how finely it must be. */
+/* A ray interval in the current cell: how the field is known on it, and the accuracy that it needs. */
 typedef struct kernel_span {
     const kernel_map *map;   /* NULL: linear */
-    const kernel_cell *cell; /* NULL: a tet or a polyhedron; without a map it is of one value */
+    const kernel_cell *cell; /* NULL: a tet or a polyhedron; if there is no map, the cell is constant */
     const kernel_interval *interval;
-    const kernel_double *precise; /* for a tet's interval in double; NULL: none */
-    float cost;                 /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
-    int first_step, step_count; /* the steps of the opacity among the cell's values */
-    bool is_steep, is_narrow;   /* steep ramps are, narrow ones */
+    const kernel_double *precise; /* a tet's interval in double, or NULL */
+    float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
+    int first_step, step_count; /* range of the opacity's steps that lie among the cell's values */
+    bool is_steep, is_narrow;   /* a steep ramp, a narrow ramp lies among the cell's values */
 } kernel_span;
 
-/* The function's bounds over the values from low to high, between steps. */
+/* Returns bounds of the transfer function over the values from low to high, apart from steps. */
 SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
 {
     const float last = KERNEL_BOUND_BINS - 1;
@@ -333,14 +337,15 @@ SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low,
     return b;
 }
 
-/* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
- * unit distance (docs/development/error_budget.md). */
+/* Returns an upper bound of the change of light per unit distance for a field error of 1. With extinction s and colour
+ * c, a field error d changes the light by at most T (contrast |s'| + s |c'|) d per unit distance
+ * (docs/development/error_budget.md). */
 SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *b)
 {
     return simd_min(t->contrast * b->extinction_slope + b->extinction_high * b->colour_slope, 1e30f);
 }
 
-/* The most of that over the cell's values, and which steps and ramps are among these. */
+/* Sets the maximum of this cost over the cell's values, and the steps and ramps that lie among these values. */
 SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const float *values, int count, kernel_span *out)
 {
     const kernel_pieces *t = state->pieces;
@@ -368,7 +373,7 @@ SIMD_INLINE vf kernel_span_value(kernel_packet *p, const kernel_span *span, vm r
     return span->map ? kernel_value_at(p, span->map, i, rays, t) : kernel_line_value(i, t);
 }
 
-/* Rays whose values, from low to high, have a steep ramp among them, or a narrow one. */
+/* Returns the rays whose value range, low to high, meets a steep ramp; if is_narrow is set, a narrow one. */
 SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
 {
     vm any = vm_none();
@@ -380,7 +385,7 @@ SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, v
     return any;
 }
 
-/* The same for a step. */
+/* Returns the rays whose value range, low to high, holds a step of the opacity. */
 SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel_span *span, vf low, vf high)
 {
     vm any = vm_none();
@@ -391,23 +396,22 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
     return any;
 }
 
-/* What float32 rounds a stretch's values by, up to 1 or of their size (docs/development/error_budget.md:
- * 4e-7 at most).
- */
+/* Rounding of an interval's values in float32, relative to max(1, |value|). docs/development/error_budget.md derives at
+ * most 4e-7. */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 
 enum { KERNEL_STRETCH_LOOKS = 8 };
 
-/* How far a field is off the line between its values at a stretch's ends, seen at eighths. */
+/* Deviation of the field from the chord between its values at the interval's ends, sampled at eighths. */
 typedef struct kernel_span_deviation {
     vf most;
-    vf bend;    /* what a parabola would be off in the middle whose second derivative has the field's mean size */
-    vf opacity; /* the mean, by the quarters */
+    vf bend;    /* middle deviation of a parabola whose second derivative has the field's mean size */
+    vf opacity; /* mean opacity, from the quarters */
 } kernel_span_deviation;
 
-/* Subintervals of length h are off their chords by h^2 / 12 of the second derivative on average, and light by the
- * integral of that. Second differences over an eighth tell its mean size, and those next to the ends, drawn on, what it
- * is beyond them. */
+/* Returns the mean size of the field's second derivative, as a deviation (kernel_span_deviation.bend). Subintervals of
+ * length h deviate from their chords by h^2 / 12 of the second derivative on average, and the error of light is the
+ * integral of that. Second differences over an eighth give the mean size; towards the ends they are extrapolated. */
 SIMD_INLINE vf kernel_span_bend(const vf off[KERNEL_STRETCH_LOOKS + 1])
 {
     vf second[KERNEL_STRETCH_LOOKS], sum = vf_set(0);
@@ -438,13 +442,14 @@ SIMD_INLINE void kernel_span_deviate(kernel_packet *p, const kernel_segment_stat
     out->bend = kernel_span_bend(off);
 }
 
-/* Into how many subintervals, as a real number, to cut the stretch, and how far its field is off the line between the
- * values at its ends. By error: a subinterval is off its chord by its square's share of the bend, two thirds of that on
- * average, and half as much again is taken. Second differences add up what values lose to rounding, which is left out,
- * but no less is taken than the field is off at its most. Allowed is the stretch's share of the ray's length and of its
- * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. Where a step of
- * the opacity is among the values no number is enough, nor where a steep ramp is among them and asks for too many, nor
- * where a narrow one is in which the values' rounding alone would take an eighth of what is allowed. */
+/* Returns into how many subintervals, as a real number, the interval must be cut, and stores how far its field deviates
+ * from the chord of its end values. By error: a subinterval deviates from its chord by its square's share of the bend,
+ * two thirds of that on average; the bound takes half as much again. Second differences accumulate the values'
+ * rounding, which is subtracted, but the bend is never less than the largest deviation. The error allowed is the
+ * interval's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity
+ * as a lower bound of the extinction. No number is enough if a step of the opacity lies among the values, if a steep
+ * ramp does and too many subintervals would be needed, or if a narrow ramp does in which the values' rounding alone
+ * would take an eighth of the allowed error. */
 SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
                                   const kernel_interval *stretch, vf *deviation)
 {
@@ -475,17 +480,18 @@ SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *
     return vf_select(too_few, vf_set(2 * KERNEL_MAX_SUBDIVISIONS), subdivisions);
 }
 
-/* The same for a stretch that others are mixed with, who take it for a medium that is the same throughout (comp.h). Of
- * a stretch of depth d whose extinction and colour vary by the share v, no more than d v / 4 is elsewhere than it is
- * said to be, and what that does to light is attenuated by the others' depth in it. That depth, times the light that
- * gets there, sums to 1 over a ray; so d v / 4 may be the whole error allowed. */
+/* Returns the number of subintervals if compositing mixes the interval with other volumes, which it treats as a uniform
+ * medium (comp.h). In an interval of depth d whose extinction and colour vary by a share v, at most d v / 4 is
+ * displaced from its assumed position, and the effect on light is attenuated by the other volumes' depth in the
+ * interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the whole error
+ * allowed. */
 SIMD_INLINE vf kernel_span_mixed(const kernel_segment_state *state, const kernel_span *span, vf length, vf change)
 {
     const vf moved = change * span->cost * (length * state->list->per_t) * 0.25f;
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
-/* How many equal subintervals; halved: the rays for which no number is enough. */
+/* Returns the number of equal subintervals. *halved: the rays for which no number is enough. */
 SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
                                         vm rays, const kernel_interval *stretch, vm *halved)
 {
@@ -512,7 +518,7 @@ SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_s
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
-/* a + b, and what that loses to rounding (Knuth). */
+/* Returns a + b and its rounding error (Knuth). */
 SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
 {
     const vf sum = a + b, other = sum - a;
@@ -520,7 +526,7 @@ SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
     return sum;
 }
 
-/* The share of a segment from `from` to `to`. */
+/* Returns the part of a segment between the shares `from` and `to` of its length. */
 SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to)
 {
     const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);
@@ -534,9 +540,9 @@ SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to
     return out;
 }
 
-/* A segment as a fragment of its own. The integral ends where all but KERNEL_BLACK of the light is gone, and says no
- * more of the depth; but what is mixed with others goes by its depth. So a segment as dense as that is cut until its
- * fragments are not, and ends where light does. */
+/* Emits a segment as a fragment of its own. kernel_integrate() stops once all but KERNEL_BLACK of the light is
+ * absorbed, and its depth is then too small; but compositing mixes fragments by their depth. So a segment that dense is
+ * bisected until its parts are not, and emission ends where light does. */
 static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
                                 const kernel_run *whole)
 {

@@ -1,24 +1,25 @@
 /* Volumes by segments: the integral of emission and absorption instead of a sum over samples.
  *
- * A cell's interval on a ray is one segment where the field is linear on it (tets, cells of one value), and is cut into
- * equal segments with a linear field each elsewhere. They are kept until all that lies in front of them is known, for
- * cells come in the order of the tree, not of the ray; then the n-th segments of all rays are integrated together
- * (kernel_integral.h), which fills the lanes far better than a cell does, that few of a packet's rays meet.
+ * If the field is linear on a cell's interval on a ray (tets, constant cells), the interval is one segment; else it is
+ * cut into equal segments with a linear field each. Segments are stored until everything in front of them is known, as
+ * cells come in the order of the tree, not of the ray. Then the n-th segments of all rays are integrated together
+ * (kernel_integral.h), which fills the lanes far better than cell by cell: few of a packet's rays meet a given cell.
  *
- * Each ray has room for so many segments, sorted by t_in. When it is full, its window ends at the t_in of the farthest,
- * which is put back; the traversal, whose upper limit is that end, meets only what is nearer. The window's segments
- * are integrated front to back, and the next window begins where the last one ended:
+ * Each ray has a list of bounded length. When it is full, the window's end is lowered to the t_in of one of its farther
+ * segments, and the segments from there on are dropped; the traversal, whose far limit is that end, visits only nearer
+ * cells. The window's segments are integrated front to back, and the next window begins where the last one ended:
  *
  *     window 1: t_end ________________ | window 2: from here on
  *     |--cell--|--cell--|----cell----|-|--cell--|
  *              ^ t_in in window 1      ^ t_in == t_end: window 2
  *
- * A segment belongs to the window that holds its t_in and is never cut by the window, so what a ray sees does not
- * depend on where windows end, nor on the other rays of its packet. Surfaces do cut segments. Fragments join segments
- * whose t_out and t_in are the same bits, as neighbours' are; a gap ends them, for it may belong to another rank.
+ * A segment belongs to the window that contains its t_in and is never cut at the window's end, so that a ray's result
+ * depends neither on the windows nor on the other rays of its packet. Surfaces do cut segments. A fragment joins
+ * segments whose t_out and t_in have the same bits, as neighbouring cells' have; it ends at a gap, which may belong to
+ * another rank.
  *
- * Where several volumes share a ray, or cells overlap, no rank knows all that is at one place: with separate_samples
- * (render.h) every segment goes out as it is met, cut finely enough for compositing to mix them. */
+ * If several volumes share a ray, or cells overlap, no rank has all segments at a position. With separate_samples
+ * (render.h) each segment is emitted at once, cut finely enough for compositing to mix them. */
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
@@ -35,14 +36,15 @@
 
 /* ---- the ray ---- */
 
-/* So far before an end that what begins there is not known to begin in front of it; render_fold.c has it too. */
+/* Returns the depth up to which another interval's begin is safely in front of this end: t_out minus the error bound of
+ * crossings. render_fold.c uses the same margin. */
 SIMD_INLINE vf kernel_segment_end(vf t_out)
 {
     return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;
 }
 
-/* Rays whose fragment must end before the segment from t_in to t_out: a surface is in between, or there is a gap, or
- * cells overlap, by more than rounding, which the overlapping fragments tell compositing (render.h). */
+/* Returns the rays whose fragment must end before the segment from t_in to t_out: a surface or a gap lies in between,
+ * or cells overlap by more than rounding; compositing detects overlaps by the overlapping fragments (render.h). */
 SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in,
                                      vf t_out)
 {
@@ -52,8 +54,9 @@ SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend 
     return broken;
 }
 
-/* End the fragments of the rays in mask, where compositing is to take them for ended. Those that are shorter than
- * rounding end before they begin, and overlap nothing (comp.h). */
+/* Ends the fragments of the rays in mask, at a t_last that is reduced by the error bound, so that compositing does not
+ * take touching fragments for overlapping ones. A fragment shorter than the error bound ends before it begins and
+ * overlaps nothing (comp.h). */
 SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vf end = b->t_last;
@@ -62,14 +65,14 @@ SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mas
     b->t_last = end;
 }
 
-/* Light of the rays in has, from t_in to t_out. */
+/* Adds the light of segments from t_in to t_out, on the rays in `has`. */
 SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, const kernel_light *light)
 {
     const vm fresh = vm_andnot(has, b->open);
     b->t_first = vf_select(fresh, t_in, b->t_first);
     b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
     for (int a = 0; a < 3; a++) {
-        /* Compensated: of hundreds of segments the roundings would add up to 1e-6. */
+        /* Compensated summation: over hundreds of segments rounding would add up to 1e-6. */
         const vf before = vf_select(fresh, vf_set(0), b->colour[a]), lost = vf_select(fresh, vf_set(0), b->lost[a]);
         const vf more = b->transmittance * light->colour[a] - lost, sum = before + more;
         b->lost[a] = vf_select(has, (sum - before) - more, b->lost[a]);
@@ -125,7 +128,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }
 
-/* A window from list->t_begin on. */
+/* Begins a window at list->t_begin. */
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
     memset(list->count, 0, sizeof list->count);

@@ -1,6 +1,6 @@
-/* Tets of a few pixels, a pixel and its tet a lane: packets would be asked for rays most of which lie beside the tet.
- * Tets are placed many at once in any case (kernel_placed.h); the pixels of their boxes are put side by side, and each
- * has its crossings, by kernel_crossings.h's operations, to the same bits (kernel_tet_rays.h). */
+/* Small tets, one pixel-tet pair per lane: of a packet's rays most would miss such a tet. Tets are transformed
+ * SIMD_WIDTH at a time in any case (kernel_placed.h). The pixels of their bounding boxes are listed, and their
+ * crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tet_rays.h). */
 #ifndef RENDER_KERNEL_SMALL_TETS_H
 #define RENDER_KERNEL_SMALL_TETS_H
 
@@ -10,13 +10,13 @@
 #include "kernel_tile_trace.h"
 #include "simd.h"
 
-/* No tet has more listed. */
+/* Most pixels of a tet that is listed. */
 enum { KERNEL_TET_PIXELS = 48 };
 
 _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vector of tets has room");
 
-/* Lists the pixels of those of the tile's pending tets in the given lanes whose boxes have no more than most, and
- * leaves out those that lie between pixels. Returns the others. */
+/* Lists the pixels of the given lanes' pending tets whose bounding boxes have at most `most` pixels; skips tets that
+ * lie between pixels. Returns the lanes of the larger tets. */
 static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lanes, int most, kernel_local_lanes *l,
                                        kernel_pixel_list *rays)
 {

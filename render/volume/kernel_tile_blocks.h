@@ -1,10 +1,10 @@
-/* Which of a tile's blocks a tet's outline meets, all of them at once: a block is a lane. The bounds of the outline
- * (kernel_outline_placement()) leave blocks that lie beside its slanted edges; two of five packets would be asked for
- * nothing.
+/* Finds which of a tile's blocks a tet's outline meets, one block per lane. The outline's bounding box
+ * (kernel_outline_placement()) also covers blocks beside its slanted edges; with it alone, two of five packets would be
+ * traced for nothing.
  *
- * An edge function is affine over the tile (kernel_cell.h), so that over a block it is that of the block's middle, give
- * or take its slopes times half of what the block's rays span. A block in which no face can have the signs that a ray
- * inside has of its three edges, holds no ray that crosses the tet. */
+ * An edge function is affine over the tile (kernel_cell.h), so that over a block it is its value at the block's middle,
+ * plus or minus its slopes times half of the extent of the block's rays. If in a block no face can have its three edge
+ * functions' signs as on a ray that crosses it, no ray of the block crosses the tet. */
 #ifndef RENDER_KERNEL_TILE_BLOCKS_H
 #define RENDER_KERNEL_TILE_BLOCKS_H
 
@@ -18,13 +18,14 @@
 
 enum { KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
 
-/* Block by block: the middle of u and v, and half of what they span. */
+/* The middle of u and v per block, and half of their extent. */
 typedef struct kernel_block_rays {
     vf u[KERNEL_BLOCK_VECTORS], v[KERNEL_BLOCK_VECTORS];
     float half_u, half_v;
 } kernel_block_rays;
 
-/* The tile's rays must be there. Halves are those of the widest block, and a thousandth more for all rounding. */
+/* Sets up the blocks of a tile whose rays are set. The half extents are those of the widest block, plus a thousandth
+ * for all rounding. */
 static inline void kernel_block_rays_setup(kernel_block_rays *r, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -45,9 +46,9 @@ static inline void kernel_block_rays_setup(kernel_block_rays *r, const kernel_fr
     }
 }
 
-/* The blocks that may have a ray inside, of a tet that has its lines. The middle's edge function errs by no more than a
- * ray's, and what decides the sign on a ray of doubt, or one that is projected, by less than the bound: twice the bound
- * is more than all of it. What is not a number is anywhere. */
+/* Returns the blocks that may have a ray inside the tet, whose edge functions must be set. The middle's edge function
+ * errs by at most as much as a ray's; on doubtful or projected rays the sign is decided within the same bound: twice
+ * the bound is more than both together. NaN counts as met. */
 SIMD_INLINE unsigned kernel_tet_blocks(const kernel_block_rays *r, const kernel_cell *c)
 {
     unsigned blocks = 0;
@@ -60,7 +61,7 @@ SIMD_INLINE unsigned kernel_tet_blocks(const kernel_block_rays *r, const kernel_
             above[n] = vm_not(vf_lt(e, vf_set(-reach)));
             below[n] = vm_not(vf_lt(vf_set(reach), e));
         }
-        for (int n = 0; n < 4; n++) { /* rays on one side of all three edges of a face cross it */
+        for (int n = 0; n < 4; n++) { /* a ray that lies on the same side of all three edges of a face crosses it */
             const signed char *edge = kernel_tet_face[n] + 3;
             met = vm_or(met, vm_and(vm_and(above[edge[0]], above[edge[1]]), below[edge[2]]));
             met = vm_or(met, vm_and(vm_and(below[edge[0]], below[edge[1]]), above[edge[2]]));

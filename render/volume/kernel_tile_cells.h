@@ -1,11 +1,11 @@
-/* A volume's cells, for a whole tile and one window of depth: each is placed once and goes to the packets of the blocks
- * that it may meet. Which cells those are is known beforehand, where the picture has gone down the trees at once
- * (kernel_candidates.h): they wait by depth, and a window has those that are in it. Else the tile goes down the trees
- * for each window.
+/* A volume's cells, for a whole tile and one window of depth: each is transformed once and passed to the packets of the
+ * blocks that it may meet. If the whole picture has been traversed at once (kernel_candidates.h), the tile's cells are
+ * known: they are sorted by depth, and a window processes those that overlap it. Else the tile traverses the trees once
+ * per window.
  *
  *     cells, by where they begin   |--a--|  |---b---|    |-c-|
  *                                     |--d--|   |--e--|
- *     window                                |=========|          d, b and e; a has left, c comes later */
+ *     window                                |=========|          d, b and e; a has ended, c begins later */
 #ifndef RENDER_KERNEL_TILE_CELLS_H
 #define RENDER_KERNEL_TILE_CELLS_H
 
@@ -35,38 +35,39 @@ enum {
     KERNEL_OPEN_PIECE = 16,
     KERNEL_SORT_PIECE = 64,
     KERNEL_SORT_ENDS = 48,
-    KERNEL_WAIT_AHEAD = 8, /* so many tets wait for their indices to come from memory, and as many for their numbers */
+    KERNEL_WAIT_AHEAD = 8, /* prefetch distance in tets: first for vertex indices, then for coordinates and values */
     KERNEL_WAIT_ROOM = SIMD_WIDTH + 2 * KERNEL_WAIT_AHEAD
 };
 
-/* Takes those of the tets placed together, in the given lanes, that are better taken so than each alone. Returns the
- * other lanes. */
+/* Callback: traces those tets of the given lanes for which one ray-tet pair per lane is faster. Returns the remaining
+ * lanes. */
 typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
 
-/* The tile's cells of a volume. The first open_count items begin before the last window's end and do not end before its
- * begin; next is the first item that is still to come. Only items before `sorted` are in order: a tile that light
- * leaves early does not look at the others. Those before each of ends, the last of which is the nearest, are no farther
- * than those from it on. */
+/* The tile's cells of a volume. The first open_count items begin before the last window's end and end behind its begin;
+ * `next` is the first item that no window has reached. Only the first `sorted` items are sorted: a tile that becomes
+ * dark early does not sort the others. `ends` are partition points of the quicksort, the last one nearest: no item
+ * before such a point is farther than any item behind it. */
 typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    kernel_cell cell;     /* the one under way, */
-    kernel_map map;       /* and its map */
-    kernel_arrays arrays; /* the volume's field on the part: */
+    kernel_cell cell;     /* the current cell */
+    kernel_map map;       /* its map */
+    kernel_arrays arrays; /* the volume's field on the current part */
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
-    /* Tets that wait to be placed together, with the blocks and the box of pixels that they may meet. Those of a vector
-     * are taken from the front when the room is full. */
-    int pending, known; /* the first known have their vertices */
+    /* Queue of tets, with the blocks and the box of pixels that each may meet. When it is full, the first SIMD_WIDTH
+     * tets are processed. */
+    int pending, known; /* the vertex indices of the first `known` tets have been read */
     uint32_t wait_cell[KERNEL_WAIT_ROOM];
     uint16_t wait_blocks[KERNEL_WAIT_ROOM], wait_box[KERNEL_WAIT_ROOM];
     int32_t wait_vertices[4][KERNEL_WAIT_ROOM];
-    kernel_tile_take_tets *take_tets; /* NULL: each is taken alone */
+    kernel_tile_take_tets *take_tets; /* NULL: each tet is processed alone */
 } kernel_tile_cells;
 
-/* Ready the fetched cell for rays of blocks, which are a pencil or are not; returns the blocks that it may show in. */
+/* Prepares the fetched cell for the rays of the blocks; returns the blocks in which it may be visible. is_pencil: the
+ * rays are a pencil (kernel_packet.h). */
 SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
 {
@@ -85,8 +86,8 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     return meets;
 }
 
-/* Makes a cell that is in a lane of a batch the tile's cell, ready for rays of all blocks, unless *alone says that it
- * is; false if it shows nowhere. *alone: the lane whose cell the tile's cell is, or -1. */
+/* Makes a batch's cell `cell`, in lane `lane`, the tile's current cell, ready for the rays of all blocks, unless it
+ * already is. Returns false if it is invisible. *alone: the lane whose cell is the current one, or -1. */
 static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_trace *t, int volume, int part,
                                                                     uint32_t cell, bool is_pencil, int lane, int *alone)
 {
@@ -118,8 +119,8 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
 
 enum { KERNEL_ALL_PIXELS = -1 };
 
-/* Returns the box of pixels, ends included, as a candidate has it (kernel_types.h); that of the blocks where box is
- * KERNEL_ALL_PIXELS. */
+/* Returns a box of pixels, ends included, in a candidate's format (kernel_types.h): `box` itself, or the bounding box
+ * of the blocks if box is KERNEL_ALL_PIXELS. */
 SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
 {
     if (box >= 0) return (unsigned)box;
@@ -135,9 +136,9 @@ SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
            (unsigned)(y0 * KERNEL_BLOCK) << 8 | (unsigned)(y1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 12;
 }
 
-/* ---- tets, as many at once as there are lanes ---- */
+/* ---- SIMD_WIDTH tets at once ---- */
 
-/* Takes the values into the domain of the transfer function. */
+/* Converts the values to the domain of the transfer function. */
 SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
@@ -147,7 +148,7 @@ SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transf
         }
 }
 
-/* Returns the lanes whose cells show and reach into the window, and the depths at which they begin. */
+/* Returns the lanes whose cells are visible and reach into the window; stores the depths at which they begin. */
 SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
                                            const kernel_interest *interest, float near[SIMD_WIDTH])
 {
@@ -170,7 +171,7 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
-/* Reads the vertices of pending tets up to an end. */
+/* Reads the vertex indices of the pending tets before index `end`. */
 SIMD_INLINE void kernel_tile_learn_pending(kernel_tile_cells *cells, int end)
 {
     for (; cells->known < end; cells->known++)
@@ -178,8 +179,8 @@ SIMD_INLINE void kernel_tile_learn_pending(kernel_tile_cells *cells, int end)
                                cells->wait_vertices[0] + cells->known, KERNEL_WAIT_ROOM);
 }
 
-/* Places the first pending tets, as many as there are lanes; returns those that show and that the rays have not yet
- * ended before. */
+/* Transforms the first `count` pending tets; returns the lanes of those that are visible and whose blocks have a ray
+ * that reaches them. */
 SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
 {
     t->thread->volume_cells += count;
@@ -215,7 +216,7 @@ SIMD_INLINE void kernel_tile_pop_pending(kernel_tile_cells *cells)
         memmove(cells->wait_vertices[i], cells->wait_vertices[i] + SIMD_WIDTH, LEFT * sizeof *cells->wait_vertices[i]);
 }
 
-/* Places the first pending tets and hands them to take. */
+/* Transforms the first pending tets and passes them to take_tets or, one by one, to `take`. */
 static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                             kernel_tile_take *take)
 {
@@ -239,8 +240,8 @@ SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cell
     while (cells->pending) kernel_tile_take_some(t, cells, take);
 }
 
-/* From now on pending tets are of this volume and part. Returns whether its tets are placed in lanes; they are not
- * where values are the cells', as a field that is constant in a cell is not interpolated. */
+/* Makes the volume and part the ones of pending tets. Returns whether the part's tets are processed in lanes: not if
+ * the field is constant per cell, as it is not interpolated then. */
 SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
                                       kernel_tile_take *take)
 {
@@ -254,7 +255,7 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
     return cells->arrays.has_lanes && !cells->arrays.is_by_cell;
 }
 
-/* Adds a tet to the pending ones, and places some of these once there is no more room. box: kernel_tile_box(). */
+/* Queues a tet, and processes some pending ones if the queue is full. box: kernel_tile_box(). */
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
                                   unsigned box, kernel_tile_take *take)
 {
@@ -268,12 +269,12 @@ SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells
 
 /* ---- from trees ---- */
 
-/* How a volume's cells are taken, those for lanes and others. */
+/* Callbacks that process a volume's cells. */
 typedef struct kernel_cell_visitor {
     bool is_pencil;
     kernel_tile_take *take;
-    /* Queues a cell if its type is for lanes; else returns false. box: of its pixels, as a candidate has it, or
-     * KERNEL_ALL_PIXELS of the blocks. */
+    /* Queues a cell if its type is processed in lanes; else returns false. box: its pixels, in a candidate's format, or
+     * KERNEL_ALL_PIXELS for all of the blocks. */
     bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
 } kernel_cell_visitor;
 
@@ -292,7 +293,7 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_v
             kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
 
-/* Goes down the trees of the parts, with the volume's ranges. */
+/* Traverses the trees of the parts, with the ranges of the volume's field. */
 SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
                                           unsigned blocks, kernel_tile_visit *visit)
 {
@@ -305,7 +306,7 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
     }
 }
 
-/* Goes down all trees of the frame, by way of the tree over them if there is one. take gets their cells. */
+/* Traverses all trees of the frame, through the tree over them if there is one. `take` receives their cells. */
 SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
                                        kernel_tile_take *take)
 {
@@ -317,7 +318,7 @@ SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, ke
     kernel_tile_take_pending(t, t->thread->tile_cells, take);
 }
 
-/* Meets a leaf's cells. */
+/* Processes a leaf's cells. */
 SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
                                    const uint32_t *cells, int count, unsigned blocks)
 {
@@ -330,9 +331,10 @@ SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visit
     if (left) kernel_tile_meet_leaf(t, visitor, volume, part, others, left, blocks);
 }
 
-/* ---- those that are known ---- */
+/* ---- cells known from the candidates ---- */
 
-/* Items before the returned index are no farther than those from it on; neither part is empty. */
+/* Partitions the items by depth: those before the returned index are no farther than the others. Neither part is
+ * empty. */
 static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
 {
     const float a = items[0].near, b = items[count / 2].near, c = items[count - 1].near;
@@ -351,7 +353,7 @@ static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
     }
 }
 
-/* Sorts by quicksort down to short pieces. It calls itself on the shorter part alone, so that the stack stays low. */
+/* Sorts by quicksort down to short pieces. It recurses only into the shorter part, so that the stack stays small. */
 static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 {
     enum { PIECE = 8 };
@@ -370,7 +372,7 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
     }
 }
 
-/* Sorts at least one item more. */
+/* Sorts at least one more item. */
 static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items + cells->sorted;
@@ -402,7 +404,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_
     return cells->count > 0;
 }
 
-/* Opens the window's cells. */
+/* Makes the cells that overlap the window the first open_count items. */
 SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items;
@@ -418,7 +420,7 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     cells->open_count = count;
 }
 
-/* Meets one of the window's cells. */
+/* Processes one of the window's cells. */
 SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
                                        const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
                                        kernel_tile_take *take)
@@ -431,7 +433,8 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }
 
-/* Prefetches the next open cells: the indices of more of them, the vertices of some. */
+/* Prefetches the next open cells: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, the vertices of
+ * KERNEL_OPEN_PIECE. */
 SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
 {
     const render_job *job = t->frame->job;
@@ -448,7 +451,7 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
     }
 }
 
-/* Meets the window's cells. */
+/* Processes the window's cells. */
 SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visitor *visitor, unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -465,13 +468,13 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
 
 /* ---- windows ---- */
 
-/* Where the tile's first cell begins, where that is known; else +inf. */
+/* Returns the depth at which the tile's first cell begins if it is known, else +inf. */
 SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
 {
     return t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
 }
 
-/* The blocks that any tree's box may meet, and the depths between which. */
+/* Returns the blocks that any tree's bounding box may meet, and the range of depths of these boxes. */
 SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
@@ -486,7 +489,7 @@ SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
     return all;
 }
 
-/* Set up the blocks; returns how many packets they have, which are listed. */
+/* Sets up the blocks' packets; lists them and returns their number. */
 SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
 {
     int count = 0;

@@ -1,17 +1,19 @@
-/* How deep a tile's next window of samples is to be. A window's cells are placed and traced for all of its depth, so
- * that in a dense medium, which lets no light through to most of the window, most of them would be placed for nothing:
+/* Chooses the depth of a tile's next window of samples. A window's cells are transformed and traced for all of its
+ * depth, so that in a dense medium, in which no light reaches most of the window, most of that work would be wasted:
  *
  *     light   1 \__                                   windows of as many samples as fit:  |===============|=====...
  *                  \___                               as deep as light goes:              |====|=|
  *             0 --------x----------------->  depth
  *
- * Neighbouring tiles lose their light in much the same depth, so the last tile's is expected of this one. Where light
- * is left after it, the brightest ray is expected to go on losing it at the rate of the window before. Rays that keep
- * their light have windows as deep as there is room, as every boundary between windows has cells placed twice.
+ * Neighbouring tiles lose their light at much the same depth, so this tile is expected to be dark at the last tile's
+ * depth. If light is left there, the brightest ray is expected to continue losing it at the rate of the previous
+ * window. Rays that keep their light have the deepest windows that fit, as cells at every boundary between windows are
+ * transformed twice.
  *
- * Samples do not depend on windows (kernel_tile_volume.h). Which cells are seen to overlap behind what takes all light
- * does, and so whether a pixel is drawn a second time. So that windows do not depend on the number of threads, a tile
- * learns only from those before it in its run of KERNEL_TILE_RUN tiles, which one thread draws in order. */
+ * Samples do not depend on windows (kernel_tile_volume.h). But windows decide which cells are seen to overlap behind
+ * the place where all light is absorbed, and so whether a pixel is drawn a second time. So that windows do not depend
+ * on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILE_RUN tiles, which one
+ * thread draws in order. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
@@ -21,17 +23,19 @@
 #include "simd.h"
 
 typedef struct kernel_tile_depth {
-    /* How deep behind its begin the last tile's rays, or most of them, had lost their light; +inf: they kept it. */
+    /* Depth behind the last tile's begin at which at least half of its rays that lost light were dark; +inf: they were
+     * not. */
     float dark;
-    /* for the tile under way */
-    float own_dark; /* the same, once it is known */
-    float begin;    /* where its first cell is known to be, or the first sample is; +inf: none has been yet */
-    bool has_met;   /* any */
-    float expected; /* how much deeper than the last window its rays are to be dark, by the light left after it */
+    /* of the current tile: */
+    float own_dark; /* the same depth for this tile; +inf until it is known */
+    float begin;    /* depth of the first cell, if known, or of the first sample; +inf before any sample */
+    bool has_met;   /* some ray has lost light */
+    float expected; /* expected further depth until the rays are dark, from the light left after the last window */
     float before;   /* the brightest ray's light before the last window */
-    /* the last window's, over rays that have lost any light */
+    /* of the last window, over rays that have lost light: */
     int met, ended;
-    float brightest, first, last; /* first: where they begin; last: where those that are dark end */
+    /* first: least depth of their samples; last: greatest depth at which one of them became dark */
+    float brightest, first, last;
 } kernel_tile_depth;
 
 /* Begins a run of tiles. */
@@ -49,7 +53,7 @@ SIMD_INLINE void kernel_depth_begin_window(kernel_tile_depth *d)
     d->last = -INFINITY;
 }
 
-/* begin: the depth of the tile's first cell, or +inf where that is not known. */
+/* Begins a tile. begin: depth of its first cell, or +inf if it is not known. */
 SIMD_INLINE void kernel_depth_begin(kernel_tile_depth *d, float begin)
 {
     if (d->has_met) d->dark = d->own_dark;
@@ -60,14 +64,14 @@ SIMD_INLINE void kernel_depth_begin(kernel_tile_depth *d, float begin)
     kernel_depth_begin_window(d);
 }
 
-/* How deep the window at a depth is to be, an eighth deeper than expected. */
+/* Returns the depth of the next window, which begins at depth `at`: an eighth more than expected. */
 SIMD_INLINE float kernel_depth_wanted(const kernel_tile_depth *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);
 }
 
-/* Look at what light a packet's rays have after the window. */
+/* Adds the light that a packet's rays have after the window. */
 SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_blend *b)
 {
     const vf far = vf_set(INFINITY);
@@ -81,7 +85,7 @@ SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_bl
     d->last = simd_max(vf_reduce_max(vf_select(ended, b->t_last, -far)), d->last);
 }
 
-/* All rays are looked at after a window of this depth. */
+/* Updates the expectation after all rays of a window of this depth were added. */
 SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
 {
     const bool fades = d->brightest > 0 && d->brightest < 0.9f * d->before;
@@ -89,7 +93,7 @@ SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
     d->before = d->brightest > 0 ? d->brightest : 1;
     d->begin = simd_min(d->first, d->begin);
     d->has_met = d->has_met || d->met;
-    if (d->begin == INFINITY) d->dark *= 2; /* nothing has been met yet, so that what is expected says little */
+    if (d->begin == INFINITY) d->dark *= 2; /* no sample yet, so the last tile's depth says little */
     if (d->own_dark == INFINITY && d->ended > 0 && 2 * d->ended >= d->met) d->own_dark = d->last - d->begin;
     kernel_depth_begin_window(d);
 }

@@ -1,17 +1,18 @@
-/* Segments of a volume for a whole tile: a window at a time, for all the tile's blocks. A cell is fetched and placed
- * once a window (kernel_tile_cells.h), and goes to the packets of the blocks that it may meet, whose rays keep the
- * segments that begin in their window (kernel_segments.h), sort them when the window is whole, and integrate them.
+/* Segments of a volume for a whole tile, window by window, for all the tile's blocks at once. A cell is fetched and
+ * transformed once per window (kernel_tile_cells.h) and passed to the packets of the blocks that it may meet. Their
+ * rays keep the segments that begin in their window (kernel_segments.h), and sort and integrate them at the end of the
+ * window.
  *
- * Windows are stretches of depth, such that a ray has most of its room filled: as many cells as possible lie in one
- * window alone, and the lists of all of a tile's rays stay in the cache. A ray that has more than its room ends its
- * window before the tile's does, and begins the next one there:
+ * Windows are depth intervals in which some ray has most of its list filled: so as many cells as possible lie in a
+ * single window, and the lists of all of a tile's rays stay in the cache. A ray with more segments than its list holds
+ * ends its window before the tile's ends, and begins the next one there:
  *
  *     ray 0  |--s-s-s--s--s---s--|--s--s-...
  *     ray 1  |ssssssssssss|ssssss|sssssss...   full: the rest comes in the tile's next window
  *     ray 2  |--s---s--s--|--x  opaque hit       (which begins where the first of its rays' does)
  *            ^ tile's window 1   ^ tile's window 2 would be here, and is ray 1's begin
  *
- * How deep they are is learnt from window to window and tile to tile; it does not show in the picture. */
+ * The depth of windows is adapted from window to window and from tile to tile; the picture does not depend on it. */
 #ifndef RENDER_KERNEL_TILE_SEGMENTS_H
 #define RENDER_KERNEL_TILE_SEGMENTS_H
 
@@ -44,13 +45,13 @@ typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_double_cell precise;
     kernel_local_stretches stretches;
-    int volume;  /* the one under way */
-    float depth; /* for windows; 0: not known yet */
+    int volume;  /* the current volume */
+    float depth; /* depth of windows; 0: not known yet */
 } kernel_tile_segments;
 
 /* ---- cells ---- */
 
-/* The cell's segments on the rays of the blocks. */
+/* Adds the cell's segments on the rays of the blocks. */
 static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                       unsigned blocks)
 {
@@ -104,14 +105,14 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
 
 /* ---- small tets ---- */
 
-/* Ends in double are found a packet at a time. Tets that are few enough to be binned by tile are so large that packets
- * are as fast. */
+/* Returns whether tets may be processed one ray-tet pair per lane. Not in double, whose ends are computed per packet;
+ * nor if tets are few enough to be binned by tile, as they are then so large that packets are as fast. */
 SIMD_INLINE bool kernel_tet_segments_fit(const kernel_frame *f)
 {
     return kernel_segments_fit(f) && !f->is_double && !f->volume_candidates;
 }
 
-/* Rays that end in their tet, or begin there. */
+/* Adds the segments of rays that begin or end inside their tet. */
 static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_trace *t, kernel_tile_segments *s,
                                                                     vi places, vi lanes, unsigned rays)
 {
@@ -127,7 +128,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
     }
 }
 
-/* Makes the segments of those of the tile's pending tets in the given lanes that are small. Returns the others. */
+/* Adds the segments of the given lanes' pending tets that are small. Returns the lanes of the others. */
 static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
@@ -175,7 +176,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     kernel_segments_set_double(p, &r->list, f->is_double && !f->job->separate_samples);
 }
 
-/* The packet's segments from now on are the volume's. */
+/* Makes the volume the current one of the packet. */
 SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_segments *r, int volume)
 {
     const kernel_frame *f = p->frame;
@@ -184,7 +185,7 @@ SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_
     r->state = (kernel_segment_state){&r->list, &f->pieces[volume], volume, f->allowance, mixing, f->reach[volume]};
 }
 
-/* Where the first of the tile's rays that are under way is; those that are not leave. +inf: none is. */
+/* Deactivates rays that have ended or are dark; returns the least t_begin of the others, +inf if there are none. */
 SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                              int count)
 {
@@ -199,7 +200,7 @@ SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_s
     return vf_reduce_min(front);
 }
 
-/* The segments that begin before the end. */
+/* Collects the segments of the window that ends at `end`. */
 SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks, float end)
 {
     for (int b = 0; b < KERNEL_BLOCKS; b++) {
@@ -220,7 +221,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     kernel_local_segments_end(t, &s->stretches);
 }
 
-/* Learn from the window how deep the next one is to be: so that some ray has three quarters of its room filled. */
+/* Sets the next window's depth from this window's lists, so that the fullest list will be three quarters full. */
 SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *packets, int count, float begin,
                                             float end)
 {
@@ -236,7 +237,8 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Begins the volume's segments; t_near of the tile is where the first ray is, +inf where none is under way. */
+/* Makes the volume the current one of all packets; sets the tile's t_near to the begin of the first ray, +inf if all
+ * rays have ended. */
 SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
                                          int volume, float near)
 {
@@ -246,7 +248,7 @@ SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segme
     t->t_near = front < INFINITY ? fmaxf(front, near) : front;
 }
 
-/* All segments of all volumes, each as a fragment of its own as soon as it is met: there are no windows. */
+/* Emits all segments of all volumes as separate fragments at once, without windows. */
 static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_tile_trace *t, kernel_tile_segments *s,
                                                                        const int *packets, int count,
                                                                        const kernel_placement *reach)
@@ -257,7 +259,7 @@ static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_ti
     }
 }
 
-/* The first volume's segments, window by window. */
+/* Integrates the first volume's segments, window by window. */
 SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                               int count, const kernel_placement *reach)
 {
@@ -276,8 +278,8 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
     }
 }
 
-/* Behind the tile's opaque surfaces, whose hits are in the packets; transparent ones, whose hits are fragments, cut
- * segments. */
+/* Traces the tile's volumes after its opaque surfaces, whose hits are in the packets. Transparent surfaces, whose hits
+ * are fragments, cut segments. */
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;

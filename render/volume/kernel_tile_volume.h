@@ -1,17 +1,17 @@
-/* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. Hexes, wedges and
- * pyramids are taken many at once, with a sample a lane (kernel_local_samples.h), and tets of few pixels with a ray and
- * its tet a lane (kernel_small_tets.h). Other cells are fetched, placed and given their lines once a window
- * (kernel_tile_cells.h), and go to the packets of the blocks that they may meet, where they fill the samples that they
- * own. A window is so many samples that most rays have one or two:
+/* Samples of volumes for a whole tile: one window of samples at a time, for all the tile's blocks. Hexes, wedges and
+ * pyramids are processed one sample per lane (kernel_local_samples.h), and tets of few pixels one ray-tet pair per lane
+ * (kernel_small_tets.h). Other cells are fetched, transformed and given their edge functions once per window
+ * (kernel_tile_cells.h), and passed to the packets of the blocks that they may meet, where they fill the samples that
+ * they own. Window boundaries are numbers of samples, at most job->sample_group apart:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
  *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
  *     block 2  |--s--s--s--s--s--s--|  dark: takes no part in the next window
  *              ^ t_near of window 1 ^ t_near of window 2
  *
- * The traversal is that of surfaces (kernel_tile_trace.h), with the window's begin in the place of the eye and each
- * block's end of the window in that of its nearest hits. What is in a window does not show in the picture: samples are
- * numbered along the ray, and owned by cells. */
+ * The traversal is that of surfaces (kernel_tile_trace.h), with the window's begin in place of the eye, and each
+ * block's end of the window in place of its nearest hits. The picture does not depend on windows: samples are numbered
+ * along the ray, and owned by cells. */
 #ifndef RENDER_KERNEL_TILE_VOLUME_H
 #define RENDER_KERNEL_TILE_VOLUME_H
 
@@ -39,7 +39,7 @@
 
 typedef struct kernel_tile_volume {
     kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
-    int volume; /* under way */
+    int volume; /* the current volume */
     kernel_tile_depth depth;
     kernel_local_batch batch;
 } kernel_tile_volume;
@@ -62,7 +62,7 @@ static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *
     for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
 }
 
-/* The cell's samples on the rays of the blocks. */
+/* Fills the cell's samples on the rays of the blocks. */
 static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                 unsigned blocks)
 {
@@ -91,19 +91,19 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
     return true;
 }
 
-/* ---- small tets: samples by kernel_samples.h's operations, to the same bits ---- */
+/* ---- small tets: samples by the operations of kernel_samples.h, to the same bits ---- */
 
-/* Packets take the samples of tets with larger boxes as fast. */
+/* Tets with larger boxes are sampled as fast by packets. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
-/* May samples of tets be made a ray and its tet a lane? Not where surfaces may end rays, nor where each sample is a
- * fragment of its own. */
+/* Returns whether tets may be sampled one ray-tet pair per lane: not if surfaces may end rays, nor if each sample
+ * becomes a fragment of its own. */
 SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
 {
     return !f->surface_count && !f->job->separate_samples;
 }
 
-/* A sample that has an owner before this one. */
+/* Emits a sample that another cell already owns as a fragment of its own. */
 static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_trace *t, kernel_local_batch *b, int at,
                                                                     float depth, float value)
 {
@@ -114,7 +114,7 @@ static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_
                        vf_set(value));
 }
 
-/* The values of samples of the window, one a lane, go where the window has them. */
+/* Stores the values of samples, one per lane, in the window; emits those that another cell already owns. */
 SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch *b, vm own, vi places, vi numbers,
                                         vf depth, vf value)
 {
@@ -134,7 +134,7 @@ SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch
     }
 }
 
-/* Gives the samples that the rays' intervals own their values. */
+/* Computes the values of the samples that the rays' intervals own. */
 SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batch *b, const kernel_interval *i, vi at)
 {
     vf base, step;
@@ -154,7 +154,7 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
     }
 }
 
-/* Takes the samples of those of the tile's pending tets in the given lanes that are small. Returns the others. */
+/* Samples the small tets among the given lanes' pending tets. Returns the lanes of the others. */
 static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_local_batch *b = &t->thread->tile_volume->batch;
@@ -186,7 +186,7 @@ static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uin
     kernel_tile_volume_trees(t, t->thread->tile_volume->volume, parts, count, blocks, kernel_tile_volume_leaf);
 }
 
-/* Set up the packet; what of sample numbers its rays have between the depths is added to first .. last. */
+/* Sets up the packet; widens first .. last to the numbers of its rays' samples between the two depths. */
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, float near, float far,
                                           int *first, int *last)
 {
@@ -204,7 +204,8 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samp
     *last = highest > *last ? highest : *last;
 }
 
-/* Make the packet ready for the window. Returns how far its rays go in it, and lowers near to where they begin. */
+/* Prepares the packet for the window. Returns the farthest depth of its rays' samples in the window, -inf if there are
+ * none, and lowers *near to the nearest. */
 SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r, int volumes, float *near)
 {
     kernel_samples *s = &r->samples;
@@ -219,7 +220,7 @@ SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r
     return vf_reduce_max(vf_select(p->active, t_end, vf_set(-INFINITY)));
 }
 
-/* Samples first .. last of all blocks; false where no ray is left. */
+/* Collects samples first .. last of all blocks; returns false if no ray is lit any more. */
 SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first, int last)
 {
     const render_job *job = t->frame->job;
@@ -247,7 +248,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     return true;
 }
 
-/* How many samples the window from sample first on is to have. */
+/* Returns the number of samples of the window that begins with sample `first`. */
 SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const kernel_packet *p, int first)
 {
     enum { LEAST = 8 };
@@ -256,7 +257,7 @@ SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const ke
     return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
 }
 
-/* Blends the samples of a window, front to back. */
+/* Blends the window's samples, front to back. */
 SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volume *v, const int *packets, int count,
                                           int samples)
 {
@@ -269,7 +270,7 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
     kernel_depth_end_window(&v->depth, (float)samples * t->packets[packets[0]].sample_step[0]);
 }
 
-/* Behind the tile's opaque surfaces, whose hits are in the packets. */
+/* Traces the tile's volumes after its opaque surfaces, whose hits are in the packets. */
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;

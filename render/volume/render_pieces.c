@@ -1,13 +1,13 @@
-/* Cutting a transfer function: at every point of the opacity and every entry of the colour table, after entries that
- * lie on a line with others have been left out. Opacity and colour are then linear between cuts, exactly as documented.
+/* Cuts a transfer function at every point of the opacity and every entry of the colour table, after entries that lie on
+ * a line with others have been dropped. Opacity and colour are then linear between cuts, exactly as documented.
  *
- * A ramp that is straight along a logarithmic scale is bent along the values. It is cut into pieces whose extinction is
- * nowhere off by more than a share e of itself. What that does to a pixel does not grow with the way through the
- * medium: of a pixel C = int T s c dt + T_end B, a change ds of the extinction s makes dC = int T ds (c - b) dt, b
- * being the light from behind, and with |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), R the contrast of
- * colours. Where the ramp rises from an opacity of 0 a piece from v to (1 + h) v is off by the share h / 2, and farther
- * up, g above it in the logarithm, by h^2 / (8 g): so sqrt(g / 2 e) pieces do, and halving makes at most twice as many.
- * Over 12 decades that are 105 for e = 1.25e-3, and 370 for 1e-4. */
+ * A ramp that is straight along a logarithmic scale is curved along the values. It is cut into pieces whose extinction
+ * has a relative error of at most e. The effect on a pixel does not grow with the path through the medium: for a pixel
+ * C = int T s c dt + T_end B, a change ds of the extinction s makes dC = int T ds (c - b) dt, b being the light from
+ * behind, and with |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), R the contrast of colours. Where the
+ * ramp rises from an opacity of 0, the relative error of a piece from v to (1 + h) v is h / 2; farther up, g above it
+ * in the logarithm, it is h^2 / (8 g). So sqrt(g / 2 e) pieces suffice, and halving makes at most twice as many. Over
+ * 12 decades that is 105 pieces for e = 1.25e-3, and 370 for 1e-4. */
 #include "render_pieces.h"
 #include "kernel_types.h"
 #include "render.h"
@@ -23,7 +23,7 @@
 
 /* A value far outside of every domain; it is finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;
-/* No extinction and no slope of one is above this. */
+/* Upper bound of extinctions and of their slopes. */
 static const double steepest = 1e6;
 static const double rounding = 1e-7;
 
@@ -52,8 +52,8 @@ static bool is_straight(const render_transfer *t, int from, int to, double toler
     return true;
 }
 
-/* Returns the last entry after i up to which all lie on a line; entries are evenly spaced. Long tables are searched
- * piece by piece, as the search is quadratic. */
+/* Returns the last entry after i up to which all entries lie on a line; entries are evenly spaced. The search is
+ * quadratic, so that lines are limited to FARTHEST entries. */
 static int next_entry(const render_transfer *t, int i, double tolerance)
 {
     enum { FARTHEST = 256 };
@@ -63,7 +63,7 @@ static int next_entry(const render_transfer *t, int i, double tolerance)
     return next;
 }
 
-/* A colour of the table that is kept, and where it is in the domain. */
+/* A colour of the table that is kept, and its position in the domain. */
 typedef struct kept_entry {
     int index;
     double place;
@@ -71,7 +71,7 @@ typedef struct kept_entry {
 
 /* ---- ramps along a scale ---- */
 
-/* The share of the extinction that it may be off by where no error is allowed to be made on purpose. */
+/* Relative error of the extinction if no error is allowed on purpose. */
 static const double exact_share = 1e-4;
 
 static double extinction_of(double opacity)
@@ -79,7 +79,7 @@ static double extinction_of(double opacity)
     return opacity < 1 ? fmin(-log1p(-opacity), steepest) : steepest;
 }
 
-/* Part of the ramp from point i to the next one. */
+/* A part of the ramp from point `ramp` to the next one. */
 typedef struct ramp_part {
     const render_transfer *transfer;
     int ramp;
@@ -101,8 +101,9 @@ static double ramp_value(const ramp_part *r, double share)
     return render_domain_of(t, render_unscaled(t->scale, t->threshold, low + share * (high - low)));
 }
 
-/* Tells whether the extinction of the part's chord is off by more than the tolerance's share of itself. An end at which
- * the opacity is 0, where the share is largest, is a 32nd of the part from the first place: a tenth more covers it. */
+/* Returns whether the relative error of the extinction of the part's chord exceeds the tolerance. At an end with
+ * opacity 0 the relative error is largest, and the first sample is 1/32 of the part away from it: the factor 1.1 covers
+ * that. */
 static bool is_bent(const ramp_part *r, double tolerance)
 {
     enum { PLACES = 32 };
@@ -117,8 +118,8 @@ static bool is_bent(const ramp_part *r, double tolerance)
     return false;
 }
 
-/* Appends the places of the cuts within the part, unless cuts is NULL; returns how many there are. Parts end where
- * float32 does not tell their ends apart any more. */
+/* Stores the values of the cuts within the part, unless cuts is NULL; returns their number. A part is not cut if
+ * float32 cannot distinguish its middle from its ends. */
 static int cut_part(const ramp_part *r, double tolerance, kernel_real *cuts)
 {
     const double middle = 0.5 * (r->low + r->high), at = ramp_value(r, middle);
@@ -132,7 +133,7 @@ static int cut_part(const ramp_part *r, double tolerance, kernel_real *cuts)
     return count + cut_part(&right, tolerance, cuts ? cuts + count : NULL);
 }
 
-/* The same for all ramps. */
+/* Stores the values of the cuts of all ramps, unless cuts is NULL; returns their number. */
 static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cuts)
 {
     const double share = tolerance > rounding ? tolerance : exact_share;
@@ -147,7 +148,8 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
 
 /* ---- pieces ---- */
 
-/* Places in the domain, sorted, no two the same; entries gets the colours of the table that are kept. */
+/* Stores the positions of all cuts in the domain, sorted and without duplicates, and the colours of the table that are
+ * kept. */
 static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
     int count = cut_ramps(t, tolerance, cuts), active = 0;
@@ -163,7 +165,7 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
     return unique;
 }
 
-/* Returns which share of the way from point i to the next one x is, along the scale. */
+/* Returns x as a share of the interval from point i to the next one, along the scale. */
 static double ramp_share(const render_transfer *t, int i, double x)
 {
     double low, inverse_width;
@@ -174,7 +176,7 @@ static double ramp_share(const render_transfer *t, int i, double x)
     return fmin(fmax((at - from) / (to - from), 0), 1);
 }
 
-/* Opacity at x on the stretch that holds middle. */
+/* Returns the opacity at x on the ramp that contains `middle`. */
 static double opacity_on(const render_transfer *t, double middle, double x)
 {
     int i = 0;
@@ -203,7 +205,8 @@ static void set_colours(const render_transfer *t, const kept_entry *entries, dou
     }
 }
 
-/* The width, in shares of the domain, below which float32's rounding of a ramp's ends and values (3e-8) shows. */
+/* Width, as a share of the domain, below which float32's rounding of a ramp's ends and values (3e-8) becomes
+ * visible. */
 static const double narrow_width = 0.01;
 
 static bool is_narrow(const render_transfer *t, int i)
@@ -212,8 +215,8 @@ static bool is_narrow(const render_transfer *t, int i)
     return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
 }
 
-/* Returns where the narrow ramp that ends at the cut ends exactly. Returns the cut if no such ramp ends there, or if
- * points coincide there (a step). */
+/* Returns the exact value of the cut in double if a narrow ramp begins or ends there. Returns the rounded cut if none
+ * does, or if several points coincide there (a step). */
 static double cut_exactly(const render_transfer *t, kernel_real cut)
 {
     double out = (double)cut;
@@ -276,7 +279,7 @@ static double piece_opacity(const kernel_piece *p, double x)
     return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
-/* The least and the most of how steeply the extinction rises or falls between two values of a piece. */
+/* Computes the minimum and the maximum of the extinction's absolute slope between two values of a piece. */
 static void steepness_of(const kernel_piece *p, double from, double to, double out[2])
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
@@ -309,8 +312,8 @@ static void bound_piece(kernel_pieces *out, const kernel_piece *p)
     }
 }
 
-/* Finds the steps. Of points at one place, the first's opacity ends the lower side and the last's begins the upper
- * side. */
+/* Finds the steps. If several points have the same value, the first one's opacity is the lower side's and the last
+ * one's the upper side's. */
 static void fill_steps(kernel_pieces *out, const render_transfer *t)
 {
     int last;
@@ -325,9 +328,9 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* A share of the domain. Wider ramps need only equal parts, up to 1000 optical depths
- * (docs/development/error_budget.md). A ramp along a scale is as steep within that of 0, and less beyond, as its slope
- * is the inverse of the value there. */
+/* Width of steep ramps, as a share of the domain. Wider ramps need only equal subintervals, up to 1000 optical depths
+ * (docs/development/error_budget.md). A ramp along a logarithmic scale is steep only within this distance of 0, as its
+ * slope is the inverse of the value. */
 static const double steep_width = 1.0 / 64;
 
 static void fill_steep(kernel_pieces *out, const render_transfer *t)
@@ -344,7 +347,7 @@ static void fill_steep(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* The least and the most of what light may be. */
+/* Computes the range of light: from 0 to 1, extended to all colours of the table. */
 static void range_of_light(const render_transfer *t, float *low, float *high)
 {
     *low = 0, *high = 1;
@@ -356,9 +359,9 @@ static void range_of_light(const render_transfer *t, float *low, float *high)
 
 /* ---- how bounds vary ----
  *
- * A field that is off by d changes the light by T d g a unit distance, g = s' (c - b) + s c' in each channel, with the
- * light b of all that lies behind, between the least and the most of colours. g is linear in b, so that over a stretch
- * of values it varies by no more than at one of these two. Of the alpha channel g is s'. */
+ * A field error d changes the light by T d g per unit distance, g = s' (c - b) + s c' in each channel, where the light
+ * b from behind lies between the minimum and maximum of light. g is linear in b, so that over a range of values its
+ * variation is largest at one of these two. For the alpha channel, g = s'. */
 enum { SWING_KINDS = 7 };
 
 typedef struct value_swing {
@@ -372,7 +375,7 @@ static void widen_swing(value_swing *swing, int kind, double low, double high)
     swing->high[kind] = fmax(swing->high[kind], fmin(high, 1e30));
 }
 
-/* Widens a by b. By comparisons, as fmin() and fmax() are calls, of which a frame would have 200,000. */
+/* Widens a by b. Comparisons are used because fmin() and fmax() are function calls, 200,000 of them per frame. */
 static void unite_swings(value_swing *a, const value_swing *b)
 {
     for (int kind = 0; kind < SWING_KINDS; kind++) {
@@ -382,7 +385,7 @@ static void unite_swings(value_swing *a, const value_swing *b)
     a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
 }
 
-/* Widens the swing by the piece between two of its values. */
+/* Widens the swing by the piece's bounds between two of its values. behind: the minimum and maximum of light. */
 static void swing_in_piece(value_swing *swing, const kernel_piece *p, double from, double to, const double behind[2])
 {
     kernel_bound b = {.extinction_low = 1e30f};
@@ -390,7 +393,7 @@ static void swing_in_piece(value_swing *swing, const kernel_piece *p, double fro
     double steepness[2];
     widen(&b, p, from, to);
     steepness_of(p, from, to, steepness);
-    /* The extinction's slope with its sign, the least and the most. */
+    /* Minimum and maximum of the extinction's signed slope. */
     const double fall = falls ? -steepness[1] : steepness[0], rise = falls ? -steepness[0] : steepness[1];
     const double least = (double)b.extinction_low, most = (double)b.extinction_high;
     swing->extinction = fmax(most, swing->extinction);
@@ -407,8 +410,8 @@ static void swing_in_piece(value_swing *swing, const kernel_piece *p, double fro
     }
 }
 
-/* The bin's, a little beyond its ends; what is beyond the first and the last bin is theirs. No piece before the first
- * reaches the bin; returns the first that reaches the next one. */
+/* Computes the bounds over a bin, a little beyond its ends; the first and the last bin include everything beyond them.
+ * No piece before `piece` may reach the bin; returns the first piece that reaches the next bin. */
 static int swing_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2], value_swing *swing)
 {
     const double width = 1 / (double)t->swing_inverse, begin = (double)t->bin_low + (bin - 1e-3) * width;
@@ -438,7 +441,8 @@ static void sum_up_swing(const value_swing *s, double contrast, kernel_swing *ou
                           .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
 }
 
-/* A stretch of a width's class ends in the wanted bin or before it, wherever in its first bin it begins. */
+/* Fills the table of bounds by class of width and first bin. A value range of a class ends in bin `wanted` or before
+ * it, wherever in its first bin it begins. */
 static void fill_swings(kernel_pieces *out, const double behind[2])
 {
     value_swing bins[KERNEL_SWING_BINS];

@@ -1,5 +1,4 @@
-/* The integrals of a transfer function over its values (kernel_preintegral.h): over each bin in double, piece by piece.
- */
+/* Integrates a transfer function over its values (kernel_preintegral.h): over each bin in double, piece by piece. */
 #include <math.h>
 #include <string.h>
 
@@ -13,13 +12,14 @@
 
 enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 };
 
-/* The most that all bins' sums may be: differences are taken in 32 bits. */
+/* Maximum of the sum over all bins: differences are computed in 32 bits. */
 static const double most_units = 0x1p30;
 static const double steepest = 1e6; /* kernel_integral.h: KERNEL_OPAQUE */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
-/* How close together the ends of a segment may be goes as the square of a bin's width, over the error. For 1e-2 it is
- * 196 KB, which a core's second cache holds beside a tile's rays. */
+/* Returns the number of bins for an error. The least distance between the ends of a segment goes as the square of a
+ * bin's width, over the error. The table for 1e-2 has 196 KB, which fits into a core's second-level cache beside a
+ * tile's rays. */
 static int bin_count_for(double max_error)
 {
     int count = LEAST_BINS;
@@ -27,9 +27,9 @@ static int bin_count_for(double max_error)
     return count;
 }
 
-/* A bin's sums, before the unit of whole numbers is known. */
+/* A bin's sums, before they are rounded to integers. */
 typedef struct bin_sums {
-    double sum[CHANNELS], low, high; /* extinctions */
+    double sum[CHANNELS], low, high; /* low, high: of extinctions */
     double colour_low[3], colour_high[3];
 } bin_sums;
 
@@ -70,7 +70,7 @@ static double extinction_at(const kernel_piece *p, double x)
     return extinction_of(clear_at(p, x));
 }
 
-/* The last extinction that was needed: bins begin where the one before ended, and in many the function is constant. */
+/* Cache of the last computed extinction. Consecutive bins share an end, and the function is constant in many bins. */
 typedef struct last_extinction {
     double clear, extinction;
 } last_extinction;
@@ -87,8 +87,8 @@ static double colour_at(const kernel_piece *p, double x, int c)
            (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_COLOUR_SLOPE + c);
 }
 
-/* Three Gauss nodes, on halves and halves of halves towards an opacity of 1. Between equal ends clear_at() is constant.
- */
+/* Adds the integrals between two values of a piece, by three Gauss nodes. Intervals are halved repeatedly towards an
+ * opacity of 1. If both ends are equal, clear_at() is constant between them. */
 static void integrate(const kernel_piece *p, double from, double to, int depth, last_extinction *last,
                       double sum[CHANNELS])
 {
@@ -120,7 +120,8 @@ static void widen(bin_sums *bin, const kernel_piece *p, double x, last_extinctio
     }
 }
 
-/* Integrates from begin to end. first is the piece that holds begin; returns the piece that holds end. */
+/* Computes the bin's sums and ranges from begin to end. first: the piece that contains begin; returns the piece that
+ * contains end. */
 static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, last_extinction *last,
                     bin_sums *bin)
 {
@@ -141,14 +142,15 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
     }
 }
 
-/* Before and behind all knots the function is constant; a width of it stands for what is endless. */
+/* Fills all bins. Before and behind all knots the function is constant; these infinite ranges are represented by one
+ * bin width each. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
-    last_extinction last = {-1, 0}; /* of no clearness */
+    last_extinction last = {-1, 0}; /* no transmittance is -1, so the cache is empty */
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
         piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &last, &bins[i]);
-    /* The border's rounding must not bring in a neighbour. */
+    /* Replaces the outermost bins, so that rounding of the border does not bring in a neighbouring piece. */
     for (int end = 0; end < 2; end++) {
         const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
@@ -170,7 +172,7 @@ static int32_t pack_colour(const bin_sums *bin, double contrast)
     return packed;
 }
 
-/* Returns the widest change among the three channels. */
+/* Returns the largest change among the three channels. */
 static double colour_change(const bin_sums *bin)
 {
     double change = 0;
@@ -178,7 +180,7 @@ static double colour_change(const bin_sums *bin)
     return change;
 }
 
-/* Writes the sums in units; returns by how much the colour within a bin differs from its middle's. */
+/* Stores the sums as integers; returns by how much the colour within a bin deviates from that at its middle. */
 static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
 {
     double total[2] = {0, 0}, before[CHANNELS] = {0}, change = 0;
@@ -197,7 +199,8 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
             e->own[n] = (float)((int32_t)(before[n] / units[n > 0]) - begin);
         }
         e->colour = pack_colour(bin, contrast);
-        const double rounding = 2 * (units[0] * contrast + units[1]) / width; /* what is nothing has none */
+        /* a bin without extinction has no rounding */
+        const double rounding = 2 * (units[0] * contrast + units[1]) / width;
         e->rough = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
                                    (bin->high > 0 ? rounding : 0),
                                1e30);
@@ -208,8 +211,8 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     return 0.5 * change;
 }
 
-/* Fills the bends of tables with uneven entries. It assumes the sharpest bend at the closest spacing. The bends to
- * constant colours at the ends count too, as the ends need not be at 0 and 1. */
+/* Fills in the bends of tables with uneven entries, assuming the sharpest bend at the closest spacing. The bends
+ * towards the constant colours beyond the ends count too, as the ends need not be at 0 and 1. */
 static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
 {
     double bend = 0, closest = 1;
@@ -228,7 +231,7 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
     out->bend = (float)fmin(bend / 4, 1e30);
 }
 
-/* Fills in where the table's colours bend and by how much. */
+/* Fills in the bends of the table's colours, which bound their deviation from chords. */
 static void fill_bends(kernel_preintegral *out, const render_transfer *t)
 {
     const int last = t->colour_count - 1;
@@ -279,7 +282,7 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
 {
     kernel_pieces exact;
     if (has_negative_colours(t)) return INSITU_OK;
-    /* Along a scale no pieces are exact: their error takes the place of that of merged colours. */
+    /* Along a scale no pieces are exact: the pieces' error takes the place of the error of merged colours. */
     const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
     const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
