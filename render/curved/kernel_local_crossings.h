@@ -1,7 +1,7 @@
-/* Where rays cross the faces of hexes, wedges and pyramids, a ray and its cell a lane: the faces by the signs of
- * projected edges, the places on quads by kernel_quad.h and on triangles by weights, both as kernel_curved_intervals()
- * has them for a packet in one cell, and so with the same bits. A function's type is a constant where it is called
- * from. */
+/* Crossings of rays with the faces of hexes, wedges and pyramids, one ray-cell pair per lane. The crossed faces are
+ * found by the signs of projected edge functions, the crossing points on quads by kernel_quad.h and on triangles by
+ * weights. The operations are those of kernel_curved_intervals(), which intersects a packet with one cell, and so the
+ * bits are the same. A function's type is a constant at its callers. */
 #ifndef RENDER_KERNEL_LOCAL_CROSSINGS_H
 #define RENDER_KERNEL_LOCAL_CROSSINGS_H
 
@@ -20,21 +20,20 @@
 
 enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
 
-/* Cells in lanes: places and the field by vertex, and of each face kernel_quad_corners() or kernel_triangle_order(),
- * four bits a corner. For vectors of 16 lanes the same cell by cell: x and y by vertex, z and the field by vertex, and
- * words by face, 8 numbers each. */
+/* One cell per lane: positions and the field by vertex, and per face a word of kernel_quad_corners() or
+ * kernel_triangle_order(), four bits per corner. For vectors of 16 lanes `rows` holds the same data per cell: x and y
+ * by vertex, z and the field by vertex, and the words by face, 8 numbers each. */
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
-    float dents[SIMD_WIDTH]; /* how far patches are off their triangles at most, over the cell's pixels
-                                (kernel_curved_dents()) */
+    /* kernel_curved_dents(): bits of the quads that may not look convex on some of the cell's pixels */
+    float dents[SIMD_WIDTH];
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
 } kernel_local_faces;
 
 /* ---- cells ---- */
 
-/* Counts for each vertex how many are before it in the order of coordinates; equal ones are in the order in which they
- * came. */
+/* Computes the rank of each vertex in the order of coordinates; vertices with equal coordinates keep their order. */
 SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int count, vf rank[8])
 {
     kernel_half sum[2][8] = {0};
@@ -57,7 +56,8 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
         for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
 }
 
-/* A step of a transposition after vf_transpose(): exchanges numbers of vectors and lanes that are 4 or 8 apart. */
+/* One step of a 16 x 16 transposition, after vf_transpose() has transposed the 4 x 4 blocks: exchanges blocks that are
+ * `apart` (4 or 8) vectors and lanes from each other. */
 SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
 {
     const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
@@ -69,7 +69,7 @@ SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int a
     }
 }
 
-/* A row of each cell: 8 numbers, which the lists have lane by lane, and 8 more. */
+/* Stores one row of every cell, by transposing two lists of up to 8 vectors each, in which lanes are cells. */
 SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count,
                                      const float (*second)[SIMD_WIDTH], int second_count, int row,
                                      kernel_local_faces *out)
@@ -88,7 +88,7 @@ SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first
     for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
 }
 
-/* Rays of the tile from the first to the last of columns and rows, lane by lane. */
+/* Stores, per lane, the slopes and origins of the rays at its first and last column and row. */
 SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], kernel_ray_box *out)
 {
     const vf first = vf_set(0), last = vf_set(KERNEL_TILE - 1);
@@ -102,7 +102,7 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
     }
 }
 
-/* lists: places, the field and ranks by vertex. ends: kernel_local_pixels(). */
+/* Fills in the faces of the cells. lists: positions, the field and ranks by vertex. ends: kernel_local_pixels(). */
 SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists)[8], int32_t ends[4][SIMD_WIDTH],
                                        int type, kernel_local_faces *out)
 {
@@ -128,7 +128,7 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 
 /* ---- rays ---- */
 
-/* Vertices in the rays' planes. */
+/* Vertices, projected along the rays. */
 typedef struct kernel_local_seen {
     vf x[8], y[8];
 } kernel_local_seen;
@@ -143,7 +143,8 @@ SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_loca
     }
 }
 
-/* An edge function, by its sign bit, and where it is so small that its sign is not known. */
+/* Returns an edge function, whose sign bit is its side, and lowers *least to its absolute value. A function that is too
+ * small has an uncertain sign. */
 SIMD_INLINE vi kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
@@ -164,7 +165,7 @@ SIMD_INLINE void kernel_local_sides_of(const kernel_local_seen *s, int type, ker
     }
 }
 
-/* Bits of the faces on the same side of all of whose edges the rays are. */
+/* Returns a bit for each face whose edge functions all have the same sign on the ray. */
 SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -177,7 +178,8 @@ SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int t
     return faces;
 }
 
-/* Rays that cross a quad once, whatever it looks like; alone gets those that may cross it twice. */
+/* Returns the rays that cross a quad once, even if it does not look convex; adds those that may cross it twice to
+ * *alone. */
 SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kernel_curved_sides *sides,
                                          const kernel_shape *shape, int face, vm rays, vm *alone)
 {
@@ -187,7 +189,8 @@ SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kerne
     return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
-/* dents: bits of the quads that may not look convex, ray by ray; NULL: there are none. */
+/* Finds the faces that the rays cross. dents: per ray, bits of the quads that may not look convex; NULL: there are
+ * none. */
 SIMD_INLINE void kernel_local_find_given(const kernel_local_faces *f, const kernel_local_rays *own, const vi *dents,
                                          vm rays, kernel_curved_crossed *out, int type)
 {
@@ -213,7 +216,7 @@ static __attribute__((noinline)) void kernel_local_find_dented(const kernel_loca
     KERNEL_OF_TYPE(type, kernel_local_find_given, f, own, dents, rays, out);
 }
 
-/* The two faces that rays cross once each. Rays that may do anything else are for the cell alone. */
+/* Finds the two faces that each ray crosses once. Any other ray is marked for the scalar path (out->alone). */
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_local_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
@@ -226,18 +229,18 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kern
 
 /* ---- corners ---- */
 
-/* The corners of two faces of each ray's cell, in the order of the faces' words: places in the ray's plane and depth,
- * and the field. */
+/* The corners of a face of each ray's cell, in the order of the face's word: position in the ray's plane, depth, and
+ * field. */
 typedef struct kernel_local_corners {
     vi vertex[4];
     vf at[4][4];
 } kernel_local_corners;
 
-/* Vectors of 16 rays mostly have them in one or two cells, which were listed one after the other. Then a number of each
- * ray's own vertex is taken out of the two cells' rows at once. */
+/* The one or two cells to which a vector of 16 rays mostly belongs, as rays are listed cell by cell. A number of each
+ * ray's own vertex is then selected from the two cells' rows by one permutation. */
 typedef struct kernel_local_pair {
-    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* for the two cells */
-    vi second;                                /* SIMD_WIDTH where the ray's cell is the second */
+    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* rows of the two cells */
+    vi second;                                /* SIMD_WIDTH if the ray's cell is the second one, else 0 */
 } kernel_local_pair;
 
 SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi lane, kernel_local_pair *out)
@@ -256,7 +259,7 @@ SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi l
     return !vm_any(vm_andnot(rays, vm_or(in_first, in_last)));
 }
 
-/* pair: NULL where rays have more than two cells. */
+/* Gathers the corners of each ray's face. pair: NULL if the rays have more than two cells. */
 SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
                                            vi lane, vi face, kernel_local_corners *out)
 {
@@ -290,7 +293,7 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
                 out[n].at[i][a] = (out[n].at[i][a] - rays->origin[a]) - rays->slope[a] * out[n].at[i][2];
 }
 
-/* A vertex's own coordinate on an axis, from the middle. */
+/* Returns a vertex's reference coordinate on an axis, relative to the cell's middle. */
 SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
 {
     static const float own[3][3][KERNEL_LOCAL_ROW] = {
@@ -305,7 +308,7 @@ SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
     return SIMD_WIDTH < 8 ? vf_gather(of, vertex) : vf_permute(vf_load(of), vertex);
 }
 
-/* ---- places ---- */
+/* ---- crossing points ---- */
 
 SIMD_INLINE void kernel_local_quad_of(const kernel_local_corners *c, kernel_quad *q)
 {
@@ -362,7 +365,7 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2],
     for (int n = 0; n < count; n++) kernel_local_quad_end(&corners[n], type, &places[n], &ends[n]);
 }
 
-/* Where rays that cross two faces come in and go out. */
+/* Computes entry and exit of rays that cross two faces. */
 SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_rays *rays,
                                     const kernel_curved_crossed *crossed, int type, kernel_point out[2])
 {

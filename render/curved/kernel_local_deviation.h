@@ -1,29 +1,29 @@
-/* The field along rays between two faces of their hexes, wedges or pyramids, a ray and its cell a lane, from three
- * places between them, and from three in each part of the way. A function's type is a constant where it is called from.
+/* The field along rays between two faces of their hexes, wedges or pyramids, one ray-cell pair per lane. It is
+ * evaluated at three places between the faces, or in each part of a ray's interval. A function's type is a constant at
+ * its callers.
  *
- * In kernel_local.h's coordinates the field is f0 + g r + (its bent terms), and y = r + n(r) goes in a line along the
- * ray, with the same bent terms b in n = B b. So with r = y - n(r)
+ * In kernel_local.h's reference coordinates the field is f0 + g r + (its nonlinear terms), and y = r + n(r) is linear
+ * along the ray, with the same nonlinear terms b in n = B b. So with r = y - n(r)
  *
- *     field = f0 + g y + h b(r),   h = (the field's bent terms) - g B,
+ *     field = f0 + g y + h b(r),   h = (the field's nonlinear terms) - g B,
  *
- * of which the first part is linear along the ray: the field is off its chord between the faces by h times what b is
- * off its own. That is little, so r need not be known as well as for the field itself.
+ * The first part is linear along the ray. So the field deviates from its chord between the faces by h times the
+ * deviation of b from its own chord. As that is small, r need not be known as accurately as for the field itself.
  *
- * r is found from the line between its values at the faces. In the middle of a cell n' is zero, so that a step of
- * Newton's method with the derivatives there adds what is left, and takes |n'| of it into the next. It has a
- * third of the terms of a step with the derivatives at the place, and all places take theirs side by side.
+ * r is found by Newton's method, from the line between its values at the faces. In the middle of a cell n' is zero, so
+ * that a step with the derivatives there adds the residual, and leaves |n'| of it to the next step. Such a step has a
+ * third of the terms of a step with the derivatives at the current point, and all places are computed side by side.
  *
- * How wrong it is. Let the residual be the sum over the coordinates of what y - (r + n(r)) is off zero by. The
- * derivative of n is no more than N in the cell. r may be somewhat outside (kernel_local_is_near()), where it is no
- * more than 1.082 N:
+ * Error bound. Let the residual be the sum over the coordinates of |y - (r + n(r))|. The derivative of n is at most N
+ * in the cell. If r lies slightly outside the cell (kernel_local_is_near()), the derivative is at most 1.082 N:
  *
  *              r may be up to                                   derivative          gradients of b
  *     hex      |ρ|, |σ|, |κ| <= 0.52                            1.04^2 N            sqrt(2) 0.52, sqrt(3) 0.52^2
  *     wedge    0.02 outside, within the cell times 1.06         1.06 N              |(0.52, 0.707)|
  *     pyramid  |α|, |β| <= 0.52 k, k <= 1.02                    1.045 N             |(0.52, 0.52, 0.52^2)|
  *
- * These are convex. So r is off by no more than residual / (1 - 1.082 N), if r itself is no farther outside, which is
- * asked; else the ray goes to the cell alone. */
+ * These regions are convex. So r errs by at most residual / (1 - 1.082 N), provided that r itself is no farther
+ * outside, which is checked; otherwise the ray takes the scalar path. */
 #ifndef RENDER_KERNEL_LOCAL_DEVIATION_H
 #define RENDER_KERNEL_LOCAL_DEVIATION_H
 
@@ -37,40 +37,41 @@
 
 enum { KERNEL_DEVIATION_STEPS = 8 };
 
-/* In r, whose cell goes from -1/2 to 1/2. */
+/* Distance in r by which points may lie outside the cell, which extends from -1/2 to 1/2. */
 #define KERNEL_DEVIATION_MARGIN 0.02f
 
-/* Lane by lane. */
+/* Properties of the nonlinear terms per lane. */
 typedef struct kernel_local_nonlinear {
     float terms[KERNEL_BENT_TERMS][SIMD_WIDTH]; /* h */
     float bend[SIMD_WIDTH];                     /* N^2 */
-    float unseen[SIMD_WIDTH];                   /* the least that is taken for E of kernel_local_budget.h */
-    float sensitivity[SIMD_WIDTH];              /* what the field may be off by, over the residual */
-    float residual_limit[SIMD_WIDTH];           /* a larger residual says nothing of the field */
-    float tolerance[SIMD_WIDTH];                /* a smaller one is small enough */
+    float unseen[SIMD_WIDTH];                   /* lower bound of E (kernel_local_budget.h) */
+    float sensitivity[SIMD_WIDTH];              /* error bound of the field per unit of the residual */
+    float residual_limit[SIMD_WIDTH];           /* if the residual is larger, the field is undefined */
+    float tolerance[SIMD_WIDTH];                /* Newton's method stops at a residual of at most this */
 } kernel_local_nonlinear;
 
 typedef struct kernel_local_deviations {
-    vf field[3];     /* off its chord, at the quarters and the middle */
-    vf residual;     /* the most at these places; of a part, at all places so far and their parts' ends */
-    vm has_diverged; /* rays on which r has not been found */
+    vf field[3];     /* deviation from the chord at the first quarter, the middle and the third quarter */
+    vf residual;     /* largest residual at these places; for a part, at all places and parts' ends so far */
+    vm has_diverged; /* rays for which r was not found */
 } kernel_local_deviations;
 
 /* ---- cells ---- */
 
-/* The gradient of a bent term is no more than that. */
+/* Returns an upper bound of the gradient of a nonlinear term. */
 SIMD_INLINE float kernel_local_bent_slope(int type, int term)
 {
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
-/* What no look may see of the field, by the bend's square and the bent terms (kernel_local_budget.h). */
+/* Returns the factor e of kernel_local_budget.h. It bounds the part of the field's deviation that the three places do
+ * not show. */
 SIMD_INLINE float kernel_local_bent_unseen(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
 
-/* All but the tolerance. */
+/* Sets every member of *out but tolerance. */
 SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_nonlinear *out)
 {
     vf most = vf_set(0);
@@ -89,10 +90,10 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
 
 /* ---- rays in cells ---- */
 
-/* The lanes' rays and cells. The ray's share u goes from -1/2 to 1/2. */
+/* Chords of the rays in their cells, one per lane. The position u on the ray goes from -1/2 to 1/2. */
 typedef struct kernel_local_chord {
-    vf middle[3], span[3];                               /* the line between r at the faces */
-    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* the terms' chords */
+    vf middle[3], span[3]; /* middle and extent of the line between the values of r at the faces */
+    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* middle and extent of the nonlinear terms' chords */
     vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
     vf tolerance, residual_limit;
 } kernel_local_chord;
@@ -108,7 +109,7 @@ SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BEN
     memcpy(out, b.term, sizeof b.term);
 }
 
-/* Tells where r is in the cell or not far outside. */
+/* Returns the rays for which r lies in the cell or slightly outside. */
 SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 {
     if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
@@ -137,7 +138,7 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     out->residual_limit = kernel_take(nonlinear->residual_limit, lane);
 }
 
-/* Finds the residual at the place u, and how far the field is off its chord. */
+/* Computes the residual at position u, and the field's deviation from its chord. */
 SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
     vf term[KERNEL_BENT_TERMS];
@@ -156,8 +157,8 @@ SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
     return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
 }
 
-/* Finds r at count places from guesses; residual: the most that is left. Returns the rays on which all of them are in
- * the cell or not far outside. */
+/* Refines r at `count` places from guesses; *residual: the largest one left. Returns the rays for which all of them lie
+ * in the cell or slightly outside. */
 SIMD_INLINE vm kernel_local_settle(const kernel_local_chord *c, const float *places, int count, vm rays, int type,
                                    kernel_local_iterate *at, vf *residual)
 {
@@ -201,11 +202,11 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
 
 /* ---- parts ---- */
 
-/* Where one of equal parts of the ray's way ends. */
+/* State at the end of one of the equal parts into which a ray's interval is cut. */
 typedef struct kernel_local_part {
     float u;
-    vf r[3], deviation; /* the field's, from the chord of the whole way */
-    vf residual;        /* the most so far */
+    vf r[3], deviation; /* deviation: of the field, from the chord of the whole interval */
+    vf residual;        /* largest one so far */
 } kernel_local_part;
 
 SIMD_INLINE void kernel_local_part_begin(const kernel_point *first, kernel_local_part *out)
@@ -214,8 +215,8 @@ SIMD_INLINE void kernel_local_part_begin(const kernel_point *first, kernel_local
     memcpy(out->r, first->r, sizeof out->r);
 }
 
-/* Goes on to the end of the next part, whose length is a share of the way, and finds the deviations from the part's own
- * chord. */
+/* Advances to the end of the next part, whose length is `share` of the interval, and computes the deviations from the
+ * part's own chord. */
 SIMD_INLINE void kernel_local_part_next(const kernel_local_chord *c, float share, vm rays, int type,
                                         kernel_local_part *part, kernel_local_deviations *out)
 {

@@ -1,6 +1,5 @@
-/* Cells that wait for lanes: hexes, wedges and pyramids of arrays of any layout, of one type in a queue each, until a
- * vector is full and they are placed together. For samples (kernel_local_samples.h) and segments
- * (kernel_local_segments.h). */
+/* Queues of hexes, wedges and pyramids, one per type, for cells in arrays of any layout. When a queue is full, a vector
+ * of its cells is transformed at once. kernel_local_samples.h and kernel_local_segments.h use them. */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -21,27 +20,28 @@
 #include "simd.h"
 
 enum {
-    KERNEL_LOCAL_AHEAD = 8, /* so many cells wait for their indices from memory, and as many for their numbers */
+    KERNEL_LOCAL_AHEAD = 8, /* prefetch distance in cells: first for vertex indices, then for coordinates and values */
     KERNEL_LOCAL_ROOM = SIMD_WIDTH + 2 * KERNEL_LOCAL_AHEAD
 };
 
-/* Cells of one type that wait. Those of a vector are taken from the front when the room is full. */
+/* Queue of cells of one type. When it is full, the first SIMD_WIDTH cells are processed. */
 typedef struct kernel_local_queue {
-    int count, known; /* the first known have their vertices */
+    int count, known; /* the vertex indices of the first `known` cells have been read */
     uint32_t cell[KERNEL_LOCAL_ROOM];
     uint16_t blocks[KERNEL_LOCAL_ROOM], box[KERNEL_LOCAL_ROOM];
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
 typedef struct kernel_local_lanes {
-    kernel_tile_take *take; /* what is done with cells that are not for lanes */
+    kernel_tile_take *take; /* callback for cells that cannot be processed in lanes */
     int volume, part;
-    kernel_arrays arrays; /* the part's */
+    kernel_arrays arrays; /* of the current part */
     kernel_local_queue queues[KERNEL_CURVED_TYPES];
-    double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH]; /* as the caller has them */
+    double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH]; /* coordinates and field as the caller has them */
     kernel_local_cells cells;
-    int32_t ends[4][SIMD_WIDTH]; /* first and last columns and rows that cells may show in (kernel_local_pixels()) */
-    int alone;                   /* the lane whose cell is the tile's cell, ready to be crossed; -1: none */
+    /* first and last column and row in which cells may be visible (kernel_local_pixels()) */
+    int32_t ends[4][SIMD_WIDTH];
+    int alone; /* the lane whose cell is the tile's current cell, ready for the scalar path; -1: none */
 } kernel_local_lanes;
 
 SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, kernel_tile_take *take)
@@ -52,7 +52,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, ker
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
 }
 
-/* Cells that wait from now on are of this part: none of another waits. */
+/* Switches to another part. The queues must be empty. */
 SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
 {
     l->part = part;
@@ -67,7 +67,7 @@ SIMD_INLINE int kernel_local_queue_of(int type)
 
 /* ---- cells ---- */
 
-/* Fetches the first cells, of so many vertices. */
+/* Reads coordinates and values of the first SIMD_WIDTH cells, which have this number of vertices. */
 SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_queue *q, int vertices)
 {
     const kernel_arrays *p = &l->arrays;
@@ -87,7 +87,8 @@ SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_qu
     }
 }
 
-/* The field in the transfer function's domain, as kernel_cell_domain() has it; returns the lanes that show. */
+/* Converts the field to the transfer function's domain, as kernel_cell_domain() does; returns the lanes that are
+ * visible. */
 SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scalars)[SIMD_WIDTH], int count,
                                    vf values[8])
 {
@@ -106,8 +107,8 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
     return vm_and(finite, kernel_interest_meets_values(&t->interest, plain, count));
 }
 
-/* The tile's first and last columns and rows in which cells may be seen. A hundredth of a pixel is more than the
- * roundings of vertices that lie a thousandth of the scene's distance or more before the eye. */
+/* Computes the tile's first and last columns and rows in which cells may be visible. The margin of 1/100 pixel exceeds
+ * the rounding of vertices that are at least 1/1000 of the scene's distance in front of the eye. */
 SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, const vf places[3][8],
                                      int32_t ends[4][SIMD_WIDTH])
 {
@@ -137,7 +138,7 @@ SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, cons
     }
 }
 
-/* What of a box of pixels (kernel_types.h) lies between the lane's ends; false where nothing does. */
+/* Clips a box of pixels (kernel_types.h) to the lane's columns and rows; returns false if nothing is left. */
 SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigned *box)
 {
     int end[4];
@@ -151,8 +152,8 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
     return true;
 }
 
-/* Places the cells that are fetched: lists gets the vertices' places and the field there, and whatever else it has of
- * the vertices is turned with these. Returns the cells that show, and in lanes those of them that are for lanes. */
+/* Transforms the fetched cells into tile space. Stores the vertices' positions and the field in lists; permutes its
+ * further rows along with them. Returns the visible cells; *lanes: those of them that can be processed in lanes. */
 SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, int type, vf (*lists)[8],
                                         int list_count, float most_bent, unsigned *lanes)
 {
@@ -172,7 +173,7 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
     return vm_bits(shows);
 }
 
-/* Reads the vertices of queued cells up to an end. */
+/* Reads the vertex indices of queued cells before index `end`. */
 SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_queue *q, int end, int type)
 {
     for (; q->known < end; q->known++)
@@ -180,8 +181,7 @@ SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_qu
                                KERNEL_LOCAL_ROOM);
 }
 
-/* Fetches the first cells of the queue, as many as there are lanes; returns the lanes that have one. Others get the
- * first cell. */
+/* Fetches the first SIMD_WIDTH cells of the queue; returns the lanes that have one. Other lanes get the first cell. */
 SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
@@ -195,7 +195,7 @@ SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_
     return (1u << count) - 1;
 }
 
-/* Takes these cells out of the queue. */
+/* Removes the first SIMD_WIDTH cells from the queue. */
 SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
 {
     enum { LEFT = KERNEL_LOCAL_ROOM - SIMD_WIDTH };
@@ -208,7 +208,7 @@ SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
     for (int i = 0; i < 8; i++) memmove(q->vertex[i], q->vertex[i] + SIMD_WIDTH, LEFT * sizeof *q->vertex[i]);
 }
 
-/* Queues a cell, whose indices have been prefetched; returns whether the queue is full. */
+/* Queues a cell, whose vertex indices must have been prefetched; returns whether the queue is full. */
 SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_queue *q, uint32_t cell, unsigned blocks,
                                    unsigned box, int type)
 {
@@ -222,7 +222,7 @@ SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_que
 
 /* ---- pixels ---- */
 
-/* From where to where the rays may be inside of their cells, after depth. */
+/* Computes the interval, relative to depth, in which each ray may be inside its cell. */
 SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_local_rays *rays, vf depth,
                                       vf *near, vf *far)
 {
