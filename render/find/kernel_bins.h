@@ -1,23 +1,23 @@
-/* The cells that a tile has of a picture's, binned by render_candidates.c. */
+/* A tile's part of the picture's cells, which render_candidates.c has binned. */
 #ifndef RENDER_KERNEL_BINS_H
 #define RENDER_KERNEL_BINS_H
 
 #include "kernel_types.h"
 #include "simd.h"
 
-/* A row's or a column's pixels in a tile, from its first one on. */
+/* A range of rows or columns of pixels, relative to the tile's first one. */
 typedef struct kernel_tile_span {
     unsigned first, last;
 } kernel_tile_span;
 
-/* Cuts pixels first .. last to the tile that begins at a pixel. */
+/* Clips pixels first .. last to the tile that begins at pixel `begin`. */
 static inline kernel_tile_span kernel_span_in_tile(int first, int last, int begin)
 {
     const int from = first - begin, to = last - begin;
     return (kernel_tile_span){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
 }
 
-/* Returns the pixels' blocks as bits. */
+/* Returns a bit for each row or column of blocks that the pixels meet. */
 static inline unsigned kernel_span_blocks(kernel_tile_span s)
 {
     return ~0u << s.first / KERNEL_BLOCK & ((2u << s.last / KERNEL_BLOCK) - 1);
@@ -35,17 +35,18 @@ static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candid
         .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
-/* A tile's cells by depth, as far as it takes to leave out what is hidden: in so many bins of the tile's depth, in any
- * order within each. */
+/* Bins a tile's cells by depth into KERNEL_DEPTHS bins, unordered within each. That is accurate enough to skip what is
+ * hidden. */
 enum { KERNEL_DEPTHS = 32 };
 
 typedef struct kernel_by_depth {
     kernel_tile_candidate *items;
     float low, scale;
-    int first[KERNEL_DEPTHS]; /* for each bin's items, the nearest bin first; each knows the next, -1 is none */
+    /* index of each bin's first item, nearest bin first; items are linked by `next`; -1: end */
+    int first[KERNEL_DEPTHS];
 } kernel_by_depth;
 
-/* The bin of a depth: no smaller than that of anything nearer. */
+/* Returns the bin of a depth. It increases monotonically with depth. */
 SIMD_INLINE int kernel_depth_bin(const kernel_by_depth *q, float near)
 {
     const float bin = (near - q->low) * q->scale;

@@ -1,15 +1,15 @@
-/* Isosurfaces of tets, hexes, wedges and pyramids, found as many at once as there are lanes (kernel_candidates.h):
+/* Isosurfaces of tets, hexes, wedges and pyramids, found SIMD_WIDTH cells at a time (kernel_candidates.h):
  *
- *     lanes are cells of one type:  do their values straddle an isovalue?
- *     lanes are cells that do:      the slab of kernel_outline.h and the box of pixels; of tets where the isovalue
- *                                   crosses their edges
+ *     cells of one type, one per lane:   do their values straddle an isovalue?
+ *     cells that do, one per lane:       the slab of kernel_outline.h and its box of pixels; for tets the points where
+ *                                        the isovalue crosses their edges
  *
- * Places are differences from the eye as float32, along the camera's axes. A hit is the mean of the vertices with
- * weights that are not negative, and its value is that of theirs (kernel_outline.h), so that |L| <= E there for
- * whatever places the vertices are given, if L and E are made of these same places: a hit is off its place in that slab
- * by no more than the vertices are, 8 roundings of their distance from the eye, which is within the pads of
- * kernel_add_lanes(). What is said of cells that are not folded holds but for rounding as well, and those whose size is
- * near that are within the pads anywhere. */
+ * Positions are differences from the eye in float32, along the camera's axes. A hit is the mean of the vertices with
+ * non-negative weights, and its value is the mean of their values with the same weights (kernel_outline.h). So |L| <= E
+ * holds there for any positions of the vertices, if L and E are computed from these same positions: a hit's error in
+ * that slab is at most the vertices', 8 roundings of their distance from the eye, which is less than the margins of
+ * kernel_add_lanes(). The properties of cells that are not folded also hold only up to rounding; cells of a size near
+ * rounding lie within the margins anyway. */
 #ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
 #define RENDER_KERNEL_CANDIDATE_SURFACES_H
 
@@ -28,18 +28,20 @@
 #include "simd.h"
 
 typedef struct kernel_curved_lanes {
-    int count;         /* a cell's vertices */
-    vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */
-    vm usual;          /* numbers are of usual sizes: others are for the cell alone */
+    int count; /* number of vertices of a cell */
+    /* at: along the camera's axes; f: values less the isovalue, scaled as by kernel_cell_relative() */
+    vf at[8][3], f[8];
+    vm usual; /* lanes whose numbers have usual sizes; other cells are tested one by one */
 } kernel_curved_lanes;
 
-/* L of kernel_outline.h at the vertices; the slab is |L| <= thickness, which is infinite where there is none. */
+/* L of kernel_outline.h at the vertices. The slab is |L| <= thickness; the thickness is infinite if there is no
+ * slab. */
 typedef struct kernel_curved_slab {
     vf at[8], thickness;
 } kernel_curved_slab;
 
-/* Returns the lanes whose cells are not folded. inverse: that of the Jacobian at the middle. What is left to 1 is far
- * more than all rounding. */
+/* Returns the lanes whose cells are not folded. inverse: of the Jacobian at the middle. The limit 0.9 instead of 1
+ * leaves far more than all rounding. */
 SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const kernel_differential *d, int count,
                                             vf inverse[3][3])
 {
@@ -68,8 +70,9 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const 
     return unfolded;
 }
 
-/* Finds L at the vertices and how thick the slab is. f is at most about 1. Places are known to a rounding of where they
- * are: X, Y and Z to r, their middle to 8 r. Lanes whose volume is near float32's least are not usual. */
+/* Computes L at the vertices and the thickness of the slab. |f| is at most about 1. Positions have an error bound of
+ * one rounding, r, of their coordinates, the middle has 8 r. Lanes whose volume is near float32's minimum become
+ * unusual. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);
@@ -119,13 +122,13 @@ static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lan
                                                                kernel_curved_slab *out)
 {
     if (kernel_is_box(type))
-        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out); /* loops of known length */
+        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out); /* loops of constant length */
     else
         kernel_curved_lanes_slab_of(l, type, out);
 }
 
-/* Finds the box of the slab's corners, and of points within it: vertices in the slab, and where lines between two
- * vertices meet its sides. */
+/* Computes the bounds of the slab's polytope, from its corners and points within it: vertices in the slab, and the
+ * points where lines between two vertices cross its sides. */
 static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l,
                                                                const kernel_curved_slab *slab, kernel_ends_lanes *e)
 {
@@ -146,7 +149,8 @@ static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_find
     }
 }
 
-/* Finds where the isovalue crosses the edges of tets. negative has the vertices whose values are below it, exactly. */
+/* Computes the bounds of the points where the isovalue crosses the edges of tets. negative: the vertices whose values
+ * are below it, exactly. */
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l, const vm negative[4],
                                        kernel_ends_lanes *e)
 {
@@ -154,14 +158,14 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curv
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(negative[i], negative[j]);
-        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* not 0 / 0 */
+        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* avoids the NaN of 0 / 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
         kernel_ends_add(s, e, point, crossed);
     }
 }
 
-/* Fetches the vertices along the camera's axes. */
+/* Reads the vertices and rotates them into the camera's axes. */
 SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_cells *c, int count,
                                            kernel_curved_lanes *l)
 {
@@ -175,7 +179,8 @@ SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_
     }
 }
 
-/* Sets the values less the level, and clears usual in lanes whose values are not. */
+/* Sets the values less the level, and clears `usual` in lanes whose values are too large, too small or NaN. Returns the
+ * largest absolute value. */
 SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
                                           const kernel_level *level, kernel_curved_lanes *l)
 {
@@ -189,8 +194,8 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_t
     return size;
 }
 
-/* Adds the cells of the lanes that are crossed and of usual numbers. Values too large, too small or NaN for lanes are
- * handled one by one. */
+/* Adds the cells of the crossed lanes. Cells with values that are too large, too small or NaN for lanes are tested one
+ * by one. */
 SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm usual, unsigned crossed,
                                     const kernel_ends_lanes *e)
 {
@@ -205,7 +210,7 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
 
 /* ---- tets ---- */
 
-/* All tets of a leaf are placed, because most are crossed where one is. */
+/* Finds the tets that isovalues cross. All tets of a leaf are transformed, because most are crossed if one is. */
 static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const kernel_cells *c)
 {
     const unsigned all = (1u << c->count) - 1;
@@ -234,7 +239,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Finds where the surface in the crossed cells may be seen. */
+/* Adds the queue's cells, with the bounds of the surface in them. */
 SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
@@ -246,7 +251,7 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_place(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
-    /* The power of two that brings the largest near 1: its exponent, mirrored. */
+    /* The power of two that scales the largest value to near 1: its exponent, negated. */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type, &slab);
@@ -270,7 +275,8 @@ static void kernel_find_all_crossed(kernel_finder *s)
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
-/* Adds these lanes' cells, which the isovalue crosses, to the crossed ones. One isovalue crosses all of those. */
+/* Queues the lanes' cells, which the isovalue crosses. A queue holds cells of one isovalue: it is processed first if
+ * the isovalue changes. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
     kernel_crossed *h = &s->crossed[kernel_found_number(from->type)];
@@ -284,7 +290,7 @@ SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, 
     }
 }
 
-/* Do the cells' values straddle an isovalue? */
+/* Queues the cells whose values straddle an isovalue. */
 SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const render_surface_layer *layer = s->surface->layer;

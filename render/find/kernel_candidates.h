@@ -1,17 +1,18 @@
-/* Isosurfaces and volumes by one traversal a frame: the trees are gone down once for the whole picture, and each cell
- * that the surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may
- * show in; the cells are then binned by tile (render_candidates.c; sort-middle, in the terms of Molnar et al. 1994),
- * and tiles trace them from the nearest on, blocks that know of something nearer left out (render_kernels.c,
- * kernel_batch.h; of the volume kernel_tile_cells.h):
+/* Isosurfaces and volumes by one traversal per frame. The trees are traversed once for the whole picture, and each cell
+ * that the surface crosses, or that is visible in the volume, is fetched and transformed once, to find the pixels in
+ * which it may be visible. The cells are then binned by tile (render_candidates.c; sort-middle in the terms of Molnar
+ * et al. 1994). Tiles trace them beginning with the nearest, and skip blocks that have nearer hits (render_kernels.c,
+ * kernel_batch.h; for volumes kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
- * A tile's own traversal (kernel_tile_surface.h) looks at the same nodes as its neighbours and places the same cells,
- * most of which lie beside it. It is better where surfaces hide more cells than they show, for it sees none of what is
- * behind them: opaque surfaces with several cells a pixel are traced so, and frames in which too many cells show.
+ * A tile's own traversal (kernel_tile_surface.h) tests the same nodes as its neighbours' and transforms the same cells,
+ * most of which lie beside the tile. It is better if surfaces hide more cells than they show, as it skips everything
+ * behind them: it is used for opaque surfaces with several cells per pixel, and for frames in which too many cells are
+ * visible.
  *
- * Boxes are of the outline projected (kernel_outline.h), widened by pads that are more than all rounding. Rays test
- * what boxes hold, so that the picture is that of any traversal, to the last bit. */
+ * Boxes are bounding boxes of the projected outline (kernel_outline.h), widened by more than all rounding. Rays test
+ * the cells in the boxes, so that the picture is that of any other traversal, to the last bit. */
 #ifndef RENDER_KERNEL_CANDIDATES_H
 #define RENDER_KERNEL_CANDIDATES_H
 
@@ -28,7 +29,7 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Finds the candidates among the cells of a type that wait for their vertices. */
+/* Finds the candidates among the pending cells of one type. */
 static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
@@ -44,7 +45,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 
 /* ---- leaves ---- */
 
-/* Looks for a cell that is not for lanes. */
+/* Tests one cell that cannot be processed in lanes, and adds it to the candidates if it is visible. */
 static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t cell)
 {
     kernel_found_fetch(s, cell);
@@ -56,8 +57,8 @@ static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t
         for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_surface(s, &s->cell, value);
 }
 
-/* Makes the queued cells, whose connectivity has come, pending, and prefetches their vertices. Those that have waited
- * for theirs are looked for before. */
+/* Moves the queued cells, whose connectivity is now in the cache, to the pending lists, and prefetches their vertices.
+ * Processes a pending list first if it is full. */
 static void kernel_find_queued(kernel_finder *s)
 {
     const kernel_arrays *p = &s->arrays;
@@ -102,16 +103,17 @@ static void kernel_find_rest(kernel_finder *s)
     kernel_find_all_crossed(s);
 }
 
-/* A node is looked at beside others, each of which has what it needs on its way from memory while they wait. */
+/* Nodes are tested KERNEL_FRONT at a time, so that their prefetches overlap. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
-/* Nodes, as 2 nodes + 1 where it lies in the picture. */
+/* A list of nodes, each stored as 2 * node, plus 1 if it lies completely in the picture. */
 typedef struct kernel_front {
     int count;
     int64_t entries[KERNEL_FRONT];
 } kernel_front;
 
-/* Tells whether the node may show in the picture. Children of a node within the picture need not be tested. */
+/* Returns whether the node may be visible in the picture. Sets *is_inside if it lies completely in the picture: then
+ * its children need not be tested. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
     kernel_placement placement = {0};
@@ -123,8 +125,8 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
     return kernel_blocks_of(sides) && !(placement.far < s->t_near);
 }
 
-/* Chooses the entries whose values show and whose boxes are in view. Values decide about half of them, which no branch
- * predicts. */
+/* Selects the entries whose values are visible and whose boxes are in view. The test of values is branch-free, as it
+ * rejects about half of the entries unpredictably. */
 SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
                                      kernel_front *front, const int64_t *entries, int count)
 {
@@ -142,7 +144,8 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
     }
 }
 
-/* Sorts out the leaves, whose cells are prefetched, and the inner nodes' left children, which are too. */
+/* Separates the leaves from the left children of inner nodes, and prefetches the leaves' cells and the children's
+ * ranges. */
 SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
                                    kernel_front *leaves, kernel_front *children)
 {
@@ -160,8 +163,9 @@ SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges
     }
 }
 
-/* Depth first, from the left, KERNEL_FRONT nodes at once: about in the order in which leaves lie in memory. One node at
- * once needs no more room than the tree is deep. */
+/* Traverses a subtree depth first, from the left, KERNEL_FRONT nodes at a time, and so roughly in the order of leaves
+ * in memory. If the stack is almost full, it takes one node at a time, which needs no more space than the tree's
+ * depth. */
 static void kernel_find_candidates(kernel_finder *s, int64_t root)
 {
     const mmbvh *tree = s->frame->job->parts[s->part].tree;

@@ -1,6 +1,6 @@
-/* The search of a subtree for the cells that show (kernel_candidates.h), and the pixels that a cell alone may show in.
- * Cells are looked for in many cells at once (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Those whose
- * numbers are too large, too small or NaN for lanes are found by the box of their vertices. */
+/* The search of a subtree for visible cells (kernel_candidates.h), and the pixels in which a single cell may be
+ * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Cells whose
+ * numbers are too large, too small or NaN for lanes are tested one by one, by the box of their vertices. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -19,15 +19,15 @@
 #include "render.h"
 #include "simd.h"
 
-/* Cells of one type, one a lane. */
+/* Cells of one type, one per lane. */
 typedef struct kernel_cells {
-    int type, vertices; /* each cell's */
+    int type, vertices; /* vertices: number of vertices of each cell */
     int count;
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
 
-/* Fills the lanes from count on with the first. */
+/* Fills the lanes from `count` on with copies of the first cell. */
 SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
 {
     for (int n = c->count; n < SIMD_WIDTH; n++) {
@@ -36,7 +36,7 @@ SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
     }
 }
 
-/* The vertex of each lane's cell. */
+/* Returns the index of vertex i of each lane's cell. */
 SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
 {
     vi vertex;
@@ -44,39 +44,39 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     return vertex;
 }
 
-/* The place of a type in kernel_lane_types. */
+/* Returns the position of a type in kernel_lane_types. */
 SIMD_INLINE int kernel_found_number(int type)
 {
     return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
 }
 
-/* Cells of one type with quads that an isovalue crosses, one a lane, until there is one in each
+/* Queue of cells of one type with quads that an isovalue crosses, one per lane; it is processed when all lanes are full
  * (kernel_candidate_surfaces.h). */
 typedef struct kernel_crossed {
     kernel_cells cells;
-    int value; /* the isovalue, of all of them */
+    int value; /* number of the isovalue, the same for all cells */
 } kernel_crossed;
 
-/* The search of one subtree, or of a tile. */
+/* State of the search of one subtree, or of a tile. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
-    const kernel_surface *surface;   /* NULL: */
-    const kernel_transfer *transfer; /* the volume's */
+    const kernel_surface *surface;   /* NULL if a volume is searched */
+    const kernel_transfer *transfer; /* the volume's, if surface is NULL */
     const render_field *field;
     const kernel_interest *interest;
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
-    uint32_t source;     /* for the layer's first isovalue */
-    kernel_tile picture; /* all of it as one tile, about the axis of view */
+    uint32_t source;     /* source of the candidates of the layer's first isovalue */
+    kernel_tile picture; /* the whole picture as one tile, about the axis of view */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
-    int first[2], last[2]; /* columns and rows that are looked for */
+    int first[2], last[2]; /* first and last column and row to which candidates are clipped */
     kernel_level eye[3];
     kernel_cell cell;
-    uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
+    uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity has been prefetched */
     int queued_count;
-    kernel_cells pending[KERNEL_LANE_TYPES]; /* those whose vertices are, by kernel_found_number() */
+    kernel_cells pending[KERNEL_LANE_TYPES]; /* cells whose vertices have been prefetched, by kernel_found_number() */
     kernel_crossed crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
 } kernel_finder;
@@ -120,7 +120,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->row_0 = (float)(-f->slope_y0 / f->slope_dy);
 }
 
-/* Finds the least and the largest number. */
+/* The minimum and maximum of some numbers. */
 typedef struct kernel_extent {
     float low, high;
 } kernel_extent;
@@ -136,16 +136,16 @@ SIMD_INLINE kernel_extent kernel_extent_of(const kernel_outline *o, vf scale, co
     return (kernel_extent){vf_reduce_min(low), vf_reduce_max(high)};
 }
 
-/* Fills the last vector of points with the first point. */
+/* Fills the last vector of points with copies of the first point. */
 SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 {
     for (int a = 0; a < 3; a++)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* Finds the pixels between the ends, of those from one to another. Returns false where there are none. The pad, a part
- * in 1e5 of the cell and its place and a hundredth of a pixel, is more than rays are off by that hit by a rounding.
- * blur is the error of the places. */
+/* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. The extent is
+ * widened by 1/100 pixel, 3e-5 of the numbers and blur, which is more than the error of rays that hit only by rounding.
+ * blur: the error bound of the positions, in pixels. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {
@@ -158,8 +158,9 @@ SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, in
     return true;
 }
 
-/* Adds a cell whose surface has these depths, columns and rows, relative to the axis of view. size is the largest depth
- * of anything in it. A cell that is partly near the eye's plane or behind it may be anywhere in the picture. */
+/* Computes the candidate of a cell whose surface has these extents in depth, columns and rows, relative to the axis of
+ * view; returns false if it is not visible. size: an upper bound of the cell's depths. A cell that is near or behind
+ * the eye's plane may be anywhere in the picture. */
 SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent depth, float size,
                                           kernel_extent columns, kernel_extent rows, kernel_candidate *out)
 {
@@ -168,7 +169,7 @@ SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent 
     if (depth.high + pad < s->t_near) return false;
     out->near = depth.low - pad;
     out->far = depth.high + pad;
-    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* not a number */
+    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* NaN */
     if (!(out->far < INFINITY)) out->far = INFINITY;
     if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
         out->x0 = (uint16_t)s->first[0];
@@ -194,7 +195,8 @@ SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline
     return kernel_extents_candidate(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
-/* Counts the candidate in each of its tiles. Most lie in one, or two side by side, which no branch could predict. */
+/* Counts the candidate in each of its tiles. Most lie in one tile or two adjacent ones, which a branch could not
+ * predict. */
 SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1, int y0, int y1)
 {
     const int left = x0 / KERNEL_TILE, columns = x1 / KERNEL_TILE - left, top = y0 / KERNEL_TILE,
@@ -225,7 +227,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     const grid *g = s->frame->job->parts[s->part].cells;
     kernel_outline o = {0};
     kernel_candidate candidate = {.cell = index, .source = s->source};
-    /* The corners of the vertices' box. */
+    /* The corners of the bounding box of the vertices. */
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, index);
     int64_t vertex;
@@ -246,7 +248,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* Adds the fetched cell by the box of its vertices. */
+/* Adds the fetched cell, with the bounding box of its vertices. */
 static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel_cell *c, uint32_t source)
 {
     kernel_outline o;
@@ -263,7 +265,7 @@ SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value
         kernel_find_whole(s, c, s->source + (uint32_t)value);
 }
 
-/* Adds the fetched cell if it shows in the volume. */
+/* Adds the fetched cell if it is visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
     if (s->cell.is_finite && kernel_cell_shows(&s->cell, s->transfer)) kernel_find_whole(s, &s->cell, s->source);
@@ -271,12 +273,12 @@ SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 
 /* ---- cells in lanes ---- */
 
-/* Bounds of the surface of one isovalue in each lane's cell. */
+/* Per lane: bounds of one isovalue's surface in the cell. */
 typedef struct kernel_ends_lanes {
     vf near, far, left, right, top, bottom;
 } kernel_ends_lanes;
 
-/* Fetches vertices, as places from the eye on in the space's scale. */
+/* Reads vertices as positions relative to the eye, in the space's scale. */
 SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
@@ -288,14 +290,14 @@ SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3]
     }
 }
 
-/* Are the numbers of usual sizes? Cells with others are handled one by one. */
+/* Returns the lanes of `usual` whose coordinates have usual sizes. Other cells are tested one by one. */
 SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
 {
     for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
     return usual;
 }
 
-/* Turns such a place into the camera's axes. */
+/* Rotates such a position into the camera's axes. */
 SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf at[3])
 {
     const render_camera *camera = &s->frame->job->camera;
@@ -304,7 +306,7 @@ SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf
         at[a] = (place[0] * (float)axes[a][0] + place[1] * (float)axes[a][1]) + place[2] * (float)axes[a][2];
 }
 
-/* Widens the bounds to hold the point, in the given lanes. */
+/* Extends the bounds in the given lanes to contain the point. */
 SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, const vf point[3], vm lanes)
 {
     const vf most = vf_set(INFINITY);
@@ -325,8 +327,8 @@ SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
     return (kernel_ends_lanes){most, -most, most, -most, most, -most};
 }
 
-/* Finds the first and the last pixel between each lane's ends, with the pad of kernel_extent_range(). Returns the lanes
- * that have any. */
+/* Computes the first and the last pixel between each lane's ends, with the margin of kernel_extent_range(). Returns the
+ * lanes that have any. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const int ends[2], vf *first, vf *last)
 {
     const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
@@ -335,7 +337,7 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const
     return vf_le(*first, *last);
 }
 
-/* Adds the cells of the lanes whose bits are set: kernel_extents_candidate() lane by lane. */
+/* Adds the cells of the lanes whose bits are set, by the steps of kernel_extents_candidate(). */
 static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
@@ -346,7 +348,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
     float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
-    /* The largest blur of any lane stands for all. */
+    /* The largest error bound of any lane is used for all. */
     const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
     vm candidates =
@@ -362,7 +364,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
         memcpy(ends[2 * a], &from, sizeof from);
         memcpy(ends[2 * a + 1], &to, sizeof to);
     }
-    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* -inf where that is not a number */
+    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* -inf if the depth is NaN */
     vf_store(far, -vf_max(-((e->far + s->t_near) + pad), vf_set(-INFINITY)));
     if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
     for (; lanes; lanes &= lanes - 1) {

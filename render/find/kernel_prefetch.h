@@ -13,7 +13,7 @@ SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, 
         __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
-/* Prefetches a cell's indices and its type. An offset is read at once, as only the prefetch waits for it. */
+/* Prefetches a cell's vertex indices and its type. An offset is read directly, as only this prefetch depends on it. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;
@@ -22,7 +22,7 @@ SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
     if (g->cell_types) __builtin_prefetch(g->cell_types + cell * g->cell_types_stride);
 }
 
-/* Prefetches a cell's vertices; a polyhedron's are left out. */
+/* Prefetches a cell's vertices; polyhedra are skipped. */
 SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field, uint32_t cell)
 {
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));
@@ -32,7 +32,7 @@ SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field
             g, field, g->lattice ? first + g->lattice->corner[i] : grid_array_index(&g->connectivity, first + i));
 }
 
-/* All that the cells are made of is on its way from memory before the first of it is looked at. */
+/* Prefetches all data of the cells. */
 SIMD_INLINE void kernel_prefetch(const grid *g, const grid_field *field, const uint32_t *cells, int count)
 {
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);

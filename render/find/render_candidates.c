@@ -1,8 +1,8 @@
-/* Subtrees are dealt to threads, each of which lists the cells it finds, counts them by tile, and bins its own. Threads
- * do not wait for each other in between: who traces a tile gathers its cells from all of them. The bound on cells is a
- * bound on memory and on time lost:
- * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
- * hidden: there a million may be listed in any case. */
+/* Subtrees are distributed among threads. Each thread lists the cells that it finds, counts them by tile, and bins its
+ * own; threads do not synchronize in between, and the thread that traces a tile gathers its cells from all lists. The
+ * bound on the number of cells limits memory and wasted time: if there is more than one cell per pixel, most listed
+ * cells are hidden or smaller than a pixel. Cells of a volume are not hidden: a million of them may be listed in any
+ * case. */
 #include "render_candidates.h"
 #include "kernel_bins.h"
 #include "kernel_types.h"
@@ -20,13 +20,13 @@
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
-/* So many cells a pixel that their tree covers are small; of surfaces, cells in leaves that isovalues may cross
- * (docs/development/decisions/find.md). */
+/* Number of cells per pixel of their trees' bounding boxes from which on they count as small; for surfaces, cells in
+ * leaves that isovalues may cross (docs/development/decisions/find.md). */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
-/* Cuts the trees of all surfaces, or of the volume, into subtrees. */
+/* Divides the trees of all surfaces, or of the volume, into subtrees. */
 static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *list)
 {
     const render_job *job = f->job;
@@ -42,7 +42,7 @@ static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *li
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
-/* Adds a chunk. A list that is full stays so, because cells that found no room are missing from it. */
+/* Adds a chunk to the list. A full list stays full, because the cells that did not fit are missing from it. */
 static bool grow(kernel_candidate_list *list)
 {
     if (list->is_full) return false;
@@ -75,14 +75,14 @@ static void free_list(kernel_candidate_list *list)
 
 /* ---- tiles ---------------------------------------------------------------------------------------------------- */
 
-/* The cells that one thread has found, tile by tile, from starts[tile] to starts[tile + 1]. */
+/* The cells that one thread has found, sorted by tile: those of a tile are starts[tile] .. starts[tile + 1] - 1. */
 typedef struct bin_list {
     kernel_tile_candidate *items;
     uint32_t *starts;
 } bin_list;
 
 struct kernel_bins {
-    int list_count; /* one a thread of the search */
+    int list_count; /* number of the search's threads */
     bin_list lists[];
 };
 
@@ -105,7 +105,7 @@ static void bins_free(struct kernel_bins *bins)
     base_free(bins);
 }
 
-/* Bins the cells; at[tile] is the place of the tile's next one. */
+/* Copies the cells to their tiles' bins; at[tile] is the index of the tile's next cell. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
@@ -117,15 +117,15 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
         }
 }
 
-/* Bins what a thread has found; starts[1 + tile] counts each tile's cells. False where they are more than `most`, or
- * memory runs out. */
+/* Bins the cells that a thread has found; starts[1 + tile] is the number of each tile's cells. Returns false if there
+ * are more than `most`, or memory runs out. */
 static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        starts[1 + tile] = (uint32_t)sum; /* moves on to where the next tile begins */
+        starts[1 + tile] = (uint32_t)sum; /* bin_tiles() advances it to the begin of the next tile */
         sum += count;
     }
     if (sum > (uint64_t)most) return false;
@@ -150,7 +150,8 @@ static int count_in_tile(const bin_list *list, int64_t tile)
     return (int)(list->starts[tile + 1] - list->starts[tile]);
 }
 
-/* Cells that one thread has found stay where they are; those of several are copied to the bin's own room. */
+/* Gathers a tile's cells. If a single thread has found them, they are used in place; else they are copied to the bin's
+ * own memory. */
 static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
 {
     const bin_list *last = NULL;
@@ -182,15 +183,15 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
     return gather(frame->candidates, tile, &thread->bin) && gather(frame->volume_candidates, tile, &thread->volume_bin);
 }
 
-/* ---- where cells are ---------------------------------------------------------------------------------------- */
+/* ---- positions of cells in the picture ---------------------------------------------------------------------- */
 
-/* The first and the last place of something along columns or rows of pixels. */
+/* A range of positions along columns or rows of pixels. */
 typedef struct span {
     double low, high;
 } span;
 
-/* Widens the spans, of columns and of rows, by a point in the space of trees. Returns its depth from the eye, or 1 for
- * orthographic cameras. */
+/* Extends the ranges of columns and rows by a point in the trees' space. Returns the point's depth from the eye, or 1
+ * for orthographic cameras. */
 static double widen(const kernel_frame *f, const double point[3], span spans[2])
 {
     const render_camera *c = &f->job->camera;
@@ -211,7 +212,7 @@ static double widen(const kernel_frame *f, const double point[3], span spans[2])
     return depth;
 }
 
-/* Widens the spans by all corners of the tree's box, and returns the least of their depths. */
+/* Extends the ranges by all corners of the tree's box, and returns the least of their depths. */
 static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans[2])
 {
     float lower[4], upper[4];
@@ -225,14 +226,15 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans
     return least;
 }
 
-/* What parts cover of the picture. */
+/* The area of the picture that parts cover. */
 typedef struct coverage {
     double cells;
-    double pixels; /* summed over the parts' boxes */
-    span all[2];   /* for all boxes */
+    double pixels; /* sum over the parts' boxes */
+    span all[2];   /* ranges of all boxes together */
 } coverage;
 
-/* Measures the parts that have ranges, of a field or, NULL, all. False where one is not all before the eye. */
+/* Measures the parts on which the field has ranges, or all parts if ranges is NULL. Returns false if a part does not
+ * lie completely in front of the eye. */
 static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, coverage *out)
 {
     *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
@@ -249,20 +251,20 @@ static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, cov
     return true;
 }
 
-/* Are the volume's cells so small that to list them costs more than it spares? A listed cell is fetched twice, once for
- * its pixels and once for its samples; tiles that go down the trees themselves fetch it once. */
+/* Returns whether the volume's cells are so small that listing them costs more than it saves. A listed cell is fetched
+ * twice, once for its pixels and once for its samples; tiles that traverse the trees themselves fetch it once. */
 static bool is_of_small_cells(const kernel_frame *f)
 {
     coverage c;
     return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
 }
 
-/* Counts of cells in leaves: all that were looked at, and those that isovalues may cross, each isovalue counted. */
+/* Counts of cells in leaves: cells sampled, and cells that isovalues may cross (one count per isovalue). */
 typedef struct leaf_sample {
     double cells, crossed;
 } leaf_sample;
 
-/* Adds some of the part's nodes, about as many leaves among them as inner nodes. */
+/* Adds a sample of the part's nodes, about half of which are leaves. */
 static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, leaf_sample *out)
 {
     const mmbvh *tree = f->job->parts[part].tree;
@@ -280,8 +282,8 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
     }
 }
 
-/* Where opaque surfaces have several cells a pixel most are hidden, or between pixels: tiles that go down the trees
- * themselves fetch fewer. */
+/* If opaque surfaces have several cells per pixel, most of them are hidden or lie between pixels; tiles that traverse
+ * the trees themselves then fetch fewer. */
 bool render_surfaces_are_small(const kernel_frame *f)
 {
     coverage c;
@@ -294,7 +296,7 @@ bool render_surfaces_are_small(const kernel_frame *f)
     if (!(values * c.cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
         leaf_sample leaves = {0, 0};
-        double own = 0; /* cells of parts that have the field */
+        double own = 0; /* cells of the parts that have the field */
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;
@@ -306,8 +308,8 @@ bool render_surfaces_are_small(const kernel_frame *f)
     return crossed > SMALL_CROSSED * pixels;
 }
 
-/* Rays and bounds of trees are off by what kernel_tree_planes() allows them, and pixels reach half a pixel beyond their
- * middles. */
+/* The margin covers the errors of rays and tree bounds that kernel_tree_planes() allows for, and the half pixel by
+ * which pixels extend beyond their centres. */
 void render_trees_cover(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -326,17 +328,17 @@ void render_trees_cover(kernel_frame *f)
     }
 }
 
-/* ---- all of it ------------------------------------------------------------------------------------------------ */
+/* ---- the search ----------------------------------------------------------------------------------------------- */
 
 typedef struct search {
     kernel_frame *frame;
     render_subtrees subtrees;
-    kernel_candidate_list *lists; /* one a thread */
+    kernel_candidate_list *lists; /* one per thread */
     int64_t bound;
     struct kernel_bins *bins;
 } search;
 
-/* Each thread bins its own cells as soon as no subtree is left, and waits for no other. */
+/* Searches all subtrees. Each thread bins its own cells as soon as no subtree is left, without waiting for others. */
 static void run(search *s, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
@@ -357,7 +359,7 @@ static void run(search *s, kernel_thread *thread_of, int threads)
     }
 }
 
-/* Begins each thread's list and bins. False: no memory. */
+/* Begins each thread's list and bins. Returns false if there is no memory. */
 static bool begin_lists(search *s, int threads)
 {
     const int64_t tiles = tile_count(s->frame);
@@ -375,7 +377,7 @@ static bool begin_lists(search *s, int threads)
     return true;
 }
 
-/* Are all cells of all threads in bins, and not too many? */
+/* Returns whether all cells of all threads are in bins and are at most `most`. */
 static bool is_whole(const search *s, int threads, int64_t most)
 {
     const int64_t tiles = tile_count(s->frame);

@@ -1,19 +1,19 @@
-/* The cells whose isosurfaces or volume may show, binned by tile of the picture (kernel_candidates.h). */
+/* Cells whose isosurfaces or volume may be visible, binned by tile of the picture (kernel_candidates.h). */
 #ifndef RENDER_RENDER_CANDIDATES_H
 #define RENDER_RENDER_CANDIDATES_H
 
 #include "kernel_types.h"
 
-/* Are there so many of the surfaces' cells a pixel that tiles had better go down the trees themselves? */
+/* Returns whether the surfaces have so many cells per pixel that tiles should traverse the trees themselves. */
 bool render_surfaces_are_small(const kernel_frame *frame);
 
-/* Fills frame->candidates, which render_candidates_free() frees; thread_of has a state for each thread. It stays NULL,
- * and tiles go down the trees themselves, where more cells show than pay or memory runs out. */
+/* Fills frame->candidates, which render_candidates_free() frees. thread_of: a state per thread. If too many cells are
+ * visible, or memory runs out, frame->candidates stays NULL, and tiles traverse the trees themselves. */
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* As above, for the only volume's cells: fills frame->volume_candidates. */
+/* Like render_candidates_find(), for the cells of the only volume: fills frame->volume_candidates. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* Gathers the cells of the tile whose upper left pixel is (x0, y0) in thread->bin and volume_bin, for the kernels.
- * False: no memory. */
+ * Returns false if there is no memory. */
 bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
 /* Sets frame->cover, from the bounds of all trees. */
 void render_trees_cover(kernel_frame *frame);

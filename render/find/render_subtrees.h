@@ -1,4 +1,4 @@
-/* A frame's search cut into pieces for threads. */
+/* Division of a frame's search into subtrees for threads. */
 #ifndef RENDER_RENDER_SUBTREES_H
 #define RENDER_RENDER_SUBTREES_H
 
@@ -9,9 +9,9 @@ typedef struct render_subtrees {
     int64_t count;
 } render_subtrees;
 
-/* Begins a list with room for so many trees. Returns false where there is no memory. */
+/* Begins a list with space for `trees` trees. Returns false if there is no memory. */
 bool render_subtrees_begin(render_subtrees *list, int64_t trees);
-/* Cuts a part's tree below its top into some 128 subtrees and adds them, for a surface (-1: the volume). */
+/* Divides a part's tree into up to 128 subtrees and adds them, for a surface (-1: the volume). */
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part);
 
 #endif
