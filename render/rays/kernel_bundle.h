@@ -1,10 +1,10 @@
 /* Rays that begin at hits: towards lights, and into the hemisphere above a surface.
  *
- * The cells that such a ray meets must not depend on the partition. Rays are traced in cells by the functions for
- * primary rays, which decide everything about a face from its vertices alone once they are in tile space. So the tile
- * space must depend on the ray alone. For a hit's hemisphere the hit is the eye, and depth is along its normal. For a
- * light depth is along its direction, and tiles form a lattice across it; a ray takes the tile that it lies in. Rays of
- * one space are a bundle, and it does not matter which of them are traced together. */
+ * The cells that such a ray meets must not depend on the partition. Rays are traced by the functions for primary rays,
+ * which decide everything about a face from its vertices alone once these are in tile space. So the tile space must
+ * depend only on the ray. For a hit's hemisphere the eye is the hit, and depth is along its normal. For a light, depth
+ * is along the light's direction, and tiles form a lattice across it; a ray belongs to the tile in which it lies. Rays
+ * of one tile space are a bundle, and the result does not depend on which of them are traced together. */
 #ifndef RENDER_KERNEL_BUNDLE_H
 #define RENDER_KERNEL_BUNDLE_H
 
@@ -17,14 +17,15 @@
 enum { KERNEL_BUNDLE_RAYS = 64 };
 
 typedef struct kernel_bundle {
-    kernel_tile tile; /* centre and radius; its own rays are not used */
+    kernel_tile tile; /* centre and radius; the tile's own rays are not used */
     int count;
-    uint64_t open; /* rays, a bit each, of which nothing is met yet: the ones to trace, and in the end the ones left */
-    /* Tile space. A ray goes from t_near to t_far. */
+    /* bits of the rays that are not blocked yet: those to trace, and in the end those that are unblocked */
+    uint64_t open;
+    /* Rays in tile space, from t_near to t_far. */
     float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
     float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
     float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];
-    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* tree space */
+    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* rays in tree space */
 } kernel_bundle;
 
 SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
@@ -34,7 +35,7 @@ SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
     return vf_load(lanes);
 }
 
-/* Makes a packet of the open rays from number first on. */
+/* Makes a packet of the open rays from number `first` on. */
 static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
                                         const kernel_bundle *b, int first)
 {

@@ -1,8 +1,9 @@
-/* Finds the parts of a ray that a job's clips (render.h) keep, in double. They depend on the ray alone, on all ranks.
+/* Computes the intervals of a ray that a job's clips (render.h) keep, in double. They depend only on the ray and are
+ * the same on all ranks.
  *
- * The half spaces, boxes and spheres that cut every layer leave one stretch of a ray, which packets begin and end with.
- * Surfaces that are cut by more are asked hit by hit. Volumes that are cut by more are traced in turns, a stretch of
- * each ray a turn, because a body that is left out may divide a ray. */
+ * The half spaces, boxes and spheres that clip every layer leave one interval of a ray, with which packets begin and
+ * end. Surfaces with further clips test each hit. Volumes with further clips are traced in turns, one interval of each
+ * ray per turn, because a body that is cut out may divide a ray. */
 #ifndef RENDER_KERNEL_CLIP_H
 #define RENDER_KERNEL_CLIP_H
 
@@ -12,7 +13,7 @@
 
 #include "render.h"
 
-/* The stretch of a ray between two depths. It is empty where begin > end. */
+/* An interval of a ray between two depths; empty if begin > end. */
 typedef struct kernel_ray_part {
     double begin, end;
 } kernel_ray_part;
@@ -71,7 +72,7 @@ static inline kernel_ray_part kernel_clip_sphere(const render_clip *c, const ren
     return (kernel_ray_part){nearest - half, nearest + half};
 }
 
-/* Returns the stretch of the ray within the body. */
+/* Returns the interval of the ray within the body. */
 static inline kernel_ray_part kernel_clip_body(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     switch (c->kind) {
@@ -82,7 +83,7 @@ static inline kernel_ray_part kernel_clip_body(const render_clip *c, const rende
     return KERNEL_NO_PART;
 }
 
-/* Keeps the holes in the order of their begins; returns how many there are. */
+/* Inserts a hole, sorted by begin; returns the new number of holes. */
 static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel_ray_part hole)
 {
     int at = count;
@@ -92,7 +93,7 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* Returns the n-th stretch, from 0, that a set of clips leaves of a ray behind the depth begin. */
+/* Returns the n-th interval, from 0, that a set of clips leaves of a ray behind the depth `begin`. */
 static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
                                                double begin, int number)
 {
@@ -131,7 +132,7 @@ static inline bool kernel_clip_has(const render_clip *c, const render_space *s, 
     return c->kind == RENDER_CLIP_BOX ? is_within : square <= c->radius * c->radius;
 }
 
-/* Is the place on the ray within what all of the clips leave? */
+/* Returns whether the ray's point at t is kept by all of the clips. */
 static inline bool kernel_clip_keeps(const render_job *job, uint32_t clips, const kernel_clip_ray *ray, double t)
 {
     for (; clips; clips &= clips - 1) {

@@ -11,16 +11,17 @@
 #include "render.h"
 #include "simd.h"
 
-/* Transmittance of a sample whose opacity per unit is a: (1 - a)^exponent, and 1 minus it without cancellation. */
+/* Returns the transmittance of a sample with this opacity per unit distance, (1 - opacity)^exponent; *absorbed: 1 minus
+ * it, without cancellation. */
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 {
     const vf clear = 1.0f - opacity;
-    /* 1 - opacity was rounded by at most half a unit: put the rest back to first order. */
+    /* 1 - opacity was rounded by at most half a unit; the error is corrected to first order. */
     const vf rest = (1.0f - clear) - opacity;
     const vf safe = vf_max(clear, vf_set(1.2e-38f));
     const vf log = vf_select(vf_le(clear, vf_set(0)), vf_set(-1e30f), vf_log2(safe) + rest / safe * 1.4426950f);
     const vf x = log * exponent;
-    /* 1 - 2^x near 0 by its own series: 7 terms at |x ln 2| < 0.35 leave 0.35^7 / 8! of the first. */
+    /* 1 - 2^x near 0 is computed by its series: 7 terms at |x ln 2| < 0.35 leave a relative error of 0.35^7 / 8!. */
     const vf y = x * 0.69314718f;
     vf p = y * 1.9841270e-4f + 1.3888889e-3f;
     p = p * y + 8.3333333e-3f;
@@ -39,7 +40,7 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     return vf_select(small, 1.0f - series, power);
 }
 
-/* Returns the place in the colour table by a scale that is not linear: render_scaled(), to 3e-7 of its value. */
+/* Returns the position in the colour table by a nonlinear scale: render_scaled(), with a relative error of 3e-7. */
 static __attribute__((noinline)) vf kernel_scaled_place(const kernel_scale *s, vf x)
 {
     const vf threshold = vf_set(s->threshold), size = vf_max(vf_abs(x), threshold);
@@ -54,7 +55,7 @@ SIMD_INLINE vf kernel_colour_place(const kernel_transfer *t, vf x)
     return t->scale.kind == RENDER_LINEAR ? x : kernel_scaled_place(&t->scale, x);
 }
 
-/* The colour at a place in the table; NaN gives the first. */
+/* Computes the colour at a position in the table; NaN gives the first colour. */
 SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
 {
     const vf place = vf_clamp(along, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
@@ -71,13 +72,13 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
     out[2] = first[2] + part * (last[3] - first[2]);
 }
 
-/* x in the transfer's domain; NaN gives the colour at 0. */
+/* Computes the colour of x, which is in the transfer function's domain; NaN gives the colour at 0. */
 SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
     kernel_table_at(t, kernel_colour_place(t, x), out);
 }
 
-/* The opacity at a place in the colour table. */
+/* Returns the opacity at a position in the colour table. */
 SIMD_INLINE vf kernel_opacity_at(const kernel_transfer *t, vf place)
 {
     vf a = vf_set(t->base_opacity);
@@ -95,7 +96,7 @@ SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
 {
-    /* Scaled by the largest component first: gradients of fields of 1e30 or 1e-30 must not overflow. */
+    /* The vector is first scaled by its largest component: gradients of fields of 1e30 or 1e-30 must not overflow. */
     const vf largest = vf_max(vf_abs(v[0]), vf_max(vf_abs(v[1]), vf_abs(v[2])));
     *is_zero = vm_not(vf_lt(vf_set(0), largest));
     const vf scale = 1.0f / vf_select(*is_zero, vf_set(1), largest);
@@ -103,7 +104,7 @@ SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
     return scale / vf_sqrt((a * a + b * b) + c * c);
 }
 
-/* Light one colour: n is any vector along the gradient, in camera axes. Blinn-Phong (render.h). */
+/* Shades a colour by Blinn-Phong (render.h). n: any vector along the gradient, in camera axes. */
 SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, const vf n[3], vf colour[3])
 {
     const render_job *job = p->frame->job;
@@ -140,12 +141,12 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
-/* A fragment for each ray. kind is added to the kind that all of them have in common. */
+/* A fragment per ray. kind is added to the kind that all of them have in common. */
 typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;
 
-/* fragment_shows() of each ray. */
+/* Returns fragment_shows() for each ray. */
 SIMD_INLINE vm kernel_shows(const vf colour[3], vf transmittance)
 {
     const vf zero = vf_set(0);
@@ -153,7 +154,7 @@ SIMD_INLINE vm kernel_shows(const vf colour[3], vf transmittance)
     return vm_or(vf_lt(transmittance, vf_set(1)), vm_not(black));
 }
 
-/* Write the fragments of the rays in mask. */
+/* Appends the fragments of the rays in mask to the thread's list. */
 SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const kernel_fragments *f)
 {
     unsigned bits = vm_bits(mask);
@@ -181,7 +182,7 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const ker
     }
 }
 
-/* Looks up colours in bands, or with colours of their own for values outside of the range. */
+/* Computes colours of banded tables, or of tables with their own colours for values outside the range. */
 static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);

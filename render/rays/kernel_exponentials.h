@@ -4,8 +4,8 @@
 
 #include "simd.h"
 
-/* 2^x for x <= 0, to 2e-7 relative; 0 below -126. Taylor of 2^f for f in [-1/2, 1/2]: the first term left out is
- * (f ln 2)^7 / 7! < 1.2e-7. */
+/* Returns 2^x for x <= 0, with a relative error of 2e-7; 0 below -126. It uses the Taylor series of 2^f for f in [-1/2,
+ * 1/2], whose first omitted term is (f ln 2)^7 / 7! < 1.2e-7. */
 SIMD_INLINE vf vf_exp2(vf x)
 {
     const vf whole = vf_floor(x + 0.5f);
@@ -20,8 +20,8 @@ SIMD_INLINE vf vf_exp2(vf x)
     return vf_select(vf_lt(x, vf_set(-126)), vf_set(0), p * scale);
 }
 
-/* log2(x) for normal x > 0: mantissa to [sqrt(1/2), sqrt(2)), then 2 atanh(s) / ln 2 with s = (m-1)/(m+1), |s| < 0.172:
- * the first term left out is s^10 / 11 < 3e-9 relative. */
+/* Returns log2(x) for normal x > 0. It brings the mantissa m to [sqrt(1/2), sqrt(2)) and sums 2 atanh(s) / ln 2 with s
+ * = (m-1)/(m+1), |s| < 0.172; the first omitted term is s^10 / 11 < 3e-9 relative. */
 SIMD_INLINE vf vf_log2(vf x)
 {
     const vi bits = vi_from_bits(x);

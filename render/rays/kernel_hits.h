@@ -6,25 +6,26 @@
 
 #include "simd.h"
 
-/* Nearest opaque hits so far; and the crossings of transparent surfaces, by which volume fragments are cut. */
+/* Maximum number of crossings of transparent surfaces stored per ray; volume fragments are split at them. */
 enum { KERNEL_MAX_CUTS = 32 };
 
-/* The cells that rays hit. part is -1 where the cell is not needed again. */
+/* The cells that rays hit. part: -1 if the cell is not needed again. */
 typedef struct kernel_hit_cells {
     vi part, index;
 } kernel_hit_cells;
 
 typedef struct kernel_hits {
     vm found;
-    vf normal[3];           /* along the gradient, camera axes, any length; of RENDER_VERTEX until the end: the place
-                               in the cell, its own coordinates */
-    kernel_hit_cells cells; /* only of RENDER_VERTEX */
-    vf colour[3];           /* unlit */
-    vf reach;               /* how far samples for differences lie; only if they are wanted */
+    /* direction of the gradient in camera axes, any length; with RENDER_VERTEX, until the tile ends, the reference
+     * coordinates in the cell */
+    vf normal[3];
+    kernel_hit_cells cells; /* only with RENDER_VERTEX */
+    vf colour[3];           /* unlit colour */
+    vf reach;               /* distance of the samples for differences; only if these are used */
     vf kind;
-    int cut_count;           /* rows: the n-th that was found of each ray, +inf where it has fewer */
-    vf cut[KERNEL_MAX_CUTS]; /* in the order in which they were found */
-    vm crowded;              /* rays that have more */
+    int cut_count;           /* number of rows in `cut` */
+    vf cut[KERNEL_MAX_CUTS]; /* row n holds the n-th crossing found of each ray, unsorted; +inf if a ray has fewer */
+    vm crowded;              /* rays with more crossings than fit */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)
@@ -36,8 +37,8 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 
-/* A row holds each ray's own n-th crossing, whichever rays met their cells together: where fragments are cut depends
- * neither on the traversal nor on the other rays of the packet. */
+/* Adds crossings. Each ray fills its own rows in order, so that the positions where fragments are cut depend neither on
+ * the traversal nor on the other rays of the packet. */
 SIMD_INLINE void kernel_hits_cut(kernel_hits *hits, vm hit, vf t)
 {
     for (int n = 0; vm_any(hit); n++) {

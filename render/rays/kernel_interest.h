@@ -1,4 +1,4 @@
-/* Do a node's or a cell's values meet those that show? */
+/* Tests whether the values of a node or a cell meet the visible ones. */
 #ifndef RENDER_KERNEL_INTEREST_H
 #define RENDER_KERNEL_INTEREST_H
 
@@ -15,7 +15,7 @@ SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float lo
     return false;
 }
 
-/* Tests as kernel_interest_meets() does, a range in each lane. */
+/* Tests as kernel_interest_meets() does, one range per lane. */
 SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf low, vf high)
 {
     vm meets = vm_none();
@@ -24,7 +24,7 @@ SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf l
     return meets;
 }
 
-/* Tests as kernel_interest_meets() does, a cell of count values in each lane. */
+/* Tests as kernel_interest_meets() does, one cell per lane, of `count` values each. */
 SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf *v, int count)
 {
     vf low = v[0], high = v[0];

@@ -1,14 +1,4 @@
-/* A packet: SIMD_WIDTH rays of one tile, and the two frames of coordinates they live in.
- *
- * Tree space: (position - origin) * scale, in which boxes are tested.
- *
- * Tile space: camera axes, scaled, sheared so that the ray through the tile's centre is the depth axis:
- *     X = x - centre_x (z + shift),  Y likewise,  Z = z          (perspective)
- *     X = x - centre_x,              Y likewise,  Z = z          (orthographic)
- * A cell's vertices are taken there in double and then rounded to float: near the tile's rays X and Y are as small as
- * the cell, so that their rounding is relative to the cell and not to the distance from the eye. A vertex has the
- * same X, Y, Z in every cell and on every rank: the tile, not the cell, decides the frame. Within the tile, a ray
- * is the point (origin_x + slope_x Z, origin_y + slope_y Z, Z), with slope and origin tiny. */
+/* A packet: SIMD_WIDTH rays of one tile. It uses two coordinate systems. */
 #ifndef RENDER_KERNEL_PACKET_H
 #define RENDER_KERNEL_PACKET_H
 
@@ -25,34 +15,35 @@ typedef struct kernel_packet {
     const kernel_frame *frame;
     const kernel_tile *tile;
     kernel_thread *thread;
-    int x0, y0; /* the upper left pixel */
+    int x0, y0; /* upper left pixel */
     vm active;
-    bool is_nearer; /* t_far has changed since this was last made false */
+    bool is_nearer; /* t_far has changed since this flag was last cleared */
     bool has_view;
     /* tile space */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* Are these rays the tile's own? Then what tells one from another is (u, v), their slopes, or where the camera is
-     * orthographic their origins (kernel_cell.h). */
+    /* The rays are the tile's own primary rays. They differ only in (u, v): their slopes, or, if the camera is
+     * orthographic, their origins (kernel_cell.h). */
     bool is_pencil;
     vf u, v;
-    vf t_near; /* the eye's plane, or clip_in where that is farther */
-    vf t_far;  /* nearest opaque hit so far, +inf or clip_out at first */
+    vf t_near; /* depth of the eye's plane, or clip_in if that is farther */
+    vf t_far;  /* nearest opaque hit so far; initially +inf or clip_out */
     uint32_t pixel[SIMD_WIDTH];
-    /* camera space direction to the eye, for shading: unit length; where has_view */
+    /* unit vector to the eye in camera space, for shading; valid if has_view */
     vf view[3];
-    /* The rest is set up where rays of the packet go down trees on their own (kernel_packet_complete()).
-     * Tree space: planes are met at t = plane * inverse - shift */
+    /* The rest is set up if rays of the packet traverse trees on their own (kernel_packet_complete()). Tree space: the
+     * ray meets a plane at t = plane * inverse - shift. */
     vf inverse[3], shift[3];
-    float pad; /* boxes are widened by it: more than all rounding in the box test */
+    float pad; /* margin by which boxes are extended: more than all rounding in the box test */
     float centre_direction[3];
-    /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
+    /* samples are at t = sample_base + m * sample_step for integers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The part of the ray that clips leave for volumes; -inf and +inf without clips. */
+    /* The interval that clips leave of the ray for volumes; -inf and +inf without clips. */
     vf clip_in, clip_out;
-    vf clip_stretch; /* how many times as long that part is as clip_out - clip_in: where a ray grazes a sphere, rounding
-                        both ends may change much of it */
-    /* The part of the rays that surfaces leave, kept where volumes have clips of their own. */
+    /* length of that interval in double, over clip_out - clip_in: if a ray grazes a sphere, rounding both ends may
+     * change the length much */
+    vf clip_stretch;
+    /* The interval that surfaces leave of the rays, saved if volumes have clips of their own. */
     vm all_active;
     vf surface_near, surface_far;
 } kernel_packet;
@@ -60,7 +51,8 @@ typedef struct kernel_packet {
 /* Packets cover rectangles: 4 × 4, 4 × 2 or 2 × 2 pixels. */
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
 
-/* Base point at t = 0 and direction per t of the ray with column and row parameters (px, py), in tree space. */
+/* Computes the base point at t = 0 and the direction per t, in tree space, of the ray with column and row parameters
+ * (px, py). */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
 {
     const render_camera *c = &f->job->camera;
@@ -74,7 +66,7 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-/* Lanes of a packet under construction: plain arrays and one loop a quantity, which compilers vectorize. */
+/* Lanes of a packet under construction: plain arrays, with one loop per quantity, which compilers vectorize. */
 typedef struct kernel_lanes {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float value[SIMD_WIDTH];
@@ -106,7 +98,7 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* Rays in tree space, axis by axis: position = base + t * direction. */
+/* Sets the rays in tree space, axis by axis: position = base + t * direction. */
 static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
 {
     const render_camera *c = &p->frame->job->camera;
@@ -129,12 +121,12 @@ static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
         p->inverse[a] = vf_load(l->value);
         p->shift[a] = vf_load(shift);
     }
-    /* Positions near the scene and the base are at most of size + 1; plane * inverse - shift errs by 2 roundings of
-     * that, the base by 1, the direction by 1 over the scene's size: 16 units leave a margin of 2. */
+    /* Positions near the scene and the base are at most size + 1. plane * inverse - shift errs by 2 roundings of that,
+     * the base by 1, the direction by 1 over the scene's size: the factor 16 leaves a margin of 2. */
     p->pad = 16 * 6e-8f * ((float)size + 2);
 }
 
-/* Finds the directions to the eye; called before kernel_shade(). */
+/* Computes the directions to the eye; must be called before kernel_shade(). */
 static inline void kernel_packet_view(kernel_packet *p)
 {
     if (p->has_view) return;
@@ -158,8 +150,8 @@ static inline void kernel_packet_view(kernel_packet *p)
     for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
 }
 
-/* Numbers the samples from one near the depth origin, so that float32 holds their places well; the number depends on
- * the camera alone. sample_first <= 0 is the sample at the eye. */
+/* Returns the number of the first sample, which is the one at the eye and at most 0. Samples are numbered from one near
+ * the depth origin, so that float32 represents their depths well; the numbers depend only on the camera. */
 static inline int kernel_sample_first(const kernel_frame *f)
 {
     const double count = floor(f->depth_shift / f->scaled_step);
@@ -184,7 +176,7 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* Finds the stretch, by its number, that the clips leave of each of the packet's rays in front of the eye. */
+/* Sets the n-th interval (n = number) that the clips leave of each of the packet's rays in front of the eye. */
 static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p, uint32_t clips, int number)
 {
     const kernel_frame *f = p->frame;
@@ -206,7 +198,7 @@ static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p,
     p->clip_stretch = vf_load(stretch);
 }
 
-/* Applies the clips that all layers are cut by. */
+/* Applies the clips that all layers have in common. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
     kernel_packet_part(p, p->frame->common_clips, 0);
@@ -215,8 +207,8 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Applies the clips of volumes: the packet keeps the stretch of the turn's number. All surfaces have been traced
- * before. */
+/* Applies the clips of volumes: the packet gets the interval with the turn's number. All surfaces must have been
+ * traced. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
     if (turn == 0) {
@@ -230,7 +222,7 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
 }
 
-/* Sets up what rays need in cells. The tile's rays must be there. */
+/* Sets up the rays for tracing in cells. The tile's rays must be set. */
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
@@ -265,7 +257,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     if (f->common_clips) kernel_packet_clip(p);
 }
 
-/* Sets up what rays need besides to go down trees on their own, and for volumes. */
+/* Sets up the additional data with which rays traverse trees on their own, and those for volumes. */
 static inline void kernel_packet_complete(kernel_packet *p)
 {
     const kernel_frame *f = p->frame;
@@ -278,7 +270,8 @@ static inline void kernel_packet_complete(kernel_packet *p)
     if (f->volume_count) kernel_packet_samples(p, &l);
 }
 
-/* Finds the depths between which the packet's rays are in the node's box, within those given. */
+/* Computes the intervals of the packet's rays in the node's box, within the given depths. Returns the rays that meet
+ * the box. */
 SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh *tree, int64_t node, vf *t_in, vf *t_out)
 {
     vf low = *t_in, high = *t_out;

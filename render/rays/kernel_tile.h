@@ -1,5 +1,5 @@
-/* A tile's blocks and what they can meet. A tile of 16 × 16 pixels is 4 × 4 blocks of 4 × 4 pixels, on every
- * instruction set; a block is one packet or several:
+/* A tile's blocks, and which of them a body may meet. A tile of 16 × 16 pixels has 4 × 4 blocks of 4 × 4 pixels, for
+ * every instruction set; a block has one or more packets:
  *
  *     border     0     1     2     3     4
  *          0     +-----+-----+-----+-----+
@@ -9,10 +9,11 @@
  *          2     +-----+-----+-----+-----+      border, or on the side of a column, for every column that it may
  *                                               touch; columns and rows together give a mask of blocks.
  *
- * All planes stand in the lanes of a vector, beside the depth and the direction along the tile: a body is classified
- * against all of them at once. Planes through the eye are right for what lies before the eye, and what does not is
- * behind the rays' begin. A body that straddles the eye's plane is on both sides of what it may meet: nothing is lost.
- * Masks are never too small, by pads that are more than all rounding: they say where to look, never what is there. */
+ * All planes are lanes of vectors, together with the depth and the direction along the tile: a body is classified
+ * against all of them at once. Planes through the eye are right for bodies in front of the eye; everything else lies
+ * behind the rays' begin. A body that straddles the eye's plane is on both sides of the borders that it may meet:
+ * nothing is lost. Masks are never too small, as bodies are extended by more than all rounding: masks only select where
+ * to test, never the result. */
 #ifndef RENDER_KERNEL_TILE_H
 #define RENDER_KERNEL_TILE_H
 
@@ -38,7 +39,7 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->radius = (float)(0.5 * KERNEL_TILE * widest);
 }
 
-/* Returns the factor that turns a slope into the origin at Z = 0. */
+/* Returns the factor from a slope to the origin at Z = 0. */
 static inline double kernel_reach(const kernel_frame *f)
 {
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
@@ -64,7 +65,7 @@ enum {
     KERNEL_BLOCK_PACKETS = KERNEL_BLOCK * KERNEL_BLOCK / SIMD_WIDTH,
     KERNEL_TILE_PACKETS = KERNEL_BLOCKS * KERNEL_BLOCK_PACKETS,
     KERNEL_ALL_BLOCKS = (1 << KERNEL_BLOCKS) - 1,
-    /* Lanes: five borders of columns, five of rows, depth (tree space: t), distance along the tile's direction. */
+    /* Lanes: five borders of columns, five of rows, depth (in tree space: t), distance along the tile's direction. */
     KERNEL_ROWS_LANE = KERNEL_BLOCKS_ACROSS + 1,
     KERNEL_DEPTH_LANE = 2 * KERNEL_ROWS_LANE,
     KERNEL_ALONG_LANE,
@@ -72,19 +73,19 @@ enum {
     KERNEL_LANE_VECTORS = KERNEL_LANES / SIMD_WIDTH
 };
 
-/* normal · position + offset in each lane; size is |normal|, and error a bound of the rounding at positions near the
- * scene. */
+/* A plane per lane: normal · position + offset. size: absolute values of the normal; error: bound of the rounding at
+ * positions near the scene. */
 typedef struct kernel_planes {
     vf normal[3][KERNEL_LANE_VECTORS], size[3][KERNEL_LANE_VECTORS];
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
 } kernel_planes;
 
-/* The sides of the planes that a body is on, a bit a lane. */
+/* The sides of the planes on which a body lies, one bit per lane. */
 typedef struct kernel_sides {
-    unsigned below, above; /* on the negative or zero, and on the positive or zero side, in part at least */
+    unsigned below, above; /* at least partly on the negative or zero side; on the positive or zero side */
 } kernel_sides;
 
-/* Lane by lane, to be made into planes: normals in camera axes. */
+/* Planes before conversion to float, one per lane: normals in camera axes. */
 typedef struct kernel_plane_lanes {
     double right[KERNEL_LANES], up[KERNEL_LANES], forward[KERNEL_LANES], offset[KERNEL_LANES];
 } kernel_plane_lanes;
@@ -94,7 +95,7 @@ SIMD_INLINE vf kernel_lanes_load(const float *lanes, int v)
     return vf_load(lanes + v * SIMD_WIDTH);
 }
 
-/* The slope (perspective) or offset (orthographic) of border n, relative to the tile's centre. */
+/* Returns the slope (perspective) or offset (orthographic) of border n, relative to the tile's centre. */
 static inline double kernel_border_x(const kernel_frame *f, const kernel_tile *tile, int n)
 {
     return kernel_column(f, tile->x0 + n * KERNEL_BLOCK - 0.5) - tile->centre_x;
@@ -104,7 +105,7 @@ static inline double kernel_border_y(const kernel_frame *f, const kernel_tile *t
     return kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5) - tile->centre_y;
 }
 
-/* Slopes or offsets of all borders, and of the direction along the rays. */
+/* Slopes or offsets of all borders, and of the direction along the tile. */
 typedef struct kernel_borders {
     double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
     double centre_x, centre_y;
@@ -120,7 +121,7 @@ static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f,
     b->centre_y = tile->centre_y;
 }
 
-/* Sets the borders so that a body in the first block lies in the picture. */
+/* Sets the borders so that a body is in the first block if it is in the picture. */
 static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
@@ -130,7 +131,7 @@ static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame 
     b->centre_x = b->centre_y = 0;
 }
 
-/* The planes relative to the eye: positive on the side of greater columns and rows. */
+/* Computes the planes relative to the eye: positive on the side of greater columns and rows. */
 static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_frame *f, const kernel_borders *b)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -151,8 +152,9 @@ static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_
     l->up[KERNEL_ALONG_LANE] = flat ? 0 : b->centre_y;
 }
 
-/* Planes in tree space, for boxes. Normals are rounded before the plane is put through the eye, so that it goes
- * through it: what is left is a turn by one rounding, at a distance of no more than the eye's and the scene's. */
+/* Computes the planes in tree space, for boxes. Normals are rounded before the offsets are computed, so that the planes
+ * still pass through the eye. The remaining error is a rotation by one rounding, at a distance of at most the eye's and
+ * the scene's. */
 static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_borders *b)
 {
     const render_camera *c = &f->job->camera;
@@ -171,8 +173,8 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
             error[i] += fabsf(normal[a][i]);
         }
     }
-    /* Positions are at most of size + 1 (kernel_packet_tree_rays()). A sum of three products errs by 4 roundings of
-     * that times the normal's 1-norm, the middle and half widths of a box by one, the normal and the offset by one. */
+    /* Positions are at most size + 1 (kernel_packet_tree_rays()). A sum of three products errs by 4 roundings of that
+     * times the normal's 1-norm, the middle and half widths of a box by 1, the normal and the offset by 1. */
     for (int i = 0; i < KERNEL_LANES; i++) {
         offset[i] = (float)l.offset[i];
         error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));
@@ -187,7 +189,8 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
     }
 }
 
-/* Planes in tile space, for cells: X - slope Z - origin, and the like. The lane along the direction is not used. */
+/* Computes the planes in tile space, for cells: X - slope Z - origin, and likewise for Y. The lane along the direction
+ * is not used. */
 static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -221,20 +224,21 @@ SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
     return kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
-/* Adds the bits of the lanes where low <= 0, and where high >= 0. */
+/* Adds the bits of the lanes with low <= 0 to below, with high >= 0 to above. */
 SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
 {
     s->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
     s->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
 }
 
-/* A body's placement: the blocks it may meet, its least and greatest depth, and its place along the tile's axis. */
+/* A body's placement: the blocks that it may meet, its least and greatest depth, and its position along the tile's
+ * axis. */
 typedef struct kernel_placement {
     unsigned blocks;
     float near, far, along;
 } kernel_placement;
 
-/* Finds the sides that a node's box is on, and its placement but for the blocks. */
+/* Computes the sides on which a node's box lies, and its placement except for the blocks. */
 SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node,
                                           kernel_placement *placement)
 {
@@ -264,16 +268,16 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
     return placement;
 }
 
-/* Points in tile space. */
-enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two on each line between two of them */
+/* Maximum number of points of an outline, in tile space. */
+enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two points on each line between two of them */
 
 typedef struct kernel_outline {
     int count;
     float point[3][KERNEL_OUTLINE_POINTS];
-    float size[3]; /* the cell's: largest |X|, |Y|, |Z| of its vertices */
+    float size[3]; /* largest |X|, |Y|, |Z| of the cell's vertices */
 } kernel_outline;
 
-/* Pads of a hundred-thousandth of the cell and its place: rays that hit by a rounding have theirs wholly within. */
+/* Relative margin of an outline's extent: rays that hit only by rounding stay within it. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
 SIMD_INLINE kernel_placement kernel_outline_placement(const kernel_planes *q, const kernel_outline *o)

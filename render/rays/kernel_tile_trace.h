@@ -1,5 +1,5 @@
-/* The tile being traced: its rays, its blocks' nearest hits, its way down a tree, and lists of pixels of several cells
- * side by side. Packets are set up when a cell meets their block. */
+/* The tile that is traced: its rays, its blocks' nearest hits, its traversal of a tree, and lists of pixels of several
+ * cells side by side. A block's packets are set up when the first cell meets the block. */
 #ifndef RENDER_KERNEL_TILE_TRACE_H
 #define RENDER_KERNEL_TILE_TRACE_H
 
@@ -20,24 +20,24 @@ typedef struct kernel_tile_trace {
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
-    unsigned wanted;        /* blocks that have pixels to trace */
+    unsigned wanted;        /* blocks with pixels to trace */
     unsigned begun;         /* blocks whose packets are set up */
-    int turn;               /* which stretch of each ray volumes are traced on (kernel_clip.h) */
-    int64_t first_fragment; /* the tile's first, in the thread's list */
+    int turn;               /* number of the interval of each ray on which volumes are traced (kernel_clip.h) */
+    int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     float t_near;
-    vf far[KERNEL_BLOCKS / SIMD_WIDTH];         /* each block's farthest t_far, */
-    float pixel_far[KERNEL_TILE * KERNEL_TILE]; /* and each pixel's, where the tile goes down the trees for surfaces */
-    /* for the surface under way */
+    vf far[KERNEL_BLOCKS / SIMD_WIDTH];         /* farthest t_far of each block's rays */
+    float pixel_far[KERNEL_TILE * KERNEL_TILE]; /* t_far of each pixel, if the tile traverses the trees for surfaces */
+    /* of the current surface: */
     const kernel_surface *surface;
     int layer;
     struct kernel_cell *cell;
     struct kernel_curved *curved;
-    struct kernel_tile_finder *search;          /* for cells down the trees */
-    kernel_packet packets[KERNEL_TILE_PACKETS]; /* block by block */
+    struct kernel_tile_finder *search;          /* for the search of cells in trees */
+    kernel_packet packets[KERNEL_TILE_PACKETS]; /* in the order of blocks */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
 
-/* Returns the blocks whose rays know of no hit before the depth. */
+/* Returns the blocks in which some ray has no hit nearer than this depth. */
 SIMD_INLINE unsigned kernel_blocks_beyond(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
@@ -63,7 +63,7 @@ SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
     }
 }
 
-/* Returns the farthest hit that the block's rays know of. */
+/* Returns the farthest t_far of the block's active rays. */
 SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
 {
     vf far = vf_set(-INFINITY);
@@ -74,7 +74,7 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
     return vf_reduce_max(far);
 }
 
-/* Notes that rays of the block know of something nearer. */
+/* Updates the block's farthest t_far, and its pixels', after new hits. */
 SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
 {
     t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
@@ -92,7 +92,7 @@ SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
     }
 }
 
-/* May a ray in the box of pixels (kernel_types.h) meet something at the depth before what it knows of? */
+/* Returns whether some pixel of the box (kernel_types.h) has no hit nearer than this depth. */
 SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, float near)
 {
     const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
@@ -106,7 +106,7 @@ SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, 
     return false;
 }
 
-/* Returns those of the blocks in which a body of this outline may show. */
+/* Returns those of the blocks in which a body with this outline may be visible. */
 SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
 {
     const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
@@ -114,7 +114,7 @@ SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_o
     return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
 
-/* Returns the farthest hit that any wanted block knows of. */
+/* Returns the farthest t_far of all wanted blocks. */
 SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
 {
     const unsigned lanes = (1u << SIMD_WIDTH) - 1;
@@ -148,8 +148,8 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     kernel_tile_planes(&t->tile_planes, f, &t->tile);
 }
 
-/* A tile goes down a tree once for all its blocks, with a mask of those that a node may meet before what they already
- * know to be nearer. */
+/* An entry of the traversal's stack. A tile traverses a tree once for all its blocks, with a mask of the blocks that a
+ * node may meet in front of their nearest hits. */
 
 typedef struct kernel_tile_entry {
     int64_t node;
@@ -162,12 +162,13 @@ typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *c
 struct kernel_cell;
 struct kernel_map;
 
-/* Called with a cell that is ready; a polyhedron has its index alone. map is NULL for cells that need none. */
+/* Callback for a cell that is ready for tracing; for a polyhedron only the index is set. map: NULL if the cell needs
+ * none. */
 typedef void kernel_tile_take(kernel_tile_trace *t, int part, const struct kernel_cell *c, const struct kernel_map *map,
                               unsigned blocks);
 
-/* Returns those of the blocks in which the node may be met, none where its values do not show. interest NULL: all
- * values show. */
+/* Returns those of the blocks that may meet the node, none if its values are invisible. interest: NULL if all values
+ * are visible. */
 SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
                                               const kernel_interest *interest, int64_t node, unsigned blocks)
 {
@@ -176,7 +177,7 @@ SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const 
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {
-        /* Prefetches what an inner node or a leaf needs next. */
+        /* Prefetches the data that are read next: a leaf's cells, or an inner node's children. */
         const int64_t ref = mmbvh_node_ref(tree, node);
         if (mmbvh_node_count(tree, node)) {
             __builtin_prefetch(tree->cells + ref);
@@ -216,11 +217,11 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
     }
 }
 
-/* ---- lanes that are pixels of several cells ---- */
+/* ---- vectors of pixels of several cells ---- */
 
 enum { KERNEL_LIST_PIXELS = 512, KERNEL_LIST_ROOM = KERNEL_LIST_PIXELS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
 
-/* A ray: its pixel in the tile, row by row, and its cell's lane. */
+/* A list of rays: for each its pixel in the tile, row by row, and its cell's lane. */
 typedef struct kernel_pixel_list {
     int count;
     uint8_t pixel[KERNEL_LIST_ROOM], lane[KERNEL_LIST_ROOM];
@@ -232,7 +233,7 @@ SIMD_INLINE int kernel_box_pixels(unsigned box)
     return columns * ((int)(box >> 12) - (int)(box >> 8 & 15) + 1);
 }
 
-/* Lists a ray for each pixel of a box, row by row, for the cell in the lane. */
+/* Lists a ray for each pixel of a box, row by row, for the cell in the given lane. */
 SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box, int lane)
 {
     static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -249,7 +250,7 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
     }
 }
 
-/* Pads the list so that whole vectors may be read. */
+/* Pads the list, so that whole vectors can be read. */
 SIMD_INLINE void kernel_pixel_list_close(kernel_pixel_list *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
@@ -264,13 +265,13 @@ SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* Looks up a tile's entries by column or row. */
+/* Returns a tile's entries at the given columns or rows. */
 SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
 }
 
-/* Returns the place of a pixel among the tile's packets: packet * SIMD_WIDTH + lane. */
+/* Returns the index of a pixel among the tile's packets: packet * SIMD_WIDTH + lane. */
 SIMD_INLINE vi kernel_batch_at(vi column, vi row)
 {
     const vi block = (row & ~3) + (column >> 2);
@@ -279,7 +280,7 @@ SIMD_INLINE vi kernel_batch_at(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
-/* Rays of pixels in tile space, the lanes of their cells, and where the pixels are in packets. */
+/* Rays of pixels in tile space, with the lane of each ray's cell and the pixel's index among the packets. */
 typedef struct kernel_local_rays {
     vi lane, at;
     vf origin[2], slope[2];
@@ -303,16 +304,16 @@ SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
                      at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
-/* Rays of a list, each of a cell of its own. */
+/* Rays of a list, each with its own cell. */
 typedef struct kernel_lane_rays {
     vm active;
-    vi lane, at; /* the lane of the ray's cell; where its pixel is, by packet and lane */
+    vi lane, at; /* lane of the ray's cell; index of its pixel, by packet and lane */
     kernel_rays rays;
     vf u, v; /* as in kernel_packet */
-    vf far;  /* the nearest hit so far; only surfaces set it */
+    vf far;  /* nearest hit so far; set only by surfaces */
 } kernel_lane_rays;
 
-/* Takes the list's rays from first on. */
+/* Loads up to SIMD_WIDTH rays of the list, beginning with ray `first`. */
 SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile_trace *t,
                                         const kernel_pixel_list *rays, int first)
 {
@@ -335,11 +336,11 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
     t->surface = &t->frame->surfaces[layer];
 }
 
-/* Are rays of the layer under way accepted by kernel_ray_accept()? */
+/* Returns whether rays of the current layer can be accepted by kernel_ray_accept(). */
 SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
-    /* Rays that are clipped begin each at a depth of its own, which packets know. */
+    /* Clipped rays begin at different depths, which only packets store. */
     if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
     if (l->lines && l->lines->is_alone) return false;
     return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;

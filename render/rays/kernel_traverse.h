@@ -1,6 +1,6 @@
-/* Packet traversal of the min-max BVH (thesis, section 4.3.1): all rays of a packet go down together as long as one
- * of them needs to (speculative descent), and a node's box is tested only where its range meets a value that shows
- * (the delayed box test, section 4.3.2). The nearer child goes first, by the rays' common direction. */
+/* Packet traversal of the min-max BVH (thesis, section 4.3.1): all rays of a packet descend together as long as one of
+ * them needs to (speculative descent), and a node's box is tested only if its range meets a visible value (the delayed
+ * box test, section 4.3.2). The nearer child, by the rays' common direction, is visited first. */
 #ifndef RENDER_KERNEL_TRAVERSE_H
 #define RENDER_KERNEL_TRAVERSE_H
 
@@ -11,10 +11,10 @@
 #include "render.h"
 #include "simd.h"
 
-/* Called with the rays that meet a leaf's box. */
+/* Callback for a leaf, with the rays that meet its box. */
 typedef void kernel_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays);
 
-/* Tells whether the right child is nearer than the left, seen along the packet. */
+/* Returns whether the right child is nearer than the left one along the packet's direction. */
 SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
 {
     float lower[2][4], upper[2][4], along = 0;
@@ -24,13 +24,14 @@ SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, i
     return along < 0;
 }
 
-/* A descent: leaf() gets every leaf that shows and that a ray enters between t_low and *t_high, which it may lower. */
+/* Parameters of a traversal. leaf() is called for each visible leaf that a ray enters between t_low and *t_high; it may
+ * lower *t_high. */
 typedef struct kernel_descent {
-    const kernel_interest *interest; /* NULL: everything shows */
+    const kernel_interest *interest; /* NULL: all values are visible */
     vf t_low;
     const vf *t_high;
     kernel_leaf *leaf;
-    void *state; /* for leaf() */
+    void *state; /* passed to leaf() */
 } kernel_descent;
 
 SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,
@@ -58,7 +59,7 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
     }
 }
 
-/* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
+/* State of the traversal of a tree over meshes: its leaves are meshes, whose own trees are then traversed. */
 typedef struct kernel_parent_state {
     const render_field *field;
     kernel_descent descent;

@@ -29,7 +29,7 @@ SIMD_INLINE kernel_half_floats kernel_half_narrow(kernel_half v)
     return __builtin_convertvector(v, kernel_half_floats);
 }
 
-/* The first half or the second. */
+/* Returns the first or the second half of a mask. */
 SIMD_INLINE kernel_half_mask kernel_half_of_mask(vm m, int half)
 {
     typedef int32_t kernel_half_ints __attribute__((vector_size(4 * KERNEL_HALF)));
@@ -46,7 +46,7 @@ SIMD_INLINE kernel_half kernel_half_select(kernel_half_mask m, kernel_half a, ke
     return (kernel_half)(((kernel_half_mask)a & m) | ((kernel_half_mask)b & ~m));
 }
 
-/* The first half of v's lanes or the second. */
+/* Returns the first or the second half of v's lanes, as doubles. */
 SIMD_INLINE kernel_half kernel_half_of(const vf *v, int half)
 {
     kernel_half_floats f;
@@ -79,7 +79,7 @@ SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
     return kernel_half_select((kernel_half_mask)(b < a), a, b);
 }
 
-/* Held within -limit .. limit. */
+/* Returns v clamped to -limit .. limit. */
 SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
 {
     const kernel_half most = (kernel_half){0} + limit;
@@ -87,7 +87,7 @@ SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
     return kernel_half_select((kernel_half_mask)(most < v), most, v);
 }
 
-/* A double a lane. */
+/* SIMD_WIDTH doubles, one per lane. */
 typedef struct kernel_whole {
     kernel_half half[2];
 } kernel_whole;
@@ -127,7 +127,7 @@ SIMD_INLINE vf kernel_whole_narrow(const kernel_whole *v)
     return out;
 }
 
-/* x in the lane. */
+/* Returns the number in the lane. */
 SIMD_INLINE double kernel_whole_lane(const kernel_whole *v, int lane)
 {
     return v->half[lane / KERNEL_HALF][lane % KERNEL_HALF];

@@ -1,8 +1,8 @@
-/* The rays of a hemisphere lie on a spiral of equal steps in area, projected upwards from the disk below (Malley's
- * method), so that they are spread as the cosine asks: the share that is open is what the sky gives. Pixels turn the
- * spiral by angles that differ from all their neighbours' (interleaved gradient noise, Jimenez 2014), and move its
- * begin; both depend on the pixel and on the number among the frames that are averaged alone, so a surface that
- * stands still has the same samples at every step. */
+/* The rays of a hemisphere lie on a spiral with steps of equal area, projected upwards from the disk below (Malley's
+ * method), so that their density follows the cosine: the fraction of unblocked rays is the light of the sky. Each pixel
+ * rotates the spiral by an angle that differs from all its neighbours' (interleaved gradient noise, Jimenez 2014), and
+ * shifts its begin. Both depend only on the pixel and on the frame's number among those that are averaged, so a surface
+ * that does not move has the same samples at every step. */
 #include "render_hits.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@ static void normalize(double v[3])
     for (int a = 0; a < 3; a++) v[a] /= length;
 }
 
-/* Finds two unit vectors across a third (Duff et al. 2017). */
+/* Returns two unit vectors perpendicular to a third (Duff et al. 2017). */
 hit_axes hit_axes_around(const double n[3])
 {
     const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
@@ -58,8 +58,8 @@ hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const flo
 /* ---- the hemisphere ------------------------------------------------------------------------------------------ */
 
 typedef struct hemisphere {
-    double cosine, sine; /* for the pixel's turn */
-    double begin;        /* 0 .. 1, of the spiral's first step */
+    double cosine, sine; /* of the pixel's rotation */
+    double begin;        /* 0 .. 1: begin of the spiral's first step */
 } hemisphere;
 
 static double part_of(double x)
@@ -78,8 +78,8 @@ static hemisphere hemisphere_of(const render_job *job, uint32_t pixel)
 /* The golden angle's cosine and sine. */
 static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
-/* The directions of a hit's samples, z along the normal, unit length. The last of them are kept off the horizon, where
- * what is rounding across the surface would be a long way. */
+/* Computes the directions of a hit's samples, of unit length, z along the normal. The last ones are kept off the
+ * horizon, where rounding of the surface would mean a long distance. */
 static void spread(const hemisphere *h, int count, double (*out)[3])
 {
     double x = h->cosine, y = h->sine;

@@ -4,11 +4,13 @@
 
 #include "kernel_types.h"
 
-/* The calling thread's choice: the thread that draws a frame asks once for all of it. */
+/* Returns the kernels for the calling thread's instruction set: the thread that draws a frame calls it once for the
+ * whole frame. */
 const kernel_table *render_kernels(void);
 
-/* Readies a thread's memory at its first use, by that thread, which so touches it first. The kernels are those of the
- * thread that opened the region. False, and thread->out_of_memory, where there is none. */
+/* Allocates and sets up a thread's memory at its first use. It is called by that thread, so that the thread touches the
+ * memory first. kernels: those of the thread that opened the parallel region. Returns false, with thread->out_of_memory
+ * set, if there is no memory. */
 bool render_thread_begin(const kernel_table *kernels, kernel_thread *thread);
 
 #endif
