@@ -1,6 +1,6 @@
-/* The tables are made on first use. Most are published as tables (colour_tables.c). ColorBrewer's go through their key
- * colours by straight lines in sRGB, as matplotlib draws them; cool_to_warm is Moreland's formula in Msh, the polar
- * form of CIELAB, whose middle stays neutral without a visible edge. */
+/* The tables are computed at first use. Most are published as tables (colour_tables.c). ColorBrewer's interpolate their
+ * key colours linearly in sRGB, as matplotlib does; cool_to_warm is Moreland's formula in Msh, the polar form of
+ * CIELAB, whose middle is neutral without a visible edge. */
 #include "colour_map.h"
 
 #include <pthread.h>
@@ -83,7 +83,7 @@ static void fill_palette(colour_table table, const brewer_palette *palette)
     }
 }
 
-/* Between two saturated ends: through a neutral middle, as light as colour_between() makes it. */
+/* Fills a table between two saturated ends, through the neutral middle of colour_between(). */
 static void fill_diverging(colour_table table, unsigned low, unsigned high)
 {
     double ends[2][3];

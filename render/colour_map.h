@@ -2,7 +2,7 @@
 #ifndef RENDER_COLOUR_MAP_H
 #define RENDER_COLOUR_MAP_H
 
-/* Every map: the word of its constant, and its name. */
+/* Every map: the suffix of its constant, and its name. */
 #define COLOUR_MAPS(X)                                                                                                 \
     X(VIRIDIS, "viridis")                                                                                              \
     X(PLASMA, "plasma")                                                                                                \
@@ -32,10 +32,11 @@
 #define COLOUR_MAP_CONSTANT(word, name) COLOUR_MAP_##word,
 typedef enum colour_map { COLOUR_MAPS(COLOUR_MAP_CONSTANT) COLOUR_MAP_COUNT } colour_map;
 
-/* The map's table (colour_count × 3 floats, linear light, evenly spaced, static), or NULL where none has this name. */
+/* Returns the map's table (colour_count × 3 floats, linear light, evenly spaced, static), or NULL if there is no map of
+ * this name. */
 const float *colour_map_table(const char *name, int *colour_count);
 
-/* Turns one sRGB component in [0, 1] into linear light. */
+/* Converts one sRGB component in [0, 1] to linear light. */
 float colour_linear_from_srgb(float srgb);
 
 #endif

@@ -66,7 +66,7 @@ static void between_lab(const double a[3], const double b[3], double share, floa
     linear_from_lab(from, linear);
 }
 
-/* ---- Moreland's diverging ways --------------------------------------------------------------------------------- */
+/* ---- Moreland's diverging interpolation ------------------------------------------------------------------------ */
 
 /* m: distance from black, s: angle from the grey axis, h: hue. */
 typedef struct msh {
@@ -91,8 +91,8 @@ static void linear_from_msh(msh colour, float linear[3])
     linear_from_lab(lab, linear);
 }
 
-/* The hue that a neutral colour of distance m takes on the side of a saturated one, so that the way there does not turn
- * in hue. */
+/* Returns the hue that a neutral colour of distance m has on the side of a saturated one, so that the hue does not
+ * rotate on the path between them. */
 static double neutral_hue(msh end, double m)
 {
     if (end.m >= m - 0.1) return end.h;
@@ -149,7 +149,7 @@ static void between_hsv(const double a[3], const double b[3], double share, floa
     }
 }
 
-/* ---- the whole ------------------------------------------------------------------------------------------------- */
+/* ---- colours and tables ---------------------------------------------------------------------------------------- */
 
 static void between_srgb(const double a[3], const double b[3], double share, float linear[3])
 {

@@ -6,8 +6,8 @@
 
 enum { COLOUR_TABLE_SIZE = 256 };
 
-/* COLOUR_TABLE_SIZE entries, sRGB of 16 bits a channel, red the highest of 48; NULL: none of this name is published so.
- */
+/* Returns COLOUR_TABLE_SIZE entries, sRGB of 16 bits per channel, red the highest of 48; NULL if no table of this name
+ * has been published. */
 const uint64_t *colour_published_table(const char *name);
 
 #endif

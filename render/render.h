@@ -1,25 +1,25 @@
-/* Local cells to local fragments: camera, layers, and the one call that draws a frame. Knows no MPI.
+/* Renders local cells to local fragments: camera, layers, and the one call that draws a frame. It does not use MPI.
  *
  * A ray through pixel (x, y) is p(z) = eye + offset + z (forward + slope), where z is the depth along the camera's
- * axis: perspective cameras have the slope, orthographic ones the offset. The ray's parameter everywhere is
- * t = (z - depth_origin) * scale, so that float32 t has its resolution where the cells are. Samples of a volume
- * stand at distances (k + jitter) * step from the eye (perspective) or the eye's plane (orthographic), k = 0, 1, ...
+ * axis: perspective cameras have the slope, orthographic ones the offset. The ray's parameter everywhere is t = (z -
+ * depth_origin) * scale, so that float32 t has its resolution where the cells are. Samples of a volume lie at distances
+ * (k + jitter) * step from the eye (perspective) or the eye's plane (orthographic), k = 0, 1, ...
  *
- * What a frame makes is a function of the cells and the job alone: not of the rank that holds a cell, of the order of
- * the cells, of the trees, nor of the number of threads.
+ * The result of a frame is a function of the cells and the job alone. It does not depend on the rank that holds a cell,
+ * the order of the cells, the trees, or the number of threads.
  *
- * Where cells overlap, each contributes its own sample: samples at one place, of several cells as of several volumes,
- * share what all of them absorb in proportion to what each would. One rank cannot know which cells of others overlap
- * its own. So a frame keeps one cell's sample and marks the ray, by a further one as a fragment of its own at the same
- * depth; compositing finds the pixels in which fragments overlap (comp.h), whoever made them; and these are traced
- * again with separate_samples, which leaves the sharing to compositing. What a frame makes of such pixels otherwise is
- * not the picture. Volumes by segments are made the same way: of overlaps each cell's segments become fragments of
- * their own, and so do the segments of several volumes, on all pixels.
+ * If cells overlap, each contributes its own sample. Samples at one position, of several cells or of several volumes,
+ * share what all of them absorb in proportion to what each would absorb alone. A rank cannot know which cells of other
+ * ranks overlap its own. So a frame keeps one cell's sample and marks the ray by a second sample, as a fragment of its
+ * own at the same depth. Compositing finds the pixels in which fragments of any ranks overlap (comp.h), and these are
+ * traced again with separate_samples, which leaves the sharing to compositing. Until then the result in such pixels is
+ * undefined. Volumes by segments work the same way: if cells overlap, each cell's segments become separate fragments;
+ * segments of several volumes do so on all pixels.
  *
- * Faces that are one in truth but not to the bit, as at hanging nodes, leave overlaps and gaps of rounding's size.
- * Segments that overlap by no more are not told compositing: each has its own length, which on any ranks adds up to the
- * same. A sample in such an overlap marks its ray; separate samples say that they are near their cell's begin or end,
- * so that compositing can tell the two owners from cells that overlap. */
+ * Faces that coincide but do not have the same bits, as at hanging nodes, leave overlaps and gaps of the size of
+ * rounding. Segments that overlap by no more are not reported to compositing: each has its own length, and the sum of
+ * lengths is the same on any partition. A sample in such an overlap marks its ray. Separate samples are flagged if they
+ * are near their cell's begin or end, so that compositing can distinguish two such owners from cells that overlap. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 
@@ -35,24 +35,24 @@ typedef struct render_camera {
     double half_height;                 /* perspective: tangent of half the vertical angle; else half the height */
     bool is_orthographic;
     int width, height;
-    double offset[2]; /* how far every ray is off its pixel's centre, in pixels, to the right and down; 0 by default */
+    double offset[2]; /* offset of every ray from its pixel's centre, in pixels, to the right and down; 0 by default */
 } render_camera;
 
-/* The offset of sample k of count (1, 2, 4, 8 or 16) in a pixel. Along either axis the samples are evenly spaced, and
- * their mean is the pixel's centre. */
+/* Computes the offset of sample k of count (1, 2, 4, 8 or 16) in a pixel. Along either axis the samples are evenly
+ * spaced, and their mean is the pixel's centre. */
 void render_camera_sample(int count, int k, double offset[2]);
 
-/* Camera at eye that looks at focal. vertical_degrees is the whole vertical angle, in (0, 180). False where eye equals
- * focal, or up is parallel to the view. */
+/* Sets a camera at eye that looks at focal. vertical_degrees: the whole vertical angle, in (0, 180). Returns false if
+ * eye equals focal, or up is parallel to the view. */
 bool render_camera_look_at(render_camera *camera, const double eye[3], const double focal[3], const double up[3],
                            double vertical_degrees, int width, int height);
 
-/* The ray through pixel (x, y), at its centre but for the offset: p(z) = base + z * direction, z >= 0. direction has
- * length 1 along forward, not 1 overall. */
+/* Computes the ray through pixel (x, y), at its centre plus the offset: p(z) = base + z * direction, z >= 0. direction
+ * has length 1 along forward, not length 1. */
 void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3]);
 
 /* The space of float32 numbers. Positions are taken relative to origin and multiplied by scale, a power of two that
- * brings the scene to a size near 1. The trees have the same origin and scale. */
+ * scales the scene to a size near 1. The trees have the same origin and scale. */
 typedef struct render_space {
     double origin[3];
     double scale;
@@ -62,27 +62,28 @@ typedef struct render_space {
 /* The spacing of values along a colour table: linear; by the logarithm, for which low > 0; or by render_scaled(). */
 typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_scale;
 
-/* The scale's function s, which never falls, and its inverse. RENDER_LOG: ln value, -infinity where value <= 0.
- * RENDER_SYMLOG: value / threshold up to the threshold > 0, on both sides of 0; 1 + ln(value / threshold) beyond, and
- * the same mirrored, so that neither s nor its slope jumps. */
+/* The scale's function s, which is monotone, and its inverse. RENDER_LOG: ln value, -infinity if value <= 0.
+ * RENDER_SYMLOG: value / threshold for |value| <= threshold (> 0); 1 + ln(value / threshold) above, and the negative
+ * mirror image below, so that s and its slope are continuous. */
 double render_scaled(render_scale scale, double threshold, double value);
 double render_unscaled(render_scale scale, double threshold, double scaled);
 
-/* Colour and opacity of a value. A value's place is (s(value) - s(low)) / (s(high) - s(low)), s being the scale.
- * Colours are a table of linear RGB, evenly spaced over the places from 0 to 1, interpolated linearly by place (in
- * volumes with a scale, by value between entries), clamped outside. Opacity is piecewise linear by place through points
- * of rising value (two of the same value make a step), constant outside; with a scale they are between low and high.
- * Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
+/* Colour and opacity of a value. A value's position is (s(value) - s(low)) / (s(high) - s(low)), s being the scale.
+ * Colours are a table of linear RGB, evenly spaced over the positions from 0 to 1, interpolated linearly by position
+ * (in volumes with a scale, by value between entries), clamped outside. Opacity is piecewise linear by position through
+ * points of rising value (two of the same value make a step), constant outside; with a scale the points lie between low
+ * and high. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
     int colour_count;     /* >= 2 */
     const float *colours; /* colour_count × 3 */
     render_scale scale;
     double threshold; /* for RENDER_SYMLOG, > 0 */
-    bool is_banded;   /* surfaces only: the colours are those of bands of equal width, not interpolated; 1 will do */
-    const float
-        *outside;      /* surfaces only: 3 × 3, the colours below low, above high, and of what is not a number; NULL:
-                          those of low and high, and RENDER_NO_COLOUR. Values within RENDER_END of an end belong to it */
+    /* surfaces only: colours are those of bands of equal width, not interpolated; colour_count may be 1 */
+    bool is_banded;
+    /* surfaces only: 3 × 3, the colours below low, above high, and of NaN; values within RENDER_END of an end belong to
+     * the range. NULL: the colours of low and high, and RENDER_NO_COLOUR */
+    const float *outside;
     int opacity_count; /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
     const double *opacity_values;
     const float *opacities;
@@ -100,8 +101,8 @@ typedef struct render_light {
     float colour[3];     /* linear, intensity included */
 } render_light;
 
-/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, n towards the eye,
- * the sums over the lights with n.l > 0. */
+/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, with n towards the
+ * eye and the sums over the lights with n.l > 0. */
 typedef struct render_material {
     float ambient, diffuse, specular, shininess;
 } render_material;
@@ -127,42 +128,43 @@ typedef enum render_normal {
 
 enum { RENDER_DIFFERENCE_SAMPLES = 6 };
 
-/* A hit of RENDER_DIFFERENCES that waits for samples of other ranks (render_differences.h). 16 bytes. */
+/* A hit of RENDER_DIFFERENCES that needs samples of other ranks (render_differences.h). 16 bytes. */
 typedef struct render_waiting_hit {
-    uint32_t pixel, kind; /* as its fragment will have them */
-    float t, reach;       /* reach: how far its samples lie before and behind it along each axis; scaled units */
+    uint32_t pixel, kind; /* those of its future fragment */
+    float t, reach;       /* reach: distance of its samples along each axis, before and behind it; scaled units */
 } render_waiting_hit;
 
-/* The look of such a hit: the cell's gradient in camera axes, and the colour before light falls on it. */
+/* The look of such a hit: the cell's gradient in camera axes, and the unlit colour. */
 typedef struct render_waiting_look {
     float normal[3], colour[3];
 } render_waiting_look;
 
-/* Growing lists of as many of both, memory from memory.h. */
+/* Growing lists of hits and looks, of equal count; memory from memory.h. */
 typedef struct render_waiting_list {
     render_waiting_hit *items;
     render_waiting_look *looks;
     int64_t count, capacity;
 } render_waiting_list;
 
-/* The samples about a hit: before and behind it along the first axis, the second, the third. 32 bytes. */
+/* The samples around a hit: before and behind it along the first axis, the second, the third. 32 bytes. */
 typedef struct render_samples_about {
-    uint32_t found, unused; /* a bit a sample: a cell holds its point */
+    uint32_t found, unused; /* found: a bit per sample, set if a cell contains its point */
     float values[RENDER_DIFFERENCE_SAMPLES];
 } render_samples_about;
 
-/* The transmittance of fragments that keep the places of hits that wait while a frame is traced. */
+/* Transmittance that marks placeholder fragments of such hits while a frame is traced. */
 #define RENDER_WAITS 2.0f
 
-/* The ends of each surface's field over all ranks, low > high where no rank has it; and where hits go to wait. */
+/* Range of each surface's field over all ranks, low > high if no rank has it; and the list of hits that need
+ * samples. */
 typedef struct render_waiting {
     double ranges[RENDER_MAX_ISOVALUES][2];
     render_waiting_list list;
 } render_waiting;
 
-/* Gradients at a part's vertices, of any length. Every vertex of the cells that the layer's isovalues cross has one. */
+/* Gradients at a part's vertices, of any length. Each vertex of the cells that the layer's isovalues cross has one. */
 typedef struct render_vertex_gradients {
-    const int32_t *entries; /* for each vertex: which of the gradients; -1: none. NULL: the part has no such cells */
+    const int32_t *entries;      /* by vertex: index into gradients; -1: none. NULL: the part has no such cells */
     const float (*gradients)[3]; /* world axes */
 } render_vertex_gradients;
 
@@ -182,10 +184,11 @@ typedef struct render_lines {
 typedef struct render_surface_layer {
     render_field field; /* vertex-centred */
     int value_count;
-    const double *values;      /* isovalues */
-    const float *colours;      /* value_count × 3, linear; where colour_map is NULL */
-    render_field colour_field; /* where colour_map is given: vertex- or cell-centred, with values on every part that has
-                                  the surface; ranges not looked at */
+    const double *values; /* isovalues */
+    const float *colours; /* value_count × 3, linear; used if colour_map is NULL */
+    /* used if colour_map is set: vertex- or cell-centred, with values on every part that has the surface; its ranges
+     * are not read */
+    render_field colour_field;
     const render_transfer *colour_map;
     float opacity; /* 0 .. 1; 1 ends the ray */
     render_material material;
@@ -196,11 +199,13 @@ typedef struct render_surface_layer {
     float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
                          of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
-    bool is_of_faces; /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that
-                         meets the face in an edge alone, and so is in the cell for no length, hits it too */
-    uint32_t clips;   /* which of the job's clips cut it, a bit each */
-    float contact; /* for rays from hits (render_light.h): what is nearer to the hit than so many sizes of the cell that
-                      it is met in hides nothing; 0: all of it does */
+    /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that meets the face
+     * only in an edge, and so is in the cell for no length, hits it too */
+    bool is_of_faces;
+    uint32_t clips; /* the job's clips that cut it, one bit each */
+    /* for rays from hits (render_light.h): a cell that is met nearer to the hit than this many sizes of the cell does
+     * not block; 0: every cell blocks */
+    float contact;
 } render_surface_layer;
 
 typedef struct render_volume_layer {
@@ -208,41 +213,43 @@ typedef struct render_volume_layer {
     const render_transfer *transfer;
 } render_volume_layer;
 
-/* The share of a colour table's length that rounding may move a value at an end of the range by. */
+/* Rounding may move a value at an end of the range by this share of the colour table's length. */
 #define RENDER_END 4e-6f
 
-/* Linear grey of surfaces where their colour field is not a number: what a scene's colour of 0.6 is in float. */
+/* Linear grey of surfaces where their colour field is NaN: a scene's colour of 0.6 in float. */
 #define RENDER_NO_COLOUR 0.318546802f
 
 /* A mesh of this rank. */
 typedef struct render_part {
     const grid *cells;
-    const mmbvh *tree; /* over cells; its origin and scale are the space's */
-    /* Loops of vertices, for layers with edges. loops[cell] is 0 where every edge between the cell's vertices in the
-     * surface is drawn; else it is one triangle of a polygon, whose corner count is at loops[loops[cell]] and whose
-     * corners follow. NULL: there are no polygons. */
+    const mmbvh *tree; /* over cells; it has the space's origin and scale */
+    /* Loops of vertices, for layers with edges. If loops[cell] is 0, every edge between the cell's vertices in the
+     * surface is drawn; else the cell is one triangle of a polygon, whose corner count is at loops[loops[cell]] and
+     * whose corners follow. NULL: there are no polygons. */
     const int64_t *loops;
 } render_part;
 
-/* The way that tiles of 16 x 16 rays find the cells that they show. The picture is the same to the last bit; the speed
- * differs. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most. */
+/* How tiles of 16 x 16 rays find their visible cells. The picture is the same to the last bit; only the speed differs.
+ * Pictures by segments may differ by the order of segments that begin at the same t, by 5e-7 at most. */
 typedef enum render_traversal {
-    RENDER_BINNED, /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
-                      tile, unless more show than pay; several volumes as by RENDER_TILES */
-    RENDER_TILES   /* a tile of the picture goes down the trees at once */
+    /* isosurfaces and a single volume: one traversal for the whole picture, and cells are binned by tile, unless too
+     * many are visible; several volumes as by RENDER_TILES */
+    RENDER_BINNED,
+    RENDER_TILES /* one traversal per tile */
 } render_traversal;
 
-/* The method that integrates volumes: samples (thesis, 4.4), whose error goes with the step, or segments, which are
- * exact where the field is linear along the ray (tets) and of second order in the pieces of cells elsewhere. Segments
- * of several volumes are made with separate_samples alone: without it several volumes are sampled. */
+/* The method that integrates volumes: samples (thesis, 4.4), whose error depends on the step, or segments, which are
+ * exact if the field is linear along the ray (tets) and of second order in the pieces of other cells. Segments of
+ * several volumes need separate_samples: without it several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 
-/* Error allowed to mixed segments where no max_error is given. */
+/* Error allowed to mixed segments if the job gives no max_error. */
 #define RENDER_MIXING_ERROR 1e-4
 
 typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_SPHERE } render_clip_kind;
 
-/* A half space, box or sphere that cuts layers: what is drawn of them lies within it, or where is_outside without. */
+/* A half space, box or sphere that clips layers: only what lies inside it is drawn, or outside it if is_outside is
+ * set. */
 typedef struct render_clip {
     render_clip_kind kind;
     bool is_outside;
@@ -251,8 +258,8 @@ typedef struct render_clip {
     double centre[3], radius;   /* sphere */
 } render_clip;
 
-/* The paint of hits: their colours, lit or not; or numbers of the pixel's nearest surface as red, green and blue. With
- * numbers, surfaces must be opaque and there must be no volumes. */
+/* What hits are painted with: their colours, lit or not; or numbers of the pixel's nearest surface as red, green and
+ * blue. With numbers, surfaces must be opaque and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
     RENDER_UNLIT,   /* of surfaces that take light, colours before it falls on them; in the place of t_out and
@@ -265,9 +272,9 @@ typedef enum render_paint {
 
 /* The shadows and ambient occlusion of hits painted RENDER_UNLIT: render_light.h. */
 typedef struct render_occlusion {
-    uint32_t lights; /* those that cast shadows, a bit each */
-    int samples;     /* for ambient occlusion: rays of a hit, 0 .. 64; 0: none */
-    double radius;   /* for ambient occlusion: what is farther away does not count; scene units, > 0 */
+    uint32_t lights; /* lights that cast shadows, one bit each */
+    int samples;     /* for ambient occlusion: number of rays per hit, 0 .. 64; 0: none */
+    double radius;   /* for ambient occlusion: distance beyond which surfaces do not block; scene units, > 0 */
 } render_occlusion;
 
 typedef struct render_job {
@@ -275,73 +282,79 @@ typedef struct render_job {
     render_space space;
     const render_part *parts;
     int part_count;
-    const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
+    const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: all parts are traversed */
     const render_surface_layer *surfaces;
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_paint paint;
     const render_occlusion *occlusion; /* for RENDER_UNLIT */
-    render_waiting *waiting; /* NULL: RENDER_DIFFERENCES are found at once; else its hits are added to the list and make
-                                no fragments, but those of polyhedra. Not with RENDER_VALUES */
+    /* NULL: RENDER_DIFFERENCES are computed at once; else its hits are added to the list instead of becoming fragments,
+     * except those of polyhedra. Not with RENDER_VALUES */
+    render_waiting *waiting;
     render_traversal traversal;
     const render_volume_layer *volumes;
     int volume_count;
     int clip_count;           /* at most RENDER_MAX_CLIPS */
-    const render_clip *clips; /* layers have sets of them: bit i for clips[i] */
-    uint32_t volume_clips;    /* those of all volumes */
+    const render_clip *clips; /* layers have sets of them, with bit i for clips[i] */
+    uint32_t volume_clips;    /* clips of all volumes */
     const render_light *lights;
     int light_count;
     double step; /* distance between samples, scene units, > 0; volumes only */
     render_integration integration;
-    double max_error; /* for segments: > 0: cells other than tets are cut into parts such that no channel of a pixel is
-                         off by more, in linear light; 0: into parts no longer than step */
-    double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
-                         ranks, so that all cut alike. 0: of this rank's */
-    int sample_group; /* samples of a ray looked up together, 1 .. RENDER_MAX_GROUP: N of the thesis's sample position
-                         packets (4.4.1) */
-    bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
-    int frame;        /* 0 .. : which of the accumulated frames this is */
-    bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */
-    /* The pixels to trace (pixel_set.h); NULL: all. */
+    /* for segments: > 0: cells other than tets are cut so that no channel of a pixel errs by more, in linear light; 0:
+     * into parts no longer than step */
+    double max_error;
+    /* with max_error: upper bound of the length of rays in the cells of all ranks, in scene units; the same on all
+     * ranks, so that all cut alike. 0: the bound for this rank's cells */
+    double extent;
+    /* samples of a ray that are looked up together, 1 .. RENDER_MAX_GROUP: N of the thesis's sample position packets
+     * (4.4.1) */
+    int sample_group;
+    bool jitter;   /* the offset of a ray's first sample is a hash of pixel and frame; else 1/2 */
+    int frame;     /* 0 .. : number of the accumulated frame */
+    bool is_alone; /* no other rank holds cells: all samples of a ray may go into one fragment */
+    /* Pixels to trace (pixel_set.h); NULL: all. */
     const unsigned char *pixels;
-    bool separate_samples; /* every cell's every sample of every volume becomes a fragment, of no length; every segment
-                              one of its length, in parts that compositing may mix */
-    bool reproducible;     /* fragments of a volume, of which there is one, are what the fold of this rank's samples or
-                              segments leaves (fragment_fold.h); not with separate_samples */
-    int threads;           /* >= 1; 0: as many as OpenMP would take */
+    /* every sample of every cell and volume becomes a fragment of length 0, every segment one or several fragments that
+     * compositing can mix */
+    bool separate_samples;
+    /* the fragments of a volume, of which there is one, are the fold of this rank's samples or segments
+     * (fragment_fold.h); not with separate_samples */
+    bool reproducible;
+    int threads; /* >= 1; 0: OpenMP's default */
 } render_job;
 
 typedef struct render_statistics {
-    int64_t rays; /* traced: one a pixel */
+    int64_t rays; /* number of rays traced: one per pixel */
     int64_t map_failures;
-    int64_t volume_cells; /* that tiles placed for volumes: a cell once for each tile and window of depth it is in */
+    int64_t volume_cells; /* cells that tiles transformed for volumes, counted once per tile and window of depth */
     double surface_ms, volume_ms;
 } render_statistics;
 
-/* The offset in [0, 1) of a pixel's samples in a frame. */
+/* Returns the offset in [0, 1) of a pixel's samples in a frame. */
 double render_jitter(uint32_t pixel, uint32_t frame);
 
-/* The values that show: a cell whose range, rounded to float, meets none of the intervals shows nothing. Of a transfer
- * function the stretches that are not transparent; returns how many, at most RENDER_MAX_INTERVALS. */
+/* Intervals of visible values: a cell whose range, rounded to float, meets none of them is invisible. For a transfer
+ * function they are the ranges that are not transparent; returns their number, at most RENDER_MAX_INTERVALS. */
 mmbvh_interval render_isovalue_interval(double value);
 int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
-/* Trace every pixel of the camera against this rank's parts and append what is seen to out (memory from memory.h;
+/* Traces every pixel of the camera against this rank's parts and appends the fragments to out (memory from memory.h;
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
-/* Draws as render_frame() does, but gives the fragments away a tile at a time. Every pixel of the camera lies in one of
- * the tiles, and tiles without fragments are given too. As many threads call take as the job has. */
+/* Draws as render_frame() does, but passes the fragments to take() tile by tile. Every pixel of the camera lies in one
+ * of the tiles; tiles without fragments are passed too. take() is called by as many threads as the job has. */
 insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
                                  render_statistics *statistics, base_error *error);
 
-/* The instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may force a lower
- * one than the machine's best; a name that is unknown or not to be had is ignored, with render_isa_warning() telling.
- */
+/* Returns the instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may select a
+ * lower one than the machine's best; a name that is unknown or not available is ignored, and render_isa_warning()
+ * returns a message. */
 const char *render_isa(void);
 const char *render_isa_warning(void);
 
-/* Around the cells of a rank that may matter to other ranks' hits: ranks know each other's, and so whom to ask. Scene
- * units; empty where lower > upper. */
+/* A box around a rank's cells that may matter to hits of other ranks. Ranks exchange these boxes to find the ranks that
+ * a hit needs. Scene units; empty if lower > upper. */
 typedef struct render_box {
     double lower[3], upper[3];
 } render_box;

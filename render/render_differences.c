@@ -1,4 +1,4 @@
-/* Threads take hits a chunk at a time, so that cells fetched for one hit are at hand for its neighbours. */
+/* Threads process hits chunk by chunk, so that cells fetched for one hit are cached for its neighbours. */
 #include "render_differences.h"
 
 #include <math.h>
@@ -40,17 +40,19 @@ render_box render_differences_box(const render_job *job)
     return hit_box(job, is_by_differences);
 }
 
-/* Scaled units, of which a scene is about one: points and float32 boxes are off by less. */
+/* Margin in scaled units, in which the size of a scene is about 1: points and float32 boxes have smaller errors. */
 static const double box_margin = 1e-5;
 
-/* Does one bar of the cross meet the box? The points are the ends of a cross that is two reaches wide about the hit. */
+/* Tests whether one bar of the cross meets the box. The points are the ends of a cross around the hit, two reaches
+ * wide. */
 bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
     const double reach = (double)hit->reach / job->space.scale, margin = box_margin / job->space.scale;
     double base[3], direction[3];
-    int beside = 0, beyond = 0; /* axes along which the hit is not in the box, the arms are not */
+    /* number of axes along which the hit is outside the box, and along which even the arms are */
+    int beside = 0, beyond = 0;
     render_camera_ray(&job->camera, (int)(hit->pixel % width), (int)(hit->pixel / width), base, direction);
     for (int a = 0; a < 3; a++) {
         const double at = base[a] + z * direction[a];
@@ -64,7 +66,7 @@ bool render_differences_meet(const render_job *job, const render_waiting_hit *hi
 /* ---- order ----------------------------------------------------------------------------------------------------- */
 
 typedef struct place_of_hit {
-    uint64_t tile; /* and block in it */
+    uint64_t tile; /* tile, and block in the tile */
     uint32_t kind, within;
     int64_t index;
 } place_of_hit;
@@ -118,14 +120,14 @@ bool render_differences_sort(const render_job *job, render_waiting_list *list)
 
 /* ---- samples and light ----------------------------------------------------------------------------------------- */
 
-/* The work of all threads: to sample about hits, or to light them, a chunk at a time. */
+/* The work of all threads: sampling around hits, or lighting them, chunk by chunk. */
 typedef struct chunk_work {
     kernel_frame frame;
     const kernel_table *kernels;
     int threads;
     const render_waiting_hit *hits;
     render_samples_about *samples;
-    const render_waiting_list *list; /* to light; NULL: to sample */
+    const render_waiting_list *list; /* hits to light; NULL: samples are taken */
     const render_samples_about *merged;
     fragment *out;
 } chunk_work;
@@ -191,7 +193,7 @@ insitu_status render_differences_light(const render_job *job, const render_waiti
                                        const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
                                        base_error *error)
 {
-    /* Hits, samples and fragments have the same numbers, from first on. */
+    /* Hits, samples and fragments then have the same indices, from 0 on. */
     const render_waiting_list some = {list->items + first, list->looks + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;

@@ -1,5 +1,6 @@
-/* A run is what touches, sample by sample or segment by segment, without a surface in between: of what its halves of
- * stretches hold no other rank has anything. A rank alone has all there is between surfaces. */
+/* A run is a sequence of samples or segments that touch each other, without a surface in between. Between the begin and
+ * the end of a run no other rank has fragments, so that halved intervals of t within it can be folded
+ * (fragment_fold.h). If only this rank has cells (job->is_alone), everything between two surfaces can be folded. */
 #include "render_fold.h"
 
 #include <math.h>
@@ -31,7 +32,7 @@ static bool make_room(render_folding *folding, int64_t count)
     return folding->starts && folding->items;
 }
 
-/* The tile's, pixel by pixel and else in the order in which they came: those of the k-th from starts[k] on. */
+/* Sorts the tile's fragments by pixel, stably; those of pixel k begin at items[starts[k]]. */
 static void collect(render_folding *folding, const pixel_area *area, const fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;
@@ -43,7 +44,8 @@ static void collect(render_folding *folding, const pixel_area *area, const fragm
     starts[pixels] = count;
 }
 
-/* They come nearly sorted. What begins a run must not change places with it, so its sign is no part of the order. */
+/* Sorts fragments, which come nearly sorted. The mark of a run's first fragment must not affect the order, so kinds are
+ * not compared. */
 static void sort(fragment *items, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
@@ -61,19 +63,21 @@ static void sort(fragment *items, int64_t count)
     }
 }
 
-/* So far from a segment's end another rank's may begin, or end, that touches it. */
+/* Returns the error bound in t of a segment's end: another rank's segment that ends or begins within it may touch this
+ * one. */
 static float error_at(float t)
 {
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
 }
 
-/* Ends each fragment of a run by its error earlier, so that compositing finds its overlaps (kernel_segments.h). */
+/* Ends each fragment of a run earlier by its error bound, so that compositing does not take touching fragments for
+ * overlapping ones (kernel_segments.h). */
 static void shorten(const render_folding *folding, fragment *items, int64_t count)
 {
     for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
 }
 
-/* Folds one run, stretch by stretch; returns the end of what it wrote. */
+/* Folds one run, interval by interval (fragment_stretch()); returns the end of its output. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;

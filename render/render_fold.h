@@ -7,18 +7,18 @@
 #include "fragment.h"
 #include "render.h"
 
-/* A thread's; all else is its own. */
+/* State of one thread. It owns the buffers; the job is borrowed. */
 typedef struct render_folding {
     const render_job *job;
-    bool has_segments; /* else samples */
+    bool has_segments; /* segments, else samples */
     fragment *items;
     int64_t capacity, *starts;
 } render_folding;
 
-/* Folds a tile's fragments, those of the list from the first on, each of which is one sample or segment. A pixel's
- * volume fragments of one half of a stretch become one where this rank has all of them (fragment_fold.h).
- * FRAGMENT_EARLY says that a surface or another rank's fragment may come before; FRAGMENT_LATE marks where cells
- * overlap. Returns false if memory ran out. */
+/* Folds a tile's fragments, those of the list from `first` on, each of which is one sample or segment. The volume
+ * fragments of a pixel in a halved interval become one fragment if this rank has all of them (fragment_fold.h).
+ * FRAGMENT_EARLY marks a fragment before which a surface or another rank's fragment may come; FRAGMENT_LATE marks
+ * overlapping cells. Returns false if memory ran out. */
 bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list, int64_t first);
 
 void render_folding_free(render_folding *folding);

@@ -52,7 +52,7 @@ bool fragment_reserve(fragment_list *list, int64_t more)
     const int64_t grown = list->capacity + list->capacity / 2 + 1024;
     const int64_t capacity = grown > needed ? grown : needed;
     if (w->piece < 0) return grow(list, capacity);
-    /* Out of the piece, which stays empty. */
+    /* Moves the fragments out of the piece, which becomes empty. */
     fragment_list own = {0};
     if (!grow(&own, capacity)) return false;
     memcpy(own.items, list->items, (size_t)list->count * sizeof *own.items);
@@ -62,7 +62,7 @@ bool fragment_reserve(fragment_list *list, int64_t more)
     return true;
 }
 
-/* Move what stands behind the end into the gaps before it. */
+/* Moves the fragments behind the end into the gaps before it. */
 static void close_gaps(const fragment_pieces *pieces, int64_t count)
 {
     fragment *items = pieces->out->items + pieces->first;

@@ -1,5 +1,5 @@
-/* A frame is drawn by tiles that are dealt to threads. Tiles are small (16 × 16 pixels) and handed out a few at a time,
- * because a picture's middle costs far more than its border. */
+/* A frame is drawn by tiles that are distributed among threads. Tiles are small (16 × 16 pixels) and assigned a few at
+ * a time, because a picture's middle costs far more than its border. */
 #include <math.h>
 #include <omp.h>
 #include <string.h>
@@ -28,13 +28,13 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Most tiles make no more fragments than this; those that do leave their piece. */
+/* Most tiles have at most this number of fragments; a thread whose tile has more copies its list out of its piece. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
-/* The destination of fragments: each writer's piece of a list, or a taker that gets them tile by tile. */
+/* The destination of fragments: each writer's piece of a list, or a callback that receives them tile by tile. */
 typedef struct frame_end {
-    fragment_writer *writers; /* a thread each */
-    fragment_taker *take;     /* NULL: nobody */
+    fragment_writer *writers; /* one per thread */
+    fragment_taker *take;     /* NULL: fragments go to the writers' lists */
     void *state;
 } frame_end;
 
@@ -72,7 +72,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     render_folding_free(&fold);
 }
 
-/* ---- hits that wait ------------------------------------------------------------------------------------------ */
+/* ---- hits that need samples of other ranks ------------------------------------------------------------------- */
 
 static bool grow_list(render_waiting_list *list, int64_t capacity)
 {
@@ -101,7 +101,7 @@ static bool append_waiting(render_waiting_list *to, const render_waiting_list *f
     return true;
 }
 
-/* Takes away what kept the places of hits that wait. */
+/* Removes the placeholder fragments of hits that need samples of other ranks. */
 static void drop_places(fragment_list *list, int64_t first)
 {
     fragment *to = list->items + first;
@@ -113,7 +113,7 @@ static void drop_places(fragment_list *list, int64_t first)
 
 /* ---- threads ------------------------------------------------------------------------------------------------- */
 
-/* The threads' states, all of them, should OpenMP give fewer threads than asked for. */
+/* Initializes the states of all threads, also of those that OpenMP may not start. */
 static void begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
 {
     bool has_polyhedra = false;
@@ -187,7 +187,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     return has_memory;
 }
 
-/* Expects a fragment at every other pixel where most pixels are traced: memory that is never written costs nothing. */
+/* Expects a fragment at every other pixel if most pixels are traced: memory that is never written costs nothing. */
 static int64_t expected_fragments(const render_job *job)
 {
     return job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
@@ -214,7 +214,7 @@ static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int thread
     return is_traced;
 }
 
-/* out: NULL where there is a taker. */
+/* Draws a frame. out: NULL if fragments are passed to take(). */
 static insitu_status draw(const render_job *job, fragment_list *out, fragment_taker *take, void *state,
                           render_statistics *statistics, base_error *error)
 {

@@ -1,6 +1,6 @@
-/* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
- * its surfaces first, so that volumes know where opaque ones end them. It is traced by the cells that are binned there,
- * or in one traversal. */
+/* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile traces
+ * its surfaces first, as opaque ones end the rays of volumes. It traces the cells that are binned there, or traverses
+ * the trees once. */
 #include <stddef.h>
 
 #include "grid.h"
@@ -33,9 +33,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* ---- a tile's cells on their way from where they are found to its rays ---- */
+/* ---- a tile's cells, between search and tracing ---- */
 
-/* Makes a placed cell with its values ready for blocks to meet it. */
+/* Sorts a transformed cell's vertices and computes its edge functions and colours, ready for tracing. */
 SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
 {
     t->cell->part = part;
@@ -81,8 +81,9 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
- * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
+/* Returns whether the cell, of the batch's layer and part, is traced in a batch of hexes, wedges or pyramids. In a mesh
+ * of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because their hits
+ * then hide other cells sooner. */
 SIMD_INLINE bool kernel_is_for_curved_batch(const kernel_tile_trace *t, const kernel_batch *b,
                                             const kernel_tile_candidate *candidate, int type)
 {
@@ -91,8 +92,7 @@ SIMD_INLINE bool kernel_is_for_curved_batch(const kernel_tile_trace *t, const ke
            kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
 }
 
-/* What a tile's cells go through from where they are found: batches of several, or, those that are for no batch, one by
- * one. */
+/* Queue of a tile's cells before tracing: batches of cells, and cells that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
 typedef struct kernel_tile_queue {
@@ -109,7 +109,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
     m->alone_count = 0;
 }
 
-/* Is it put into any batch? */
+/* Returns whether the cell is traced in any batch. */
 SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
                                      const kernel_tile_candidate *candidate)
 {
@@ -117,7 +117,8 @@ SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_ba
     return kernel_is_linear(type) ? b->takes_batches : kernel_is_for_curved_batch(t, b, candidate, type);
 }
 
-/* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
+/* Traces the cells that fit no batch. Traces the batches first, because their cells were found earlier and may hide
+ * these. */
 static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
@@ -133,7 +134,7 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
     m->alone_count = 0;
 }
 
-/* Takes a cell of the layer under way and the part. */
+/* Queues a cell of the current layer and the part. */
 SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
@@ -150,7 +151,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
     }
 }
 
-/* Traces all that waits. */
+/* Traces all queued cells. */
 static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     kernel_tile_queue_alone(t, m);
@@ -158,10 +159,9 @@ static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
     kernel_curved_batch_end(t, &m->curved_batch);
 }
 
-/* What a thread keeps from tile to tile: with what it finds cells down the trees, and the queue of those, or of binned
- * ones. */
+/* Per-thread state kept from tile to tile: the tree search, and the queue of cells to trace. */
 typedef struct kernel_tile_search {
-    kernel_tile_finder nodes; /* the first member, as a tile has the address of it alone */
+    kernel_tile_finder nodes; /* must be the first member, as the tile points to it */
     kernel_candidate_list list;
     kernel_tile_trace *tile;
     kernel_tile_queue queue;
@@ -176,13 +176,13 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
     kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
 }
 
-/* Cells whose vertices' indices are being prefetched. */
+/* Cells whose vertex indices are being prefetched. */
 typedef struct kernel_pending {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_pending;
 
-/* Prefetches the vertices of all pending cells, then traces them. */
+/* Prefetches the vertices of all pending cells, then queues them for tracing. */
 static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
                                                                kernel_pending *w)
 {
@@ -192,7 +192,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
         if (b->layer == t->layer && b->part == part && kernel_is_for_batch(t, b, w->items[n]))
-            continue; /* batches ask for theirs */
+            continue; /* batches prefetch their own cells */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  w->items[n]->cell);
     }
@@ -204,7 +204,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
     w->count = 0;
 }
 
-/* Traces the tile's opaque surfaces, or the transparent ones, which need the opaque ones to be known. */
+/* Traces the tile's opaque surfaces, or its transparent ones, which must be traced after the opaque ones. */
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {
@@ -239,7 +239,7 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 
 /* ---- isosurfaces in the cells that a tile finds itself ---- */
 
-/* Puts the cells found so far on their way to the rays. */
+/* Queues the cells found so far for tracing, unless nearer hits hide them. */
 static bool kernel_tile_find_take(kernel_candidate_list *list)
 {
     kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
@@ -258,7 +258,7 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
     return true;
 }
 
-/* Cells that are found from now on are of this part. */
+/* Switches the search to another part. */
 static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
@@ -319,7 +319,7 @@ static int volume_turns(const kernel_frame *f)
     return f->volume_turns ? f->volume_turns : 1;
 }
 
-/* Tells whether one of the rectangle's pixels is to be traced. */
+/* Returns whether one of the rectangle's pixels must be traced. */
 static bool is_wanted(const render_job *job, int x0, int y0, int columns, int rows)
 {
     const int x1 = x0 + columns, y1 = y0 + rows;
@@ -369,21 +369,21 @@ static void trace_tile_samples(kernel_tile_trace *t)
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
-/* May the tile see any tree's box? */
+/* Returns whether the tile may contain any tree's box. */
 static bool is_covered(const kernel_frame *f, int x0, int y0)
 {
     return x0 <= f->cover[0][1] && x0 + KERNEL_TILE > f->cover[0][0] && y0 <= f->cover[1][1] &&
            y0 + KERNEL_TILE > f->cover[1][0];
 }
 
-/* May the tile have samples or segments of volumes? */
+/* Returns whether the tile may have samples or segments of volumes. */
 static bool has_volume(const kernel_frame *f, const kernel_thread *thread, int x0, int y0)
 {
     if (!f->volume_count || !is_covered(f, x0, y0)) return false;
     return !f->volume_candidates || thread->volume_bin.count;
 }
 
-/* May it have hits? */
+/* Returns whether the tile may have hits. */
 static bool has_surface(const kernel_frame *f, const kernel_thread *thread, int x0, int y0)
 {
     if (!f->surface_count) return false;
@@ -424,7 +424,8 @@ static void find_candidates(const kernel_frame *f, kernel_thread *thread, const 
     kernel_find_candidates(finder, subtree->node);
 }
 
-/* Megabytes, most of which no tile of the frame may touch: only what is read before it is written is set. */
+/* Sets up a thread's memory. It has megabytes, most of which no tile of the frame may use: only members that are read
+ * before they are written are set. */
 static void begin(kernel_thread *thread)
 {
     kernel_memory *m = thread->memory;

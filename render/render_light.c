@@ -1,4 +1,4 @@
-/* Takes the rays of hits into the spaces of the kernels (kernel_occluders.h, kernel_bundle.h), and lights the hits. */
+/* Transforms the rays of hits into the kernels' spaces (kernel_occluders.h, kernel_bundle.h), and lights the hits. */
 #include "render_light.h"
 
 #include <math.h>
@@ -25,7 +25,7 @@ static hit_place place_of(const render_job *job, const render_hit *hit)
     return hit_place_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
-/* Returns the layer that the fragment was hit on. */
+/* Returns the layer to which the fragment's surface belongs. */
 static const render_surface_layer *layer_of(const render_job *job, const fragment *f)
 {
     int value = (int)(f->kind - FRAGMENT_SURFACE), i = 0;
@@ -61,33 +61,33 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
 
-/* A thread takes so many hits at once, and keeps the cells that it has fetched for one of them for the others. */
+/* Number of hits that a thread processes at once; it keeps the cells that it has fetched for one of them for the
+ * others. */
 enum { CHUNK_HITS = 64, CHUNK_RAYS = CHUNK_HITS * (RENDER_MAX_SAMPLES + RENDER_MAX_LIGHTS) };
 
-/* Cells of a light's lattice to a scaled unit. */
+/* Number of tiles of a light's lattice per scaled unit. */
 enum { LIGHT_TILES = 32 };
 
 struct render_occluders {
     const kernel_table *kernels;
-    render_job job; /* as it was given */
+    render_job job; /* as given by the caller */
     render_job surfaces;
-    kernel_frame frame; /* for the surfaces alone */
+    kernel_frame frame; /* of the surfaces only */
     kernel_occluders trees;
     int threads;
 };
 
-/* A ray of a chunk: the hit's number, and the ray's: a sample of the hemisphere, or a light from RENDER_MAX_SAMPLES
- * on. */
+/* Name of a ray in a chunk. hit: number of the hit; number: a sample of the hemisphere, or a light from
+ * RENDER_MAX_SAMPLES on. */
 typedef struct ray_name {
     int16_t hit, number;
 } ray_name;
 
-/* The state of a thread. Its frame is a copy with a job of its own, so that the camera can be moved from space to
- * space. */
+/* State of a thread. Its frame is a copy with its own job, so that the camera can be moved from space to space. */
 typedef struct tracer {
     const render_occluders *of;
     const kernel_table *kernels;
-    const render_job *job; /* as it was given */
+    const render_job *job; /* as given by the caller */
     render_job moved;
     kernel_frame frame;
     kernel_thread thread;
@@ -107,7 +107,7 @@ static bool grow_doubts(kernel_straights *s)
     return true;
 }
 
-/* ---- rays on their own */
+/* ---- single rays */
 
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
@@ -139,7 +139,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
     }
 }
 
-/* ---- rays that a cell is asked of */
+/* ---- rays that must be tested exactly in a cell */
 
 static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
 {
@@ -156,7 +156,7 @@ static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool 
     }
 }
 
-/* Makes the bundle a hit's hemisphere. */
+/* Sets up the bundle with the rays of a hit's hemisphere. */
 static void look_at_hemisphere(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
@@ -183,7 +183,7 @@ static void look_at_hemisphere(tracer *t, const render_hit *hit)
     b->count = o->samples;
 }
 
-/* Makes the bundle a hit's ray to a light. */
+/* Sets up the bundle with a hit's ray to a light. */
 static void look_at_light(tracer *t, const render_hit *hit, int light)
 {
     const hit_axes a = hit_axes_around(t->job->lights[light].direction);
@@ -223,10 +223,10 @@ static void ask_cell(tracer *t, int32_t occluder)
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Marks a doubt whose cell has been traced for all its rays. */
+/* Marks a doubt whose cell has already been traced for all its rays. */
 enum { ASKED = -1 };
 
-/* Traces a hit's rays into the hemisphere in the cells of its doubts, of which there are count. */
+/* Traces a hit's rays into the hemisphere in the cells of its `count` doubts. */
 static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *doubts, int64_t count)
 {
     uint64_t open = 0;
@@ -334,7 +334,7 @@ static tracer *tracer_create(const render_occluders *of)
     return NULL;
 }
 
-/* Returns false where memory ran out. */
+/* Frees the tracer; returns false if memory ran out. */
 static bool tracer_free(tracer *t)
 {
     if (!t) return false;
@@ -408,7 +408,7 @@ insitu_status render_occlude(const render_occluders *of, const render_hit *hits,
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the rays of %lld hits", (long long)count);
 }
 
-/* ---- which ranks to ask -------------------------------------------------------------------------------------- */
+/* ---- ranks whose cells rays may meet ------------------------------------------------------------------------- */
 
 static bool is_opaque(const render_surface_layer *layer)
 {
@@ -420,10 +420,10 @@ render_box render_occluder_box(const render_job *job)
     return hit_box(job, is_opaque);
 }
 
-/* Scaled units. Boxes are grown by it, which is more than rays and float32 boxes are off by. */
+/* Margin of boxes in scaled units: more than the errors of rays and of float32 boxes. */
 static const double box_margin = 1e-5;
 
-/* May a ray meet the box before it is reach long? */
+/* Returns whether a ray of length reach may meet the box. */
 static bool meets_box(const double from[3], const double direction[3], double reach, double margin,
                       const render_box *box)
 {
@@ -432,7 +432,7 @@ static bool meets_box(const double from[3], const double direction[3], double re
         const double low = box->lower[a] - margin - from[a], high = box->upper[a] + margin - from[a];
         if (!(low <= high)) return false;
         if (fabs(direction[a]) < 1e-9) {
-            /* The slope is so small that only a ray far longer than the scene would leave the slab. */
+            /* The slope is so small that only a ray far longer than the scene could leave the slab. */
             if (low > 0 || high < 0) return false;
             continue;
         }
@@ -476,7 +476,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
-/* Does what kernel_shade() does, by the open lights alone and in double. */
+/* Computes kernel_shade()'s sums over the open lights only, in double. */
 static void shade(const render_job *job, const render_material *m, const hit_place *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {

@@ -1,4 +1,4 @@
-/* Shadows and ambient occlusion of hits: which of a hit's rays are open, and what colour that makes it.
+/* Shadows and ambient occlusion of hits: which of a hit's rays are unblocked, and the resulting colour.
  *
  * A frame painted RENDER_UNLIT is traced first. Each of its hits then has one ray towards each light that casts shadows
  * and that it faces, and a set of rays into the hemisphere above it; every rank that holds cells on their way is asked
@@ -7,10 +7,10 @@
  * block nothing; transparent surfaces are lit as opaque ones are; a surface that takes no light (its material is
  * ambient alone) has its colours from the frame, and has no rays.
  *
- * Where rays begin. A hit is off its surface by the rounding of its depth, and of what the depth was found by: by no
- * more than 1e-6 in the space's scaled units (KERNEL_WEIGHT_ERROR twice, and t's own rounding). Rays begin RENDER_LIFT
- * of them above it, along the normal: so the cell that was hit is left, not met again, and what is nearer than that to
- * a surface is not told from it. */
+ * Where rays begin. A hit deviates from its surface by the rounding of its depth and of the numbers from which the
+ * depth was computed: by at most 1e-6 in the space's scaled units (KERNEL_WEIGHT_ERROR twice, and t's own rounding).
+ * Rays begin RENDER_LIFT scaled units above it, along the normal. So a ray leaves the cell that was hit instead of
+ * meeting it again; anything nearer than that to a surface is not distinguished from it. */
 #ifndef RENDER_RENDER_LIGHT_H
 #define RENDER_RENDER_LIGHT_H
 
@@ -21,10 +21,10 @@
 
 enum { RENDER_MAX_SAMPLES = 64 };
 
-/* Scaled units, of which a scene is about one. */
+/* In scaled units; the size of a scene is about 1. */
 #define RENDER_LIFT 4e-6
 
-/* A hit as an unlit fragment has it. */
+/* A hit, from an unlit fragment. */
 typedef struct render_hit {
     uint32_t pixel;
     float t, normal[2];
@@ -36,35 +36,36 @@ typedef struct render_hit_rays {
     uint32_t lights, unused;
 } render_hit_rays;
 
-/* Makes the hit of an unlit fragment of the job, with its rays. Returns false where it is lit without any. */
+/* Computes the hit of an unlit fragment of the job, with its rays. Returns false if it is lit without rays. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
-/* Finds where the hit's rays begin, in scene units, and the unit directions of its samples. */
+/* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its samples. */
 void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
                         double directions[RENDER_MAX_SAMPLES][3]);
 
 /* This rank's occluders: the cells whose opaque surfaces may block rays of the job's hits. */
 typedef struct render_occluders render_occluders;
 
-/* Finds them once for all hits of a frame. The job must stay as it is until they are freed, but for its occlusion and
- * camera. On success *out is NULL where there are none. Local. */
+/* Collects the occluders once for all hits of a frame. The job must not change until they are freed, except for its
+ * occlusion and camera. On success *out is NULL if there are none. Local. */
 insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error);
 void render_occluders_free(render_occluders *occluders);
 
-/* Closes the rays that are blocked by this rank's opaque surfaces; occluders may be NULL. Local; rays are in an
- * undefined state on an error. */
+/* Closes the rays that are blocked by this rank's opaque surfaces; occluders may be NULL. Local; after an error the
+ * rays are in an undefined state. */
 insitu_status render_occlude(const render_occluders *occluders, const render_hit *hits, render_hit_rays *rays,
                              int64_t count, base_error *error);
 
-/* Returns the box around all cells of this rank that may block rays. */
+/* Returns the bounding box of all cells of this rank that may block rays. */
 render_box render_occluder_box(const render_job *job);
 
-/* Calls take(state, box's number, rays) for each of count boxes that rays of the hit may meet, with these rays. */
+/* render_rays_to_boxes() calls take(state, box number, rays) for each of `count` boxes that rays of the hit may meet,
+ * with these rays. */
 typedef void render_box_taker(void *state, int box, const render_hit_rays *rays);
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
                           const render_box *boxes, int count, render_box_taker *take, void *state);
 
-/* Lights an unlit fragment by its open rays, as RENDER_LIGHT would have; leaves fragments of volumes as they are. */
+/* Lights an unlit fragment by its open rays, as RENDER_LIGHT would have done; leaves fragments of volumes unchanged. */
 void render_light_fragment(const render_job *job, const render_hit_rays *open, fragment *f);
 
 #endif

@@ -26,7 +26,7 @@ static float above(double v)
     return (double)f < v ? nextafterf(f, INFINITY) : f;
 }
 
-/* Adds an interval, or makes the last one longer; returns how many there are. */
+/* Adds an interval, or extends the last one; returns the number of intervals. */
 static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
 {
     if (count && intervals[count - 1].high >= below(low)) {
@@ -79,8 +79,8 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double slope = high > low ? 1 / (high - low) : 1;
-    /* Logarithms are counted from a value below low by more than RENDER_END of the table, so that what is less still is
-     * seen to be below. */
+    /* Logarithms are taken relative to a value that is below low by more than RENDER_END of the table, so that smaller
+     * values are still recognized as below the range. */
     const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
     const double begin = t->scale == RENDER_LOG ? log(least) : 0;
     out->scale = (kernel_scale){.kind = t->scale,
@@ -90,7 +90,7 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
                                 .shift = (float)((begin - low) * slope)};
 }
 
-/* Where a point of the opacity is, as kernel_colour_place() has it. */
+/* Returns the position of a point of the opacity, as kernel_colour_place() computes it. */
 static double ramp_place(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
@@ -171,7 +171,8 @@ void render_surface_range(const render_job *job, int surface, double range[2])
     }
 }
 
-/* 1 over the width of the field's range on all parts, of all ranks where differences ask these, to a power of two. */
+/* Returns 1 / the width of the field's range on all parts, rounded to a power of two. If differences use samples of
+ * other ranks, the range is that of all ranks. */
 static double value_scale(const render_job *job, int surface)
 {
     double range[2];
@@ -183,8 +184,8 @@ static double value_scale(const render_job *job, int surface)
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
-/* Finds the clips that every layer has and that leave a ray in one piece, and how many pieces the volumes' other clips
- * may leave. */
+/* Finds the clips that every layer has and that leave a single interval of a ray, and the maximum number of intervals
+ * that the volumes' other clips leave. */
 static void prepare_clips(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -198,7 +199,7 @@ static void prepare_clips(kernel_frame *f)
         f->volume_turns = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
-/* Opaque layers first; kinds number the isovalues in the job's order. */
+/* Opaque layers come first; kinds number the isovalues in the job's order. */
 static void prepare_surfaces(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -277,7 +278,7 @@ static insitu_status check_job(const render_job *job, base_error *error)
     if (job->sample_group < 1 || job->sample_group > KERNEL_MAX_GROUP)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "sample group of %d, expected 1 to %d", job->sample_group,
                          KERNEL_MAX_GROUP);
-    /* The scene is of a size near 1 in scaled units: finer steps would make millions of samples a ray. */
+    /* The scene has a size near 1 in scaled units: smaller steps would make millions of samples per ray. */
     if (!(job->step * job->space.scale > 1e-6))
         return base_fail(error, INSITU_ERROR_ARGUMENT,
                          "step of %g between samples, expected more than a millionth of "
@@ -294,7 +295,8 @@ static insitu_status check_job(const render_job *job, base_error *error)
     return INSITU_OK;
 }
 
-/* The longest way through the cells, in scaled units: the diagonal of all trees' boxes. */
+/* Returns an upper bound of a ray's length in the cells, in scaled units: the diagonal of the bounding box of all
+ * trees. */
 static double scene_reach(const render_job *job)
 {
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, square = 0;
@@ -312,11 +314,11 @@ static double scene_reach(const render_job *job)
     return sqrt(square);
 }
 
-/* Below it max_error asks for more than float32 ends promise: of random tets with functions that step and rise to an
- * opacity of 1 they were off by 3.4e-5 at most. */
+/* Below this max_error the ends of tets in float32 are not accurate enough: the largest error measured, over random
+ * tets and functions with steps and opacities up to 1, was 3.4e-5. */
 static const double double_error = 2e-4;
 
-/* Tells whether there may be cells whose segments are made in lanes (kernel_local_segments.h). */
+/* Returns whether there may be cells whose segments are computed in lanes (kernel_local_segments.h). */
 static bool has_curved_cells(const render_job *job)
 {
     for (int i = 0; i < job->part_count; i++) {
@@ -326,9 +328,9 @@ static bool has_curved_cells(const render_job *job)
     return false;
 }
 
-/* An eighth of max_error goes to the colours' table, and four fifths to the field (docs/development/error_budget.md):
- * half of these over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half
- * of that for their mixing. */
+/* An eighth of max_error is allotted to the colour table, and four fifths to the field
+ * (docs/development/error_budget.md): half of these over the length of the ray, half over the absorption. Segments that
+ * are mixed with other volumes use half of that for their mixing. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
@@ -340,8 +342,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = job->max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * (error_of_each > 0 ? error_of_each : RENDER_MIXING_ERROR));
-    /* The partition decides whether overlaps are found that are clearly in front of a surface. So compositing and a
-     * rank must cut at the surface in the same place, to 1e-6. Several volumes are always cut by compositing. */
+    /* The partition determines whether overlaps are found that lie clearly in front of a surface. So compositing and a
+     * rank must cut at the surface with the same result, to 1e-6. Segments of several volumes are always cut by
+     * compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {
@@ -382,7 +385,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     if (segments != INSITU_OK) render_unprepare(frame);
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
-    /* A tile's list of cells is used up by one turn. */
+    /* A tile's list of cells is consumed by one turn. */
     frame->bins_volume =
         bins && job->volume_count == 1 && frame->volume_turns <= 1 && !(frame->has_segments && job->separate_samples);
     return segments;

@@ -1,4 +1,4 @@
-/* Makes the constants of a frame from a job. */
+/* Computes the constants of a frame from a job. */
 #ifndef RENDER_RENDER_PREPARE_H
 #define RENDER_RENDER_PREPARE_H
 
@@ -7,11 +7,11 @@
 #include "kernel_types.h"
 #include "render.h"
 
-/* Check the job and fill frame, which is to be freed with render_unprepare() where that succeeded. */
+/* Checks the job and fills *frame, which must be freed with render_unprepare() if this succeeds. */
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error);
 void render_unprepare(kernel_frame *frame);
 
-/* The ends of the surface's field on this rank's parts, low > high where it is on none. */
+/* Computes the range of the surface's field on this rank's parts, low > high if no part has it. */
 void render_surface_range(const render_job *job, int surface, double range[2]);
 
 #endif
