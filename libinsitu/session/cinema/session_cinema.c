@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* the largest table that is continued: some four million pictures */
+enum { MOST_BYTES = 1 << 28 }; /* the largest table that is continued: about four million pictures */
 
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error)
@@ -31,7 +31,7 @@ char *session_database_file(const scene_database *database, const char *file)
 
 /* ---- lines ----------------------------------------------------------------------------------------------------- */
 
-/* Makes room for more bytes, and for one that ends the text. */
+/* Ensures space for `more` more bytes and a terminating NUL. */
 static bool reserve(session_table *t, size_t more)
 {
     if (t->size + more < t->capacity) return true;
@@ -43,7 +43,7 @@ static bool reserve(session_table *t, size_t more)
     return true;
 }
 
-/* A line while it is made; is_well: there was memory for all of it. */
+/* A line that is being written. is_well: memory sufficed for all of it. */
 typedef struct table_line {
     session_table *table;
     bool is_well;
@@ -65,8 +65,8 @@ static void add_number(table_line *line, double number)
     add_bytes(line, text, (size_t)length);
 }
 
-/* Adds a text, in quotes where it has a character that separates fields (RFC 4180), and after a shield where a
- * spreadsheet would take it for a formula. */
+/* Adds a text. It is quoted if it contains a character that separates fields (RFC 4180), and preceded by the shield if
+ * a spreadsheet would take it for a formula. */
 static void add_text(table_line *line, const char *shield, const char *text, char end)
 {
     const bool is_quoted = strpbrk(text, ",\"") != NULL, is_formula = *text && strchr("=+-@", *text);
@@ -77,7 +77,7 @@ static void add_text(table_line *line, const char *shield, const char *text, cha
     add_bytes(line, &end, 1);
 }
 
-/* In Spec D an empty field says that there is no value. */
+/* In Spec D an empty field means that there is no value. */
 static void add_nothing(table_line *line)
 {
     add_bytes(line, ",", 1);
@@ -130,7 +130,7 @@ static void drop_from(session_table *t, int64_t cycle)
     t->size = header + text_keep_below(t->text + header, cycle);
 }
 
-/* Takes over the lines of the folder's table from before this cycle. */
+/* Copies the lines of the folder's table that belong to cycles before this one. */
 static insitu_status take_over(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
@@ -216,8 +216,8 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-/* Tells whether a byte must be escaped in a script's text. Bytes above 0x7f need not be: the page's scripts are UTF-8.
- */
+/* Returns whether a byte must be escaped in a script's text. Bytes above 0x7f need not be: the page's scripts are
+ * UTF-8. */
 static bool is_escaped(unsigned char byte)
 {
     return byte == '"' || byte == '\\' || byte < 0x20;
@@ -234,7 +234,7 @@ static void write_script_line(FILE *file, const char *line, size_t size)
     }
 }
 
-/* Writes the lines as a list of texts, given to a function of the page. */
+/* Writes the lines as a list of strings that is passed to a function of the page. */
 static void write_script(FILE *file, const void *what)
 {
     const session_table *t = what;
@@ -260,7 +260,7 @@ static bool put_script(const session_table *t, const char *path, file_failure *f
     return text_file_replace(path, write_script, t, failure);
 }
 
-/* The page is always the same: it is written once, and where it was taken away. */
+/* Writes the page if it does not exist or was not written by this session; its content is always the same. */
 static bool put_page(const session_table *t, const char *path, file_failure *failure)
 {
     if (t->has_page && file_exists(path)) return true;

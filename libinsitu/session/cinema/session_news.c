@@ -9,7 +9,7 @@
 #include "session_cinema.h"
 #include "text_file.h"
 
-/* ---- what there is to tell ------------------------------------------------------------------------------------- */
+/* ---- warnings and errors --------------------------------------------------------------------------------------- */
 
 static void note_line(session_news *news, int64_t cycle, const char *line, size_t size)
 {
@@ -36,9 +36,9 @@ void session_note_news(session_news *news, const session_report *report, const b
     news->error = *error;
 }
 
-/* ---- its text -------------------------------------------------------------------------------------------------- */
+/* ---- text of report.json --------------------------------------------------------------------------------------- */
 
-/* A text while it is made; is_whole: there was memory for all of it. */
+/* A text that is being written. is_whole: memory sufficed for all of it. */
 typedef struct news_text {
     session_text text;
     bool is_whole;
@@ -59,7 +59,7 @@ __attribute__((format(printf, 2, 3))) static void add(news_text *out, const char
     if (length > 0) add_bytes(out, piece, (size_t)length);
 }
 
-/* A text in quotes, as JSON has it; null where there is none. */
+/* Adds a quoted JSON string; null if text is NULL. */
 static void add_quoted(news_text *out, const char *text)
 {
     add_bytes(out, text ? "\"" : "null", text ? 1 : 4);
@@ -74,7 +74,7 @@ static void add_quoted(news_text *out, const char *text)
     if (text) add_bytes(out, "\"", 1);
 }
 
-/* JSON has no infinity and no NaN. */
+/* Adds a number; infinity and NaN become null, as JSON has neither. */
 static void add_number(news_text *out, double number)
 {
     if (isfinite(number))

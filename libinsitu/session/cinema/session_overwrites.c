@@ -5,7 +5,7 @@
 #include "memory.h"
 #include "session_hash.h"
 
-/* Hashes a name without "./" and "//", which lead to the same file as without. Never 0. */
+/* Hashes a path without "./" and "//", so that paths to the same file have equal hashes. Never 0. */
 static uint64_t hash_of(const char *path)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -29,7 +29,7 @@ static int outputs_before(const scene *scene, int image)
     return count;
 }
 
-/* The image of the scene that has this output. */
+/* Returns the image of the scene that has this output. */
 static const scene_image *image_of(const scene *scene, int output)
 {
     int image = 0;
@@ -37,7 +37,8 @@ static const scene_image *image_of(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* The output whose last picture has this file; -1: none. A step that a run repeats under its cycle is no series. */
+/* Returns the output whose last picture was written to this file; -1: none. The same output at the same cycle does not
+ * count: the run has repeated the step. */
 static int find_written(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
@@ -45,7 +46,7 @@ static int find_written(const session_overwrites *all, uint64_t file, int output
     return -1;
 }
 
-/* What mends it. */
+/* Returns the advice that ends the warning. */
 static const char *advice_for(const scene_image *image, const scene_image *before, bool is_same_output)
 {
     if (is_same_output) return "put {cycle} into its path to keep a picture of each step";
