@@ -1,5 +1,5 @@
-/* A rank that returned early would leave the others waiting in their next collective call. So all ranks leave a phase,
- * or none does. The price is one reduction of an integer where nothing failed. */
+/* A rank that returned early would leave the others blocked in their next collective call. So either all ranks end a
+ * step after a phase, or none does. If nothing failed this costs one reduction of an integer. */
 #include "session_agree.h"
 
 #include <stdio.h>

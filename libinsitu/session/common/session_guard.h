@@ -1,5 +1,5 @@
-/* Settings of the caller that the library must neither work under nor change: the floating-point
- * environment, and OpenMP's leave to give teams of any size (OMP_DYNAMIC). */
+/* Settings of the caller under which the library must not work, and which it must not change: the floating-point
+ * environment, and OpenMP's permission to vary the size of teams (OMP_DYNAMIC). */
 #ifndef SESSION_GUARD_H
 #define SESSION_GUARD_H
 
@@ -10,14 +10,15 @@ typedef struct session_guard {
     int is_dynamic;
 } session_guard;
 
-/* Give the calling thread the default environment and teams of the size asked for, and keep what it had. */
+/* Sets the calling thread's default environment and fixed team sizes, and saves its own settings. */
 void session_guard_begin(session_guard *guard);
 
-/* Give it back, exception flags too. */
+/* Restores the saved settings, including exception flags. */
 void session_guard_end(const session_guard *guard);
 
-/* Gives the calling thread its environment back for the region that OpenMP starts threads in: they begin under the
- * caller's own environment, as if the caller had needed them first. Call both between the two calls above. */
+/* Restore the calling thread's environment for the parallel region in which OpenMP starts threads: these then begin
+ * with the caller's own environment, as if the caller had started them. Both calls must be between the two calls
+ * above. */
 void session_guard_lend(const session_guard *guard);
 void session_guard_return(void);
 

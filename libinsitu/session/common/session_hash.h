@@ -1,4 +1,4 @@
-/* FNV-1a: *hash, SESSION_HASH_BEGIN at first, takes bytes in. */
+/* FNV-1a hashes: *hash, initially SESSION_HASH_BEGIN, is updated by bytes. */
 #ifndef SESSION_HASH_H
 #define SESSION_HASH_H
 
@@ -13,7 +13,8 @@ static inline void session_hash_bytes(uint64_t *hash, const void *data, size_t s
     for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
 }
 
-/* Takes in a text with its end, so that texts in a row differ from others cut elsewhere. */
+/* Updates the hash by a text and its NUL, so that sequences of texts that are split differently have different
+ * hashes. */
 static inline void session_hash_text(uint64_t *hash, const char *text)
 {
     session_hash_bytes(hash, text, strlen(text) + 1);

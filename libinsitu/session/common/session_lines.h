@@ -1,4 +1,4 @@
-/* Warnings that one rank alone knows of, told to all. */
+/* Sends warnings that only one rank knows to all ranks. */
 #ifndef SESSION_LINES_H
 #define SESSION_LINES_H
 
@@ -6,13 +6,13 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* What this rank brings into a maximum over all ranks, which is for session_telling_rank(). Local. */
+/* Returns this rank's operand for an MPI maximum, from whose result session_telling_rank() computes the rank. Local. */
 int session_telling_word(const session_report *report, const session_team *team);
-/* The lowest rank that has lines; -1: none has. Local. */
+/* Returns the lowest rank that has lines; -1 if no rank has any. Local. */
 int session_telling_rank(int word, const session_team *team);
 
-/* Give all ranks' reports the lines of one rank, which may have none. Those of other ranks, which mostly are the same,
- * are dropped. Collective. */
+/* Adds one rank's lines, possibly none, to all ranks' reports. Lines of other ranks, which are mostly the same, are
+ * dropped. Collective. */
 insitu_status session_share_lines(session_report *report, int root, const session_team *team, base_error *error);
 
 #endif

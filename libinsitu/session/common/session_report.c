@@ -1,4 +1,4 @@
-/* A warning that was told is remembered as a hash of what it is about. */
+/* A warning that has been reported is stored as a hash of its subject. */
 #include "session_report.h"
 
 #include <stdarg.h>
@@ -106,7 +106,7 @@ static uint64_t key_of(const session_warning *w)
     return key;
 }
 
-/* Finds a told warning; told_count if it is not among them. */
+/* Returns the index of a reported warning; told_count if it has not been reported. */
 static int find_told(const session_report *report, uint64_t key)
 {
     int at = 0;
@@ -114,7 +114,7 @@ static int find_told(const session_report *report, uint64_t key)
     return at;
 }
 
-/* Where memory runs out the warning is told again. */
+/* Stores a reported warning. If memory runs out, the warning will be reported again. */
 static void add_told(session_report *report, uint64_t key)
 {
     uint64_t *told = base_realloc(report->told, (size_t)(report->told_count + 1) * sizeof *told);

@@ -1,4 +1,4 @@
-/* Who works on a step: all ranks, and this rank's threads. */
+/* The ranks and threads that work on a step. */
 #ifndef SESSION_TEAM_H
 #define SESSION_TEAM_H
 
@@ -9,23 +9,25 @@
 #include "error.h"
 
 typedef struct session_team {
-    MPI_Comm comm;              /* the session's own; MPI's errors are returned */
-    MPI_Comm compositing_comm;  /* on which compositing alone talks */
-    struct comp_claims *claims; /* compositing's (comp.h); the session's */
+    MPI_Comm comm;              /* the session's own communicator; MPI's errors are returned */
+    MPI_Comm compositing_comm;  /* used only by compositing */
+    struct comp_claims *claims; /* compositing's (comp.h); owned by the session */
     int rank, ranks;
-    int node_ranks;      /* ranks on this rank's node, itself among them */
-    int cores;           /* this rank's share of the node's (session_cores.h) */
-    int each_node_ranks; /* ranks on every node, if all nodes have as many and ranks are placed node by node or in turn;
-                            else 1 */
-    bool is_round_nodes; /* ranks are placed in turn: neighbours in rank are on different nodes */
-    int threads;         /* this rank's threads in this step; 0 before the first */
+    int node_ranks; /* number of ranks on this rank's node, including itself */
+    int cores;      /* this rank's share of the node's cores (session_cores.h) */
+    /* number of ranks on every node, if it is the same on all nodes and ranks are placed node by node or round-robin;
+     * else 1 */
+    int each_node_ranks;
+    bool is_round_nodes; /* ranks are placed round-robin: consecutive ranks are on different nodes */
+    int threads;         /* number of this rank's threads in this step; 0 before the first */
 } session_team;
 
-/* Duplicates the caller's communicator, twice. What was duplicated when an error came is in *out, to be freed.
- * Collective. */
+/* Duplicates the caller's communicator twice. After an error, the communicators duplicated so far are in *out and must
+ * be freed. Collective. */
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error);
 
-/* Counts the ranks of this rank's node and its share of the cores, and finds how ranks lie on nodes. Collective. */
+/* Counts the ranks of this rank's node and its share of the cores, and determines how ranks are placed on nodes.
+ * Collective. */
 void session_team_count_node(session_team *team);
 
 /* Frees the communicators. Collective, while MPI is running. */

@@ -1,13 +1,13 @@
-/* OpenMP's runtimes end the process where they cannot start a thread. So threads are started here first, where a
- * failure only lowers their number: as many as the step wants and a few more, with the stacks that OpenMP would give
- * them. They are kept until every rank has tried, since the ranks of a node share limits (processes of a user or a
- * container, memory, address space). OpenMP is then asked for as many as could be started; the few more, and some
+/* OpenMP's runtimes end the process if they cannot start a thread. So threads are first started here, where a failure
+ * only lowers their number: as many as the step needs and SPARE_THREADS more, with the stack size that OpenMP would
+ * use. They are kept until every rank has tried, since the ranks of a node share limits (processes of a user or a
+ * container, memory, address space). OpenMP then gets the number that could be started; the spare threads, and some
  * memory, are left for other needs.
  *
- * OpenMP keeps its threads for later regions, so a team need be tried again only if it grows, or if threads have ended,
- * as GNU's do where a region of the caller's has fewer. A destructor in each thread counts these.
+ * OpenMP keeps its threads for later regions, so a team is tried again only if it grows, or if threads have ended, as
+ * GNU's do if a region of the caller has fewer. A destructor in each thread counts those that end.
  *
- * OpenMP has no call that tells the stack size of workers, so the workers are asked. */
+ * OpenMP has no call that returns the stack size of workers, so it is measured in the workers. */
 #define _GNU_SOURCE 1
 #include "session_threads.h"
 
@@ -25,17 +25,18 @@
 
 enum {
     SPARE_THREADS = 4,
-    SPARE_BYTES = 4 << 20 /* OpenMP ends the process where it finds no memory to describe a region or a task */
+    SPARE_BYTES = 4 << 20 /* OpenMP ends the process if there is no memory for a region or a task */
 };
 
-/* ---- wanted -------------------------------------------------------------------------------------------------- */
+/* ---- number of threads requested ----------------------------------------------------------------------------- */
 
 typedef struct team_cap {
     int threads;
     const char *reason;
 } team_cap;
 
-/* Within a region of the caller's, GNU's OpenMP would start new threads for every region of the library. */
+/* Returns the maximum number of threads and its reason. Inside a parallel region of the caller GNU's OpenMP would start
+ * new threads for every region of the library, so the maximum is 1. */
 static team_cap cap_of_team(void)
 {
     const int cores = omp_get_num_procs(), limit = omp_get_thread_limit();
@@ -71,7 +72,7 @@ static void make_key(void)
     has_key = pthread_key_create(&key, count_end) == 0;
 }
 
-/* The number of threads that are known to be there. */
+/* Returns the number of threads that are known to exist. */
 static int living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
@@ -100,7 +101,7 @@ static void *pass_gate(void *gate)
     return NULL;
 }
 
-/* Reads a size as the runtimes write it, as in "512k" or " 16 M". 0: none. */
+/* Parses a size in the format of the runtimes, as in "512k" or " 16 M". Returns 0 if there is none. */
 static size_t parse_size(const char *text, size_t unit)
 {
     static const char suffixes[] = "bkmg";
@@ -113,7 +114,7 @@ static size_t parse_size(const char *text, size_t unit)
     return number > SIZE_MAX / unit ? 0 : (size_t)number * unit;
 }
 
-/* The largest stack that the environment asks for; 0: none is. */
+/* Returns the largest stack size set in the environment; 0 if none is. */
 static size_t stack_of_environment(void)
 {
     static const struct {
@@ -130,7 +131,7 @@ static size_t stack_of_environment(void)
     return most;
 }
 
-/* Start as many threads as can be, up to wanted ones. */
+/* Starts up to `wanted` threads. */
 static void start_trial(trial *t, int wanted)
 {
     pthread_attr_t attributes;
@@ -140,7 +141,7 @@ static void start_trial(trial *t, int wanted)
     pthread_mutex_lock(&t->gate);
     if (!t->threads || !t->room || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
-    if (stack) pthread_attr_setstacksize(&attributes, stack); /* OpenMP does not take a size that is refused here */
+    if (stack) pthread_attr_setstacksize(&attributes, stack); /* OpenMP does not use a size that is refused here */
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old); /* these threads must not take the caller's signals */
     while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, pass_gate, &t->gate) == 0)
@@ -158,8 +159,8 @@ static void end_trial(trial *t)
     base_free(t->room);
 }
 
-/* Tries threads where any rank lacks some, before its first parallel region. All ranks try at the same time, for those
- * of a node share its limits. Collective. */
+/* Tries to start threads if any rank lacks some, before its first parallel region. All ranks try at the same time, as
+ * those of a node share its limits. Collective. */
 static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm comm, base_error *error)
 {
     const int living = living_threads(threads), lacking = wanted - living;
@@ -174,7 +175,7 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
     return status;
 }
 
-/* Chooses the number of threads of this step; the report says so if there are fewer than asked for. */
+/* Returns the number of threads of this step; warns if there are fewer than requested. */
 static int choose_threads(const session_threads *threads, int asked, int wanted, session_report *report)
 {
     const bool are_enough = threads->count >= wanted;
@@ -188,7 +189,7 @@ static int choose_threads(const session_threads *threads, int asked, int wanted,
 
 /* ---- stacks -------------------------------------------------------------------------------------------------- */
 
-/* This thread's stack; left: from here to its lowest address, INT64_MAX where it is not the system's. */
+/* A thread's stack: its size, and the bytes left below the current frame; INT64_MAX if unknown. */
 typedef struct thread_stack {
     int64_t left, size;
 } thread_stack;
@@ -207,7 +208,7 @@ static thread_stack own_stack(void)
     return (thread_stack){(int64_t)(here - low), (int64_t)size};
 }
 
-/* The smallest that a worker has. */
+/* Returns the smallest stack of a worker. */
 static thread_stack least_worker_stack(int threads)
 {
     int64_t left = INT64_MAX, size = INT64_MAX;
@@ -225,15 +226,15 @@ static thread_stack least_worker_stack(int threads)
     return (thread_stack){left, size};
 }
 
-/* The size, in kB, of a stack that has so many bytes left where this one has its own: what is taken already is added,
- * and what systems take from a stack's size, a few pages. */
+/* Returns the stack size, in kB, that leaves `needed` bytes free: adds what is in use now, and a few pages for the
+ * system. */
 static long long kilobytes_for(const thread_stack *stack, int64_t needed)
 {
     enum { OF_SYSTEMS = 16 };
     return ((needed + stack->size - stack->left) >> 10) + OF_SYSTEMS;
 }
 
-/* An error where a stack is too small. In the first parallel region. Collective. */
+/* Fails if a stack is too small. Must be in the first parallel region. Collective. */
 static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
                                   base_error *error)
 {
@@ -254,7 +255,7 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
                   (long long)least.left >> 10, SESSION_WORKER_STACK >> 10, kilobytes_for(&least, SESSION_WORKER_STACK),
                   kilobytes_for(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
-    if (status) threads->count = 0; /* looked at again in the next step */
+    if (status) threads->count = 0; /* tried again in the next step */
     return status;
 }
 
