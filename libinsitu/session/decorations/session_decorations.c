@@ -1,6 +1,6 @@
-/* The domain's box is convex and all data is in it. So an edge between two faces that are seen from within lies behind
- * everything, and any other edge before everything or beside it: edges are drawn right without depth, among surfaces as
- * in the mist of a volume. */
+/* The domain's box is convex and contains all data. So an edge between two faces that are seen from inside lies behind
+ * everything, and any other edge in front of everything or beside it: edges are drawn correctly without depth, both
+ * among surfaces and inside a volume. */
 #include "session_decorations.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@
 
 /* ---- the box ------------------------------------------------------------------------------------------------- */
 
-/* A point as the camera sees it: right, up, forward of the eye. */
+/* A point in the camera's coordinates: to the right, up and forward, relative to the eye. */
 typedef struct seen_point {
     double at[3];
 } seen_point;
@@ -35,7 +35,7 @@ static void project(const render_camera *c, const seen_point *p, double pixel[2]
     pixel[1] = 0.5 * c->height - p->at[1] * scale;
 }
 
-/* Cuts the edge off at the plane of this depth; false where all of it is nearer. */
+/* Clips the edge at the plane of this depth; returns false if all of it is nearer. */
 static bool cut_near(seen_point *a, seen_point *b, double near)
 {
     if (a->at[2] < near && b->at[2] < near) return false;
@@ -48,7 +48,7 @@ static bool cut_near(seen_point *a, seen_point *b, double near)
     return true;
 }
 
-/* Tells whether the box's face across this axis, at its low or high end, is seen from outside. */
+/* Returns whether the box's face across this axis, at its low or high end, is seen from outside. */
 static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
@@ -84,10 +84,11 @@ int session_box_strokes(const double lower[3], const double upper[3], const rend
 
 /* An edge of the box along an axis, in the picture. */
 typedef struct ruled_edge {
-    double from[3], to[3];   /* scene */
-    double pixels[2][2];     /* the ends */
-    double away[2];          /* out of the box, across the edge; unit length */
-    bool is_there, is_outer; /* before the eye; between a face that is seen from outside and one that is not */
+    double from[3], to[3]; /* in the scene */
+    double pixels[2][2];   /* the ends */
+    double away[2];        /* unit vector perpendicular to the edge, out of the box */
+    /* is_there: in front of the eye; is_outer: between a face that is seen from outside and one that is not */
+    bool is_there, is_outer;
 } ruled_edge;
 
 static ruled_edge find_edge(const double lower[3], const double upper[3], const render_camera *c, int axis, int corner)
@@ -203,9 +204,9 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
     return out;
 }
 
-/* ---- words and bars ------------------------------------------------------------------------------------------ */
+/* ---- texts and bars ------------------------------------------------------------------------------------------ */
 
-/* Chooses a light colour on a dark background, and a dark one on a light one or on none. */
+/* Chooses a light colour on a dark background, and a dark one on a light background or none. */
 static void choose_colour(const scene_image *image, float colour[3])
 {
     const float *b = image->background;
@@ -215,7 +216,7 @@ static void choose_colour(const scene_image *image, float colour[3])
         colour[i] = image->decorations.has_colour ? image->decorations.colour[i] : is_dark ? 0.85F : 0.01F;
 }
 
-/* False: no memory. */
+/* Adds a text. Returns false if there is no memory. */
 static bool add_words(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at,
                       float size)
 {
@@ -232,9 +233,8 @@ static bool fill_words(session_decorations *d, const scene_decorations *scene, c
     return well;
 }
 
-/* Tells whether the layer shows the magnitude of the field: by its own word, or because the field has several
- * components.
- */
+/* Returns whether the layer shows the magnitude of the field: because the scene says so, or because the field has
+ * several components. */
 static bool is_magnitude(const session_catalogue *catalogue, const scene_field *field)
 {
     int components = 1;
@@ -274,7 +274,7 @@ static void write_label(const scene_decorations *scene, int bar, const session_c
     if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
-/* Tells whether an earlier bar has the same field, colours and numbers; several layers may show one field. */
+/* Returns whether an earlier bar has the same field, colours and numbers; several layers may show one field. */
 static bool is_repeated(const session_decorations *d, int bar)
 {
     const insitu_colour_bar *b = &d->bars[bar];
@@ -290,13 +290,13 @@ static bool is_repeated(const session_decorations *d, int bar)
     return is_found;
 }
 
-/* Input that bars are made from, beside the layers. */
+/* Further input of bars, besides the layers. */
 typedef struct bar_basis {
     const scene_decorations *scene;
     const session_catalogue *catalogue;
 } bar_basis;
 
-/* Makes the bar of a layer, unless an earlier one says the same. */
+/* Adds the bar of a layer, unless an earlier bar is equal. */
 static void add_bar(session_decorations *d, const bar_basis *basis, const scene_field *field,
                     const scene_colour_map *map, const session_transfer *transfer)
 {
@@ -341,7 +341,7 @@ static void fill_bars(session_decorations *d, const scene_image *image, const se
                 &transfers[given->layers->surface_count + i]);
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all decorations ----------------------------------------------------------------------------------------- */
 
 static void fill_axes(session_decorations *d, const render_camera *c)
 {
@@ -352,7 +352,7 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
-/* Fills in the decorations that tell lengths. */
+/* Fills in the decorations that show lengths. */
 static void fill_lengths(session_decorations *d, const scene_decorations *scene, const session_extent *extent,
                          const render_camera *camera)
 {

@@ -12,8 +12,7 @@ void session_free_outline(session_outline *outline)
     *outline = (session_outline){0};
 }
 
-/* ---- ends: x, y, z of the lower corner, and those of the upper one with the other sign, so that the least of all
- * count */
+/* ---- ends: x, y, z of the lower corner, and the negated ones of the upper, so that a minimum unites boxes */
 
 enum { ENDS = 6 };
 
@@ -26,7 +25,7 @@ static void widen(const session_mesh *mesh, double ends[ENDS])
     }
 }
 
-/* Boxes around nothing are left out. */
+/* Adds the boxes that are not empty. */
 static void take_boxes(const double *ends, int count, session_outline *out)
 {
     for (int i = 0; i < count; i++, ends += ENDS) {
@@ -61,9 +60,9 @@ static insitu_status gather(const session_catalogue *catalogue, const session_me
                        "MPI_Allreduce");
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all boxes ------------------------------------------------------------------------------------------------- */
 
-/* Room for the boxes, on rank 0. */
+/* Allocates the boxes, on rank 0. */
 static bool reserve(session_outline *out, int count)
 {
     out->boxes = base_alloc((size_t)count * sizeof *out->boxes);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A step of 1, 2 or 5 times 10^exponent. */
+/* A step of factor (1, 2 or 5) times 10^exponent. */
 typedef struct round_step {
     int factor, exponent;
 } round_step;
@@ -21,7 +21,7 @@ static round_step next_step(round_step step)
     return (round_step){step.factor == 1 ? 2 : 5, step.exponent};
 }
 
-/* Multiples of the step in [low, high]. A bound that is one but for rounding counts. */
+/* Computes the first and last multiple of the step in [low, high]. A bound that is a multiple up to rounding counts. */
 static void multiples(double low, double high, double step, double *first, double *last)
 {
     const double slack = 1e-9 * (high - low) / step;
@@ -41,18 +41,18 @@ static round_step choose_step(double low, double high, int most)
     return step;
 }
 
-/* "1.20e+05" to "1.2e5" would lose a digit that its neighbours have; so the exponent alone is shortened: "1.20e5". */
+/* Shortens only the exponent, "1.20e+05" to "1.20e5"; "1.2e5" would lose a digit that the neighbouring ticks have. */
 static void shorten_exponent(char *text)
 {
     char *e = strchr(text, 'e');
     if (!e) return;
     const bool is_negative = e[1] == '-';
     const size_t zeros = strspn(e + 2, "0");
-    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one of e+00 stays */
+    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one zero of e+00 stays */
     memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
 }
 
-/* digits: behind the point, of a plain number or of one with an exponent. */
+/* Writes a number, plain or with an exponent, with `digits` digits behind the point. */
 static void write_number(double value, bool is_plain, int digits, char *text, size_t size)
 {
     const int shown = digits < 0 ? 0 : digits > 15 ? 15 : digits;
@@ -65,8 +65,8 @@ static void write_number(double value, bool is_plain, int digits, char *text, si
     if (!is_plain) shorten_exponent(text);
 }
 
-/* Writes the number in the form that is asked for, or else plain or with an exponent, with so many digits behind the
- * point. */
+/* Writes the number in the form that the scene requests, or else plain or with an exponent, with `digits` digits behind
+ * the point. */
 static void write_in_form(double value, const scene_number_form *form, bool is_plain, int digits, insitu_tick *tick)
 {
     enum { MOST = sizeof tick->text - 2 };
@@ -108,7 +108,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 
 /* ---- logarithmic --------------------------------------------------------------------------------------------- */
 
-/* The numbers of a power of ten that get a tick: 1, or 1, 2 and 5, of every so many powers. */
+/* The numbers that get a tick: 1, or 1, 2 and 5, times every `every`-th power of ten. */
 typedef struct decade_choice {
     bool has_2_and_5;
     int every;
@@ -129,7 +129,7 @@ static void add_value(const session_scale *s, double value, insitu_tick *ticks, 
     (*count)++;
 }
 
-/* The powers of ten from the smallest that shows to the largest, on the side of the sign. */
+/* Adds ticks at the powers of ten from the smallest visible one to the largest, with the given sign. */
 static void add_decades(const session_scale *s, double sign, decade_choice choice, insitu_tick *ticks, int *count)
 {
     const double largest = fmax(fabs(s->low), fabs(s->high));
@@ -155,7 +155,7 @@ static int fill_decades(const session_scale *s, decade_choice choice, insitu_tic
     return count;
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all scales ------------------------------------------------------------------------------------------------ */
 
 static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
 {
@@ -166,7 +166,8 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_multiples(s, most, ticks) : count;
 }
 
-/* A range that begins and ends at ids, or half a band beyond them, has as many of them as bands. */
+/* Fills one tick in the middle of each band if the bands match the whole numbers of the range, which ends at them or
+ * half a band beyond; else returns 0. */
 static int fill_ids(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;
