@@ -1,20 +1,20 @@
-/* The volume of a cell by its corners, and where its cube root, the cell's size, begins. */
+/* The volume of a cell from its corners, and the first approximation of its cube root, the cell's size. */
 #ifndef SESSION_CORNERS_H
 #define SESSION_CORNERS_H
 
 #include "grid.h"
 
-/* A type's corners, each with its three neighbours in right-handed order: the cell's volume is what their tets'
- * volumes, six times, sum to, over shares. Exact for cells with parallel edges, else a mean. */
+/* A cell type's corners, each with its three neighbours in right-handed order. The cell's volume is the sum of six
+ * times the volume of the tet at each corner, divided by shares: exact if edges are parallel, else a mean. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
     int count;
-    double shares; /* what a cell of volume 1 sums to */
+    double shares; /* that sum for a cell of volume 1 */
 } cell_corners;
 
-/* A third of a double's upper bits and the offset are near its cube root, to 0.033, since its bits are its logarithm to
- * within 0.09. A step of Halley's method cubes the error: two leave 2.1e-5 of it cubed, then rounding. The offset is
- * two thirds of 1.0's bits, less the mantissa's part. */
+/* Constants of the cube root's first approximation: a third of a double's upper bits plus the offset, with an error of
+ * 0.033, since a double's bits are its logarithm to within 0.09. A step of Halley's method cubes the error: after two
+ * steps it is 2.1e-5 cubed, below rounding. The offset is two thirds of 1.0's bits, less the mantissa's part. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 
 static inline __attribute__((always_inline)) cell_corners corners_of(int type)

@@ -1,9 +1,9 @@
-/* The loops of one instruction set, SESSION_LANES_TABLE: compiled once for each (CMakeLists.txt).
+/* The loops of one instruction set, SESSION_LANES_TABLE. This file is compiled once per set (CMakeLists.txt).
  *
- * A block of cells is passed over twice. First vertices are read and become bounds and volumes, then volumes become
- * sizes. In one pass a tet takes 5.8 ns instead of 4.0, as each root waits for its volume, and a core does not look so
- * far ahead that it has other cells to go on with. Volumes are kept as the sum of the corners' and sizes as the roots
- * of those, so that one division serves a block. Numbers are loaded one by one: gathers take 1.6 times as long. */
+ * A block of cells is processed in two passes. First vertices are read and become bounds and volumes, then volumes
+ * become sizes. In one pass a tet takes 5.8 ns instead of 4.0, as each root depends on its volume, and a core does not
+ * look far enough ahead to overlap other cells. Volumes are kept as sums over corners and sizes as the roots of these,
+ * so that one division serves a block. Numbers are loaded one by one: gathers take 1.6 times as long. */
 #include <stdbool.h>
 
 #include "session_corners.h"
@@ -11,15 +11,15 @@
 #include "session_lanes.h"
 
 enum {
-    BLOCK_CELLS = 512, /* whose volumes stay in the first cache */
+    BLOCK_CELLS = 512, /* their volumes fit into the first-level cache */
     PARTS = LANES / LANE_WIDTH,
-    AHEAD = 512 /* entries of the connectivity; the core's own prefetching comes too late */
+    AHEAD = 512 /* prefetch distance in entries of the connectivity; the hardware's own prefetches come too late */
 };
 
-/* Arrays and strides, with what is constant in a run. */
+/* Arrays and strides, with the constants of a run. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
-    uintptr_t axes[3]; /* address of what an index of 0 would be, that of no vertex where they count from 1 */
+    uintptr_t axes[3]; /* address of index 0's number; if indices count from 1, it is outside the array */
     int64_t connectivity_stride, ghosts_stride, stride;
     int64_t base, last; /* bounds of the indices */
     int type, count;    /* count: the number of vertices */
@@ -27,19 +27,19 @@ typedef struct lane_source {
     bool wide_index, wide_number;
 } lane_source;
 
-/* Vertices of LANE_WIDTH cells: one of the two. */
+/* Positions of the vertices of LANE_WIDTH cells: in narrow if coordinates are float, in wide if they are double. */
 typedef struct lane_points {
     floats narrow[GRID_MAX_CELL_VERTICES][3];
     doubles wide[GRID_MAX_CELL_VERTICES][3];
 } lane_points;
 
-/* Bounds: those of floats or those of doubles have grown. */
+/* Bounds of positions: the float or the double members are used. */
 typedef struct lane_bounds {
     floats narrow_lower[3], narrow_upper[3];
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* Volumes of a block's cells, as sums of corners. */
+/* Sums of the sizes of a block's cells. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
     doubles least;
@@ -93,7 +93,7 @@ static __attribute__((noinline)) void pack_indices(const char *from, int64_t str
     for (int i = 0; i < count; i++) memcpy(out + i * size, from + i * stride, (size_t)size);
 }
 
-/* Returns where the indices of LANES cells stand one behind the other: where they are, or in room. */
+/* Returns a pointer to the contiguous indices of LANES cells: in place, or copied to `room`. */
 LANE_INLINE const char *list_indices(const lane_source *s, int64_t cell, int64_t room[LANES * GRID_MAX_CELL_VERTICES])
 {
     const char *from = s->connectivity + cell * s->count * s->connectivity_stride;
@@ -110,7 +110,7 @@ LANE_INLINE int64_t given_index(const lane_source *s, const char *indices, int i
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Tell whether all are indices of vertices, by the signs of index and last - index. */
+/* Return whether all indices are those of vertices, by the signs of index and last - index. */
 LANE_INLINE bool are_wide_vertices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;
@@ -189,7 +189,7 @@ LANE_INLINE doubles coordinate(const lane_source *s, const lane_points *points, 
     return s->wide_number ? points->wide[vertex][axis] : doubles_of(points->narrow[vertex][axis]);
 }
 
-/* Returns the sum over the corners, shares times the volume. */
+/* Returns the sum over the corners: shares times the volume. */
 LANE_INLINE doubles sum_of_corners(const lane_source *s, const lane_points *points)
 {
     const cell_corners of = corners_of(s->type);
@@ -222,8 +222,8 @@ LANE_INLINE void grow_bounds(const lane_source *s, const lane_points *points, la
         }
 }
 
-/* Finds the volumes of cells begin .. end; returns where it has come to a ghost or a bad index, or less than LANES
- * cells are left. */
+/* Computes the volumes of cells begin .. end - 1. Stops before cells with a ghost or a bad index, or if less than LANES
+ * cells are left; returns the cell at which it stopped. */
 LANE_INLINE int64_t measure(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds, double *volumes)
 {
     lane_bounds b = *bounds;
@@ -257,7 +257,8 @@ LANE_INLINE doubles cube_root(doubles x)
     return y;
 }
 
-/* Adds up so many volumes, a multiple of LANES; returns false, with sums as they were, where one has no usual root. */
+/* Adds the sizes of `count` volumes, a multiple of LANES. Returns false, with sums unchanged, if a volume is zero, too
+ * small, too large or NaN. */
 LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *sizes)
 {
     lane_sizes s = *sizes;
@@ -268,7 +269,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
             const doubles volume = doubles_load(volumes + i + part * LANE_WIDTH), size = doubles_magnitude(volume);
             unusual |= ~((words)(size > 1e-280) & (words)(size < 1e280));
             s.least = doubles_min(size, s.least);
-            s.inverted += (words)(volume < 0); /* -1 where it is */
+            s.inverted += (words)(volume < 0); /* -1 if the volume is negative */
             s.sums[part] += cube_root(size);
         }
     }

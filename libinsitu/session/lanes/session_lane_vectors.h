@@ -1,5 +1,5 @@
-/* Vectors of doubles and of as many floats, for the instruction set that the compiler is told. simd.h has none of
- * doubles. Minima and maxima are a where a is less or more, else b, so that a NaN in a is passed over. */
+/* Vectors of doubles, and of the same number of floats, for the instruction set for which the file is compiled. simd.h
+ * has no such vectors. Minima and maxima return a if it is less or greater, else b, so that a NaN in a is ignored. */
 #ifndef SESSION_LANE_VECTORS_H
 #define SESSION_LANE_VECTORS_H
 
@@ -119,7 +119,7 @@ LANE_INLINE floats floats_max(floats a, floats b)
 #endif
 }
 
-/* gcc 12 would convert eight floats by halves. */
+/* Converts floats to doubles; gcc 12 would convert eight floats in two halves. */
 LANE_INLINE doubles doubles_of(floats v)
 {
 #if defined(__AVX512F__)
@@ -134,7 +134,7 @@ LANE_INLINE doubles doubles_magnitude(doubles v)
     return (doubles)((words)v & INT64_MAX);
 }
 
-/* Tells whether a bit is set in any lane. */
+/* Returns whether a bit is set in any lane. */
 LANE_INLINE bool words_any(words v)
 {
     int64_t any = 0;
