@@ -20,12 +20,12 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
     return false;
 }
 
-/* The statistics found in a step: those that are due, then those of conditions. */
+/* The statistics computed in a step: first those that are due, then those of images' conditions. */
 typedef struct event_work {
     int count;
     session_statistics_wish *wishes;
     session_statistics *found;
-    int *of; /* index of the statistics, or of the image and the count of statistics */
+    int *of; /* index of the statistics; or, for an image, its index plus the number of statistics */
 } event_work;
 
 static void work_free(event_work *w)
@@ -56,14 +56,14 @@ static bool work_create(const scene *scene, int64_t cycle, const session_sound_e
     return true;
 }
 
-/* Tells whether the condition holds; without values it does not. */
+/* Returns whether the condition holds; it does not if there are no values. */
 static bool holds(const scene_condition *c, const session_statistics *s)
 {
     const double value = c->of == SCENE_MEAN ? s->mean : c->of == SCENE_MINIMUM ? s->least : s->most;
     return s->cells > 0 && value > c->above && value < c->below;
 }
 
-/* Writes all that are due, though some fail; returns the first error. */
+/* Writes all statistics that are due, even if some fail; returns the first error. */
 static void write_due(session_events *events, const scene *scene, const event_work *w, const session_event_time *now,
                       base_error *error)
 {
@@ -95,7 +95,7 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     event_work work;
     if (!work_create(scene, now->cycle, sound, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
     for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
-    insitu_status status = session_agree(team->comm, error); /* the functions that fill fields may be collective */
+    insitu_status status = session_agree(team->comm, error); /* fill functions may be collective */
     if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_wanted(meshes, team->threads, error);
     status = session_agree(team->comm, error);

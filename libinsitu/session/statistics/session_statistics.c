@@ -1,6 +1,6 @@
-/* Sums are of whole numbers, which add up to the same in any order: shares of the largest cell's volume, from 0 to 1,
- * times 2^52. Of shells areas take the place of volumes, where no other cell counts. A sum has two parts, multiples of
- * 2^28 and the rest, so that 2^34 cells fit. Each cell is off by at most 2^-53 of the largest. */
+/* Sums are sums of integers, which are the same in any order: shares of the largest cell's volume, from 0 to 1, times
+ * 2^52. For shells, if no cell has a volume, areas take the place of volumes. A sum has two parts, multiples of 2^28
+ * and the rest, so that 2^34 cells fit. Each cell errs by at most 2^-53 of the largest. */
 #include "session_statistics.h"
 
 #include <math.h>
@@ -54,16 +54,16 @@ static double sum_of(const int64_t sum[2])
     return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
 
-/* Results of earlier passes that a pass needs. */
+/* Results of earlier passes that a pass uses. */
 typedef struct sum_basis {
     const session_statistics *known;
-    double largest; /* volume */
-    double about;   /* second pass: the mean as a share of the range */
+    double largest; /* largest volume */
+    double about;   /* second pass: the mean, as a share of the range */
     bool is_second;
-    bool is_of_shells; /* shells count, else cells with a volume */
+    bool is_of_shells; /* only shells are counted, else only cells with a volume */
 } sum_basis;
 
-/* A value's share of the range, from 0 at low to 1 at high, without overflow. */
+/* Returns a value's share of the range, from 0 at low to 1 at high, without overflow. */
 static double share_of_range(double value, double low, double high)
 {
     const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
@@ -92,12 +92,12 @@ static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
     if (bin >= 0) add_share(sums + BINS + 2 * bin, volume);
 }
 
-/* A pass over one mesh. */
+/* Data of a pass over one mesh. */
 typedef struct statistics_pass {
     const grid *g;
     grid_field field;
     const session_team *team;
-    volume_room *rooms; /* one for each thread */
+    volume_room *rooms; /* one per thread */
 } statistics_pass;
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
@@ -114,7 +114,8 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
     }
 }
 
-/* Entries of the reduction by minimum: least, -most, -largest volume; of cells with a volume, then of shells. */
+/* Entries of the reduction by minimum: minimum, -maximum, -largest volume; first of cells with a volume, then of
+ * shells. */
 enum { ENDS = 3, KINDS = 2 };
 
 static void find_ends(const statistics_pass *p, double ends[KINDS * ENDS])
@@ -142,12 +143,12 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_wish *wishes;
     int count;
-    double *ends;       /* KINDS times ENDS a wish, then -1 where a rank's memory ran out, else 0 */
-    int64_t *sums;      /* MAX_SUMS a wish, then two */
-    volume_room *rooms; /* one for each thread; large enough after the first pass, as a thread's cells stay the same */
+    double *ends;       /* KINDS times ENDS per wish; then one entry: -1 if a rank's memory ran out, else 0 */
+    int64_t *sums;      /* MAX_SUMS per wish, then two */
+    volume_room *rooms; /* one per thread; large enough after the first pass, as a thread's cells stay the same */
 } statistics_work;
 
-/* The pass over the wish's field on a mesh of this rank; false where it has none. */
+/* Sets up the pass over the wish's field on a mesh of this rank; returns false if the mesh does not have the field. */
 static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
@@ -155,7 +156,7 @@ static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_p
     return of->is_given && session_find_values(of, w->wishes[wish].field, &pass->field);
 }
 
-/* Whether a room could not be made on any rank. */
+/* Fails if a thread's buffer could not be allocated on any rank. */
 static insitu_status check_rooms(const statistics_work *w, base_error *error)
 {
     if (w->ends[KINDS * ENDS * w->count] == 0) return INSITU_OK;
@@ -165,7 +166,7 @@ static insitu_status check_rooms(const statistics_work *w, base_error *error)
     return session_agree(w->team->comm, error);
 }
 
-/* The ends of the cells that count: those with a volume, or, where there is none, shells. */
+/* Returns whether only shells are counted: if no cell has a volume and there are shells. */
 static bool is_of_shells(const statistics_work *w, int wish)
 {
     const double *ends = w->ends + KINDS * ENDS * wish;

@@ -7,9 +7,9 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* the largest file that is continued: some two million lines */
+enum { MOST_BYTES = 1 << 28 }; /* the largest file that is continued: about two million lines */
 
-/* The line of column names, without its end: from base_alloc(). NULL: no memory. */
+/* Returns the line of column names, without its newline, from base_alloc(); NULL if there is no memory. */
 static char *make_header(int bin_count, bool is_of_shells)
 {
     static const char solids[] = "cycle,time,cells,volume,minimum,maximum,mean,deviation";
@@ -24,17 +24,18 @@ static char *make_header(int bin_count, bool is_of_shells)
     return out;
 }
 
-/* Input that a file is written from. */
+/* Content of the file to write. */
 typedef struct new_lines {
-    char *old; /* the lines that stay */
+    char *old; /* the lines that are kept */
     size_t old_size;
-    const char *header; /* NULL: the file has one */
+    const char *header; /* NULL: the file already has one */
     int64_t cycle;
     double time;
     const session_statistics *values;
 } new_lines;
 
-/* Significant digits that give nine of the width of a range, however far from 0 it is; at most all of a double. */
+/* Returns the number of significant digits that resolve nine digits of a range's width, however far it is from 0; at
+ * most all digits of a double. */
 static int digits_for(double low, double high)
 {
     enum { OF_THE_WIDTH = 9, MOST = 17 };
@@ -61,14 +62,14 @@ static void write_lines(FILE *file, const void *what)
     write_line(file, n);
 }
 
-/* `what`: "read" or "written". */
+/* Returns an error for the file. what: "read" or "written". */
 static insitu_status fail(const char *path, const char *what, const file_failure *failure, base_error *error)
 {
     return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "statistics: %.300s: cannot be %s: %s", path, what, failure->reason);
 }
 
-/* Finds the lines of the file that stay. */
+/* Finds the lines of the file that are kept. */
 static insitu_status keep_lines(const char *path, file_content *old, new_lines *lines, base_error *error)
 {
     const size_t header = strlen(lines->header);
@@ -82,7 +83,7 @@ static insitu_status keep_lines(const char *path, file_content *old, new_lines *
     return INSITU_OK;
 }
 
-/* The session's first line, or the first after the file was taken away. */
+/* Writes the session's first line, or the first after the file was removed. */
 static insitu_status begin_file(const char *path, new_lines *lines, base_error *error)
 {
     file_content old;

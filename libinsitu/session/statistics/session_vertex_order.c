@@ -1,7 +1,7 @@
-/* A cell whose vertices are read in another order than they stand in is turned inside out at some corners: their
- * volumes are of both signs, while those of a cell that is right or mirrored agree. Its sum of them may be of any sign,
- * or 0. So cells with both signs are counted, and for each order that vertex_order has, how many it would leave with
- * one. */
+/* A cell whose vertices are read in another order than they are stored is turned inside out at some corners: the
+ * volumes at its corners have both signs, while those of a correct or mirrored cell all have one sign. Their sum may
+ * have any sign, or be 0. So cells with both signs are counted, and for each order of vertex_order the cells that would
+ * have a single sign if they were read in it. */
 #include "session_vertex_order.h"
 
 #include "memory.h"
@@ -10,10 +10,10 @@
 #include "session_tally.h"
 #include "session_topology.h"
 
-enum { ORDERS = 3, SAMPLES = 256 /* cells of a mesh that a rank looks at */ };
+enum { ORDERS = 3, SAMPLES = 256 /* number of a mesh's cells that a rank samples */ };
 
-/* The types that orders differ in. Each is judged by itself: where few cells are hexes, these are wrong all the same.
- */
+/* The types in which the orders differ. Each is judged separately: if few cells are hexes, these may be wrong all the
+ * same. */
 enum { JUDGED = 4 };
 static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
 
@@ -22,8 +22,8 @@ enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Tells whether the cell's corners agree if its vertices stand in the order, and not in the one that they are read in.
- */
+/* Returns whether all corners of the cell have one sign if its vertices are stored in `order` instead of the order in
+ * which they are read. */
 static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_turn(mesh->given.vertex_order, type);
@@ -32,14 +32,14 @@ static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     const int count = grid_cell_vertices(&mesh->cells, cell, vertices);
     for (int i = 0; i < count; i++) {
-        const int given = other ? other[i] : i; /* the place in the caller's connectivity */
+        const int given = other ? other[i] : i; /* position in the caller's connectivity */
         grid_vertex(&mesh->cells, vertices[read ? read[given] : given], points[i]);
     }
     return !tally_has_both_signs(type, points);
 }
 
-/* The sums of the cell's type; NULL where it is not judged: a ghost, or a polyhedron by the caller's word, whose faces
- * tell the order. */
+/* Returns the counts of the cell's type; NULL if the cell is not judged: a ghost, or a cell that the caller describes
+ * as a polyhedron, whose faces determine the order. */
 static int64_t *sums_of(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
@@ -74,7 +74,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     sum_orders(mesh, sums);
 }
 
-/* Tells whether most cells of a type have corners of both signs. */
+/* Returns whether most cells of a type have corners of both signs. */
 static bool is_any_turned(const int64_t sums[CELL_SUMS])
 {
     bool is_any = false;
@@ -83,7 +83,7 @@ static bool is_any_turned(const int64_t sums[CELL_SUMS])
     return is_any;
 }
 
-/* The order that fits most cells, if it fits most of each type; else -1. */
+/* Returns the order that fits most cells, if it fits most cells of each type; else -1. */
 static int order_that_fits(const int64_t sums[CELL_SUMS])
 {
     int best = -1;
@@ -102,8 +102,8 @@ static int order_that_fits(const int64_t sums[CELL_SUMS])
     return best;
 }
 
-/* Warns if most cells of a type are turned inside out at some corners, and names the order that fits most cells, if one
- * does. */
+/* Warns if most cells of a type are turned inside out at some corners, and names the order that fits most cells, if
+ * there is one. */
 static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};
