@@ -1,12 +1,12 @@
-/* An automatic camera looks along a given direction, and its place is computed, so that the sphere around the bounds,
- * or their corners, just fit the part of the frame that decorations leave.
+/* An automatic camera looks along a given direction. Its position is computed so that the sphere around the bounds, or
+ * their corners, just fit the part of the frame that decorations leave free.
  *
- * A corner at (x, y) across and w towards the eye, seen from a place s to the right and D towards the eye, is within
- * the right border if x - s <= r (D - w), r being its tangent; and within the left one, of tangent l, if s - x <= l (D
- * - w). So with a = max(x + r w) and b = max(l w - x), s is between a - r D and l D - b, which meet where D is (a + b)
- * / (r + l). The same holds for up and down; the larger D serves both. A sphere of radius R has a = R sqrt(1 + r^2) and
- * b = R sqrt(1 + l^2). A box stands in the middle of what it may, a sphere as near to the middle of the frame as it
- * may. */
+ * A corner at (x, y) across and w towards the eye, seen from a position s to the right and D towards the eye, is within
+ * the right border if x - s <= r (D - w), r being the border's tangent, and within the left one, of tangent l, if s - x
+ * <= l (D - w). So with a = max(x + r w) and b = max(l w - x), s is between a - r D and l D - b; these meet at D = (a +
+ * b) / (r + l). The same holds for up and down; the larger D is used. A sphere of radius R has a = R sqrt(1 + r^2) and
+ * b = R sqrt(1 + l^2). A box is placed in the middle of its allowed range, a sphere as near to the middle of the frame
+ * as allowed. */
 #include "session_camera.h"
 
 #include <math.h>
@@ -14,10 +14,10 @@
 
 #include "vector3.h"
 
-/* The share of the half frame that the data fills at most. */
+/* Largest share of the half frame that the data fills. */
 static const double filled = 0.95;
 
-/* Chooses up, or, where that is along the view, an axis that is not. */
+/* Returns up, or an axis that is not parallel to the view if up is. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
     double cross[3];
@@ -30,9 +30,9 @@ static void choose_up(const double direction[3], const double up[3], double out[
     for (int axis = 0; axis < 3; axis++) out[axis] = axis == least;
 }
 
-/* ---- where it stands ------------------------------------------------------------------------------------------- */
+/* ---- position -------------------------------------------------------------------------------------------------- */
 
-/* Tangents of half the angles of view, across and up. */
+/* Tangents of half the angles of view, horizontal and vertical. */
 typedef struct camera_tangents {
     double across, up;
 } camera_tangents;
@@ -43,25 +43,27 @@ static camera_tangents tangents_of(const scene_image *image)
     return (camera_tangents){up * image->width / image->height, up};
 }
 
-/* The largest of so many places of corners, for which see above. */
+/* Maxima over the corners, as derived at the top of this file. */
 typedef struct corner_reach {
     double right, left, up, down, back;
 } corner_reach;
 
-/* Shares of half the frame, or tangents, from its middle to where the data may reach on each side. */
+/* Extents from the middle of the frame to the limit of the data on each side, as shares of half the frame or as
+ * tangents. */
 typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* What fits into the frame: its reach from the middle of the bounds in perspective and in parallel, and the frame. */
+/* Extents of the data from the middle of the bounds, for a perspective (near) and an orthographic camera (flat), and
+ * the frame into which they must fit. */
 typedef struct camera_fit {
     corner_reach near, flat;
     camera_frame tangents, shares;
-    bool is_centred; /* in its part of the frame */
+    bool is_centred; /* centred in its part of the frame */
 } camera_fit;
 
-/* The room that a column of colour bars, a title, a line of words, and rulers' numbers take of the picture, in heights
- * of words; and the shape of a bar, about as adaptors/image/layout.cpp has it. */
+/* Space that a column of colour bars, a title, a line of text, and rulers' numbers take of the picture, in heights of
+ * text; and the shape of a bar, approximately as in adaptors/image/layout.cpp. */
 static const double bar_room = 6.5, title_room = 2.4, line_room = 1.5, ruler_room = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
@@ -70,7 +72,7 @@ static double less_room(double most, double words, double pixels)
     return fmax(most - 2 * words / pixels, 0.5);
 }
 
-/* Counts the letters of the longest label, and the bars. */
+/* Returns the number of bars; *letters: length of the longest label. */
 static int count_bars(const scene_image *image, double *letters)
 {
     const scene_decorations *d = &image->decorations;
@@ -83,7 +85,7 @@ static int count_bars(const scene_image *image, double *letters)
     return count;
 }
 
-/* The width of all columns of bars, in heights of words. */
+/* Returns the width of all columns of bars, in heights of text. */
 static double room_of_bars(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
@@ -95,8 +97,8 @@ static double room_of_bars(const scene_image *image)
     return d->has_bars ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
-/* The height of the lines at the middle of the top or bottom, or at its corners, whichever is more. Lines at corners
- * count if they reach far into the picture. In heights of words. */
+/* Returns the height of the lines at the middle of the top or bottom, or at its corners, whichever is larger, in
+ * heights of text. Lines at corners count if they reach far into the picture. */
 static double room_of_lines(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
@@ -116,7 +118,7 @@ static double room_of_lines(const scene_image *image, scene_anchor middle, scene
     return line_room * most + (most ? 0.5 : 0);
 }
 
-/* The part of the frame that decorations leave free, of at most this share of its half. */
+/* Returns the part of the frame that decorations leave free, at most the share `most` of its half. */
 static camera_frame free_frame(const scene_image *image, double most)
 {
     const scene_decorations *d = &image->decorations;
@@ -168,7 +170,7 @@ static camera_fit make_fit(const session_extent *e, const render_camera *axes, c
     return fit;
 }
 
-/* How far the eye is from the middle of the bounds. */
+/* Returns the distance of the eye from the middle of the bounds. */
 static double back_of(const camera_fit *fit, double half_diagonal)
 {
     const corner_reach *near = &fit->near;
@@ -178,27 +180,28 @@ static double back_of(const camera_fit *fit, double half_diagonal)
     return fmax(back, near->back + 0.01 * half_diagonal); /* flat bounds, seen edge on */
 }
 
-/* Half the height of an orthographic picture in which all fits; aspect: width over height. */
+/* Returns half the height of an orthographic picture in which all data fits; aspect: width over height. */
 static double fitting_height(const camera_fit *fit, double aspect)
 {
     const double across = (fit->flat.right + fit->flat.left) / (fit->shares.right + fit->shares.left) / aspect;
     return fmax((fit->flat.up + fit->flat.down) / (fit->shares.up + fit->shares.down), across);
 }
 
-/* Returns the eye's place between low and high: in the middle, or as near to 0 as it may. */
+/* Returns the eye's position between low and high: in the middle, or as near to 0 as allowed. */
 static double place_between(double low, double high, bool is_centred)
 {
     if (is_centred || low > high) return 0.5 * (low + high);
     return fmin(fmax(0, low), high);
 }
 
-/* Half the height of an orthographic picture. */
+/* Returns half the height of an orthographic picture. */
 static double half_height_of(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
-/* The eye stays where it is, with all data before it: an orthographic picture is the same from any distance. */
+/* Makes the camera orthographic if the scene says so. The eye keeps its position, with all data in front of it: an
+ * orthographic picture is the same from any distance. */
 static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
 {
     if (!image->camera.is_orthographic) return;
@@ -206,7 +209,8 @@ static void set_orthographic(const scene_image *image, double half_height, rende
     camera->half_height = half_height_of(image, half_height);
 }
 
-/* Places are from the middle of the bounds until the camera is made, so that bounds far from 0 leave all its digits. */
+/* Computes an automatic camera. Positions are relative to the middle of the bounds until the camera is complete, so
+ * that bounds far from 0 do not lose digits. */
 static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
 {
     const scene_camera *c = &image->camera;
@@ -247,9 +251,9 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
     return true;
 }
 
-/* ---- what the scene leaves to the data ------------------------------------------------------------------------- */
+/* ---- defaults from the data ------------------------------------------------------------------------------------ */
 
-/* Flat data is seen with the first of its axes to the right and the second one up. */
+/* Looks at flat data with the first of its axes to the right and the second one up. */
 static void face_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};

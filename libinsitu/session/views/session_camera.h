@@ -1,4 +1,4 @@
-/* Turns a scene's camera into the renderer's. */
+/* Computes the renderer's camera from a scene's. */
 #ifndef SESSION_CAMERA_H
 #define SESSION_CAMERA_H
 
@@ -6,10 +6,11 @@
 #include "scene.h"
 #include "session_space.h"
 
-/* Where the data is flat (session_flat_axis()), an automatic camera looks along that axis, is orthographic and fits the
- * box, as far as the scene does not say otherwise.
+/* If the data is flat (session_flat_axis()), an automatic camera looks along that axis, is orthographic and fits the
+ * box, unless the scene says otherwise.
  *
- * False where the camera stands at its focal point, or looks along its up direction. Local; the same on every rank. */
+ * Returns false if the camera's position is its focal point, or the camera looks along its up direction. Local; the
+ * same on every rank. */
 bool session_make_camera(const session_extent *extent, const scene_image *image, render_camera *out);
 
 #endif

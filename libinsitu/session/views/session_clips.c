@@ -1,5 +1,5 @@
-/* What a set of clips leaves of the bounds is enclosed in a box, which each clip makes smaller in turn, and again while
- * others may have made it so. If nothing is left of the box, nothing is of the bounds. */
+/* The part of the bounds that a set of clips leaves is enclosed in a box, which each clip shrinks in turn, repeatedly
+ * while other clips have shrunk it. If the box becomes empty, the clips leave nothing. */
 #include "session_clips.h"
 
 #include <math.h>
@@ -8,7 +8,8 @@
 #include "session_distances.h"
 #include "vector3.h"
 
-/* The kept region is widened by twice what a slice's plane may be from its place, so that a slice in it is seen. */
+/* Converts a clip. The kept region is extended by twice the largest shift of a slice's plane (SESSION_BORDER_SHARE), so
+ * that a slice on its border is visible. */
 static render_clip make_clip(const session_extent *e, const scene_clip *clip)
 {
     const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
@@ -37,7 +38,7 @@ void session_make_clips(const session_extent *extent, const scene_image *image, 
     for (int i = 0; i < image->clip_count; i++) out[i] = make_clip(extent, &image->clips[i]);
 }
 
-/* ---- what they leave ------------------------------------------------------------------------------------------- */
+/* ---- boxes around what clips leave ----------------------------------------------------------------------------- */
 
 typedef struct clip_box {
     double lower[3], upper[3];
@@ -61,8 +62,8 @@ static void meet_box(clip_box *box, const double lower[3], const double upper[3]
     }
 }
 
-/* The kept side has places of at most the distance along the normal. An axis reaches as far as the others, at their
- * least, let it. */
+/* Clips the box to the half space normal . x <= distance: each axis is limited by the distance that remains after the
+ * other two axes' least contributions. */
 static void meet_plane(clip_box *box, const render_clip *clip)
 {
     double least[3], left = clip->distance;
@@ -79,7 +80,7 @@ static void meet_plane(clip_box *box, const render_clip *clip)
     }
 }
 
-/* The distances from a sphere's centre to the nearest and the farthest place of the box. */
+/* Computes the distances from a sphere's centre to the nearest and the farthest point of the box. */
 static void find_distances(const clip_box *box, const double centre[3], double *nearest, double *farthest)
 {
     double near[3], far[3];
@@ -145,7 +146,7 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    bool has_nothing; /* nothing is left of any layer */
+    bool has_nothing; /* all layers together have nothing left */
 } clip_basis;
 
 static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)

@@ -1,4 +1,4 @@
-/* What cuts the layers of an image. */
+/* The clips of an image's layers. */
 #ifndef SESSION_CLIPS_H
 #define SESSION_CLIPS_H
 
@@ -7,11 +7,11 @@
 #include "session_report.h"
 #include "session_space.h"
 
-/* Make the renderer's clips of the image's. Local. */
+/* Converts the image's clips to the renderer's. Local. */
 void session_make_clips(const session_extent *extent, const scene_image *image, render_clip out[RENDER_MAX_CLIPS]);
 
-/* Warn of layers that the clips leave nothing of: no place within the bounds of all cells. Local, the same everywhere.
- */
+/* Warns of layers of which the clips leave nothing: no point within the bounds of all cells. Local; the same on every
+ * rank. */
 void session_warn_of_clips(const session_extent *extent, const scene_image *image, const render_clip *clips,
                            session_report *report);
 

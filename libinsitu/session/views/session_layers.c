@@ -1,6 +1,6 @@
 /* A part is a mesh of this rank that has a tree with cells in it. A layer has a field for each part. If a part does not
- * have the field, its ranges are NULL, and the renderer passes the part by. If a part has the surface but not the field
- * that colours it, it is drawn with NaN as values. */
+ * have the field, its ranges are NULL, and the renderer skips the part. If a part has the surface but not the field
+ * that colours it, its values are NaN. */
 #include "session_layers.h"
 
 #include <math.h>
@@ -82,14 +82,14 @@ static void fill_parts(const session_meshes *meshes, session_layers *layers)
 
 static const double no_number = NAN;
 
-/* One value for all vertices. */
+/* Returns a field that is NaN at all vertices. */
 static grid_field absent_field(void)
 {
     return (grid_field){.values = {.data = (const char *)&no_number, .stride = 0, .is_wide = true},
                         .component_count = 1};
 }
 
-/* A part's field; scalar: NULL where it has none. */
+/* Sets a part's field. scalar: NULL if the part has none. */
 static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mesh *mesh, const session_scalar *scalar,
                          bool wants_ranges)
 {
@@ -97,8 +97,8 @@ static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mes
     if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
-/* Fills one run of part_count fields, whose number is slot, on the meshes that have the field. plane: NULL for the
- * field's values, else the values are the distances from it. */
+/* Fills the slot-th run of part_count fields, on the meshes that have the field. plane: NULL for the field's values,
+ * else the values are the distances from it. */
 static render_field place_field(const session_meshes *meshes, session_layers *layers, int slot,
                                 const scene_field *field, const scene_plane *plane, bool wants_ranges)
 {
@@ -115,7 +115,7 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     return out;
 }
 
-/* Gradients at the vertices of the meshes that have the field. */
+/* Sets gradients at the vertices of the meshes that have the field. */
 static const render_vertex_gradients *place_gradients(const session_meshes *meshes, session_layers *layers, int index,
                                                       const scene_field *field)
 {
@@ -150,7 +150,7 @@ static void warn_of_width(const session_layer_basis *basis, const scene_field *f
         basis->image->name, field->name, low, high);
 }
 
-/* Makes a transfer function, whose range may include that of the run before. Collective. */
+/* Computes a transfer function, whose range may include that of the run so far. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
@@ -165,7 +165,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return INSITU_OK; /* lack of memory is left to the next agreement */
+    return INSITU_OK; /* lack of memory is reported by the next agreement */
 }
 
 /* Returns the slot of the fields of a surface's lines. */
@@ -233,7 +233,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the outer faces that the part is made of. */
+/* Returns whether the layer shows the outer faces of which the part consists. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_surface_is_on(layer, walk->whole) &&
@@ -286,7 +286,8 @@ static bool place_gathered(const session_meshes *meshes, session_layers *layers,
     return true;
 }
 
-/* A picture of flat data is a map: if the scene names no light and no material, the colours are those of the bar. */
+/* Returns the material of a layer. A picture of flat data is a map: if the scene sets no light and no material, its
+ * colours are exactly those of the bar. */
 static const scene_material *material_of_faces(const session_layer_basis *basis, const scene_surface *layer)
 {
     static const scene_material bare = {.ambient = 1};
@@ -337,7 +338,7 @@ static void warn_of_plane(const session_layer_basis *basis, const scene_image *i
                  image->name, low, high);
 }
 
-/* surface: the plane's place among the surfaces. */
+/* Fills the surface of a plane. surface: the plane's index among the surfaces. */
 static insitu_status fill_plane(const session_layer_basis *basis, const scene_image *image, const scene_slice *layer,
                                 const scene_plane *plane, int surface, session_layers *layers, base_error *error)
 {
@@ -385,7 +386,8 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
-/* One volume keeps an error by default. With a second one that takes longer, as their segments are mixed. */
+/* Warns that several volumes are sampled. A single volume has an error bound by default; with several that takes
+ * longer, as their segments are mixed. */
 static void warn_of_samples(const session_layer_basis *basis, const scene_image *image)
 {
     const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};
@@ -402,7 +404,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     session_layers layers = {0};
     if (!error->status && !allocate_layers(basis, image, &layers))
         session_no_memory(error, 1 << 10, "an image's layers");
-    /* Where the scene asks for too much, the error is not one rank's. */
+    /* If the scene exceeds a limit, the error belongs to no rank. */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
     warn_of_samples(basis, image);

@@ -1,4 +1,4 @@
-/* An image's layers on this rank's meshes, as the renderer takes them. */
+/* An image's layers on this rank's meshes, in the renderer's form. */
 #ifndef SESSION_LAYERS_H
 #define SESSION_LAYERS_H
 
@@ -23,12 +23,12 @@ typedef struct session_layers {
     session_contours *contours;  /* one for each surface */
     grid_field *fields;          /* part_count a surface and its colour, in turns, a volume, and a surface's lines */
     int64_t field_count;
-    render_vertex_gradients *gradients; /* part_count an isosurface */
-    double **gathered;                  /* as the fields: values at outer faces; NULL where they are not such */
-    mmbvh_ranges *ranges;               /* as the fields */
+    render_vertex_gradients *gradients; /* part_count entries per isosurface */
+    double **gathered;                  /* same order as fields: values gathered at outer faces; else NULL */
+    mmbvh_ranges *ranges;               /* same order as fields */
 } session_layers;
 
-/* Input that layers are made from. */
+/* Input of layers. */
 typedef struct session_layer_basis {
     const session_meshes *meshes;
     const session_team *team;
@@ -36,13 +36,13 @@ typedef struct session_layer_basis {
     bool is_flat;         /* session_flat_axis() found an axis */
     bool has_shells;      /* session_has_shells() */
     session_report *report;
-    session_image_ranges *run_ranges; /* NULL: no layer has one over the run */
+    session_image_ranges *run_ranges; /* NULL: no layer has a range over the run */
     const scene_image *image;
 } session_layer_basis;
 
-/* Collective, as ranges from the data are over all ranks. All ranks first agree on the error that each one's *error
- * holds; on an error nothing is left to free. If only this rank's memory for colours is lacking, *error says so for the
- * next agreement. */
+/* Computes an image's layers. Collective, as ranges from the data are over all ranks. All ranks first agree on the
+ * error in each one's *error; on an error nothing is left to free. If only this rank lacks memory for colours, *error
+ * is set for the next agreement. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

@@ -1,5 +1,4 @@
-/* Turns the scene's view into the renderer's numbers. It is arithmetic on what all ranks have, so nothing is exchanged.
- */
+/* Computes the renderer's numbers from the scene's view. All ranks have the same input, so nothing is exchanged. */
 #include "session_view.h"
 
 #include <math.h>
@@ -32,11 +31,12 @@ static void make_lights(const scene_image *image, const render_camera *camera, r
     }
 }
 
-/* The finest step by default, as a share of the half diagonal: some 500,000 samples across the scene. Cells as thin as
- * needles may be smaller. */
+/* Smallest default step, as a share of the half diagonal: some 500,000 samples across the scene. Cells of extreme
+ * aspect ratio may be smaller. */
 static const double finest_step = 4e-6;
 
-/* Cells of no volume have no size: then a hundredth of the diagonal takes its place. */
+/* Returns the distance between samples. If no cell has a volume, a hundredth of the diagonal takes the place of the
+ * cells' size. */
 static double sample_distance(const session_extent *extent, const scene_image *image)
 {
     if (image->step > 0) return image->step;
@@ -45,7 +45,8 @@ static double sample_distance(const session_extent *extent, const scene_image *i
     return image->step_cells < SCENE_STEP_CELLS ? step : fmax(step, finest_step * extent->half_diagonal);
 }
 
-/* A tenth of the diagonal by default. If that is 0, any radius will do, as nothing is near. */
+/* Returns the radius of occlusion, by default a tenth of the diagonal. If that is 0, the radius does not matter, as
+ * nothing is near. */
 static double occlusion_radius(const session_extent *extent, const scene_image *image)
 {
     if (image->occlusion_radius > 0) return image->occlusion_radius;
@@ -68,11 +69,11 @@ static void fill_view(const session_space *space, const scene_image *image, sess
 
 /* ---- time ---------------------------------------------------------------------------------------------------- */
 
-/* Nanoseconds that a sample takes on one thread: 27 to 240 ns as measured, on all types of cells, where there are many
- * rays and few. */
+/* Duration of a sample on one thread: 27 to 240 ns were measured, on all types of cells, with many rays and with
+ * few. */
 static const double sample_seconds = 1e-7;
 
-/* The length of the pixel's ray within the bounds. */
+/* Returns the length of the pixel's ray within the bounds. */
 static double chord_of_bounds(const session_extent *e, const render_camera *camera, int x, int y)
 {
     double base[3], direction[3], begin = 0, end = INFINITY;
@@ -80,13 +81,14 @@ static double chord_of_bounds(const session_extent *e, const render_camera *came
     for (int axis = 0; axis < 3; axis++) {
         const double a = (e->lower[axis] - base[axis]) / direction[axis];
         const double b = (e->upper[axis] - base[axis]) / direction[axis];
-        begin = fmax(begin, fmin(a, b)); /* parallel to the faces: infinities of the right signs, or NaN, passed over */
+        /* for a ray parallel to the faces a and b are infinities with the right signs, or NaN, which fmin() ignores */
+        begin = fmax(begin, fmin(a, b));
         end = fmin(end, fmax(a, b));
     }
     return end > begin ? (end - begin) * vector3_length(direction) : 0;
 }
 
-/* Counts the samples of all rays on all ranks as if the bounds were full of cells and nothing hid a sample. */
+/* Returns the number of samples of all rays on all ranks if the bounds were full of cells and nothing hid a sample. */
 static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
 {
     enum { PROBES = 16 };
@@ -116,13 +118,14 @@ static insitu_status check_time(const session_extent *e, const char *scene_path,
                      image->max_seconds);
 }
 
-/* ---- views that see nothing ---------------------------------------------------------------------------------- */
+/* ---- views without data -------------------------------------------------------------------------------------- */
 
-/* Where the corners of the bounds lie in the picture. */
+/* Positions of the bounds' corners in the picture. */
 typedef struct corner_bounds {
-    double low[2], high[2]; /* bounds of the corners in front of the eye, in the picture, whose borders are -1 and 1 */
-    int behind;             /* corners */
-    bool is_beside;         /* all of them beyond one border */
+    /* bounds of the corners in front of the eye, in the picture, whose borders are at -1 and 1 */
+    double low[2], high[2];
+    int behind;     /* number of corners behind the eye */
+    bool is_beside; /* all corners are beyond one border */
 } corner_bounds;
 
 static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
@@ -148,7 +151,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
     return b;
 }
 
-/* The reason why nothing is in view, or NULL where something may be. */
+/* Returns the reason why no data is in view, or NULL if some may be. */
 static const char *why_unseen(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);
@@ -170,7 +173,7 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
                  why ? why : "");
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all of the view ----------------------------------------------------------------------------------------- */
 
 insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
                                 const session_team *team, session_report *report, session_view *out, base_error *error)
