@@ -1,4 +1,4 @@
-/* Results that depend on a scalar's values are stale only where the values differ from those before. */
+/* Results that depend on a scalar's values are stale only if the values have changed. */
 #include "session_checksums.h"
 
 #include <string.h>
@@ -14,7 +14,8 @@ static uint64_t mix(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Sums in several independent lanes, since each multiplication waits for the one before in its lane. */
+/* Computes the checksum in several independent lanes, since each multiplication depends on the previous one in its
+ * lane. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -53,7 +54,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
             const char *data = a->data + first * a->stride;
             const uint64_t own =
                 a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
-            sum += mix(own, (uint64_t)block); /* a sum, so that the order of the blocks does not matter */
+            sum += mix(own, (uint64_t)block); /* the order of the blocks does not affect a sum */
         }
         region_leave();
     }
@@ -72,7 +73,8 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     return sum;
 }
 
-/* A cell's own value is part of it, since losing that may leave the means at its vertices unchanged. */
+/* Returns the checksum of a scalar. It includes the cells' own values: if these become NaN, the means at their vertices
+ * may stay the same. */
 static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_scalar_field(mesh, scalar);
@@ -101,7 +103,7 @@ static uint64_t sample_of(const session_mesh *mesh, const session_scalar *scalar
     return field.own ? sample_field(sum, mesh, field.own) : sum;
 }
 
-/* Trees have the ranges of the old values while rays read the new ones. */
+/* Warns if values have changed in place: trees have the ranges of the old values while rays read the new ones. */
 static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, session_report *report)
 {
     if (session_is_distance(scalar)) return;

@@ -8,7 +8,7 @@
 #include "session_agree.h"
 #include "session_scalars.h"
 
-/* ---- which planes -------------------------------------------------------------------------------------------- */
+/* ---- planes -------------------------------------------------------------------------------------------------- */
 
 static void move_along(const double from[3], const double normal[3], double offset, double out[3])
 {
@@ -64,7 +64,7 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
     return scalar;
 }
 
-/* A plane through the middle of the data goes with their bounds. */
+/* Moves a plane through the middle of the data if the bounds have changed. */
 static void follow_data(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
 {
     double point[3];
@@ -130,8 +130,9 @@ void session_update_distances(const session_meshes *meshes, const session_team *
     }
 }
 
-/* A crossing belongs to the cell that reaches the distance from below, so the least distance of all has no crossing. A
- * tenth of the tolerance more can be told from it in single precision, but is too little to be seen in the scene. */
+/* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so the minimum
+ * of all distances has no crossing. A tenth of the tolerance above it is distinguishable from it in float32, but
+ * invisible in the scene. */
 double session_slice_distance(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;

@@ -1,5 +1,5 @@
-/* MPI counts are ints: words are 8 bytes, so that a rank may send another 16 GiB at once; beyond that it is an error on
- * all ranks, not an overflow. */
+/* MPI counts are ints. Words have 8 bytes, so that a rank can send another up to 16 GiB at once; more is an error on
+ * all ranks instead of an overflow. */
 #include "session_exchange.h"
 
 #include <string.h>
@@ -58,10 +58,11 @@ void session_mail_free(session_mail *mail)
     *mail = (session_mail){0};
 }
 
-/* ---- mail ------------------------------------------------------------------------------------------------------ */
+/* ---- messages -------------------------------------------------------------------------------------------------- */
 
-/* Messages are found as they come (Hoefler et al. 2010): sends are synchronous, so that a rank whose sends are complete
- * knows that theirs have arrived, and joins a reduction; when that is complete all have. */
+/* A received message. Ranks do not know in advance who sends to them (Hoefler et al. 2010): sends are synchronous, so
+ * that a rank whose sends are complete knows that they have been received, and joins a non-blocking reduction; when
+ * that is complete all messages have been received. */
 typedef struct letter {
     struct letter *next;
     int from;
@@ -113,7 +114,8 @@ static letter *letter_create(delivery *d, int from, int64_t count)
     return d->letters = l;
 }
 
-/* Where there is no room, the sender is told that its message has come, and the rest of it is dropped. */
+/* Receives a message. If there is no memory, it is received with length 0, so that the sender can complete, and its
+ * data is dropped. */
 static void receive(delivery *d, const MPI_Status *found, base_error *error)
 {
     int count = 0;
@@ -127,11 +129,12 @@ static void receive(delivery *d, const MPI_Status *found, base_error *error)
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks", (long long)count * 8);
 }
 
-/* Receives until all ranks' messages have come. *failed: the lowest rank that had failed before; ranks: none. */
+/* Receives until all ranks' messages have been received. *failed: the lowest rank that had failed before; `ranks` if
+ * none had. */
 static insitu_status receive_all(delivery *d, int *failed, base_error *error)
 {
     int own = error->status ? d->rank : d->ranks, has_joined = 0, is_over = 0;
-    base_error lost = {0}; /* in receiving */
+    base_error lost = {0}; /* error in receiving */
     MPI_Request all = MPI_REQUEST_NULL;
     insitu_status status = INSITU_OK;
     while (!status && !is_over) {
@@ -154,7 +157,7 @@ static insitu_status receive_all(delivery *d, int *failed, base_error *error)
     return status;
 }
 
-/* This rank's words for itself are a letter, too. */
+/* Adds this rank's words for itself as a message, too. */
 static void keep_own(delivery *d, const session_mail *out, base_error *error)
 {
     const uint64_t *words = out->words;
@@ -168,7 +171,7 @@ static void keep_own(delivery *d, const session_mail *out, base_error *error)
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data", (long long)count * 8);
 }
 
-/* Puts letters in the order of ranks. */
+/* Concatenates the messages in the order of ranks. */
 static void open_letters(const delivery *d, session_mail *in, base_error *error)
 {
     int64_t *starts = base_calloc((size_t)d->ranks + 1, sizeof *starts);

@@ -16,7 +16,7 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
     return field;
 }
 
-/* Entries of connectivity that are vertices of cells. */
+/* Returns the number of entries of connectivity that are vertices of cells. */
 int64_t session_corner_count(const insitu_mesh *mesh)
 {
     if (mesh->cell_count == 0) return 0;
@@ -24,7 +24,8 @@ int64_t session_corner_count(const insitu_mesh *mesh)
     return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
 }
 
-/* Counts vertices, cells or corners of the mesh; for corners in rows, all entries from the first to the last corner. */
+/* Returns the number of the mesh's vertices, cells or corners; for corners in rows, of all entries from the first to
+ * the last corner. */
 int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
@@ -38,7 +39,7 @@ static const char *place_words(insitu_centring centring)
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
-/* An array without elements may have no address: then its type tells. */
+/* Returns whether the field has an index. An array without elements may have no address: then its type decides. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
@@ -76,7 +77,7 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
                                     "components of values", error);
 }
 
-/* Mixed cells are looked at when they are torn. */
+/* Checks a field at corners. Mixed cells are checked when they are torn. */
 static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const long long row = field->corner_row, vertices = grid_type_vertices((int)mesh->cell_type);
@@ -124,7 +125,7 @@ static insitu_status check_patch_arrays(const insitu_patch *patch, int component
                                     "components of values", error);
 }
 
-/* Checks how the patch names its faces, and its values. */
+/* Checks how the patch identifies its faces, and its values. */
 static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, int components, base_error *error)
 {
     const bool has_vertices = patch->connectivity.data != NULL;
@@ -170,7 +171,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     return INSITU_OK;
 }
 
-/* Checks a field that is filled on demand, before fill is called. */
+/* Checks a field with a fill function, before it is called. */
 static insitu_status check_fill(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
@@ -306,7 +307,7 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
                           field->given.component_count != given->component_count || field->problem.status;
     const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same;
     if (is_other) {
-        /* The scalars' components may have changed their meaning. */
+        /* The scalars' components may mean something else now. */
         session_drop_scalars(mesh);
         field->version++;
         meshes->are_names_changed = true;
@@ -328,7 +329,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     base_error what = {0};
     session_field *field = &mesh->fields[index];
     if (field->is_derived) {
-        /* The caller takes the name of a derived field: session_name_derived() tells. */
+        /* The caller uses the name of a derived field; session_name_derived() reports that. */
         session_drop_copy(field);
         *field = (session_field){.given = {.name = field->given.name}};
     }
@@ -346,9 +347,8 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     return error->status;
 }
 
-/* The mesh's own error is what the next step has to return. Images that show the field need the mesh, and are not
- * drawn.
- */
+/* Refuses a field whose mesh was refused. The next step returns the mesh's own error. Images that show the field need
+ * the mesh, and are not drawn. */
 static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, const char *name, base_error *error)
 {
     if (session_find_field(mesh, name) < 0 && !add_field(mesh, name, error)) {
@@ -375,7 +375,7 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, const 
     return error->status;
 }
 
-/* Checks that the fields of scalars and statistics are as they were promised. */
+/* Checks that the filled field has the centring and components that were declared. */
 static insitu_status check_filled(const session_mesh *mesh, const insitu_field *promised, const insitu_field *filled,
                                   base_error *error)
 {

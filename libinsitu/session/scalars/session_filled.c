@@ -28,7 +28,7 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* A fill that has failed is an error for all that need the field. */
+/* Calls the field's fill function once per step. If it has failed, its error is returned to all users of the field. */
 static insitu_status fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];

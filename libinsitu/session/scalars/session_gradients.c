@@ -1,21 +1,23 @@
-/* Every corner of a cell gives the gradient of the linear function through the corner's value and those at the other
- * ends of its three edges. A pyramid's apex has four edges, and gives one for each three of them. A corner of a
- * polyhedron's face gives one by its two edges there and the line to the cell's centre, which has the mean of the
- * vertices' places and values. A corner of a shell gives one by its two edges and a normal along which nothing changes.
- * So a linear field has its own gradient everywhere, and vertices on a boundary get theirs from the cells on one side.
+/* Every corner of a cell contributes the gradient of the linear function through the value at the corner and those at
+ * the other ends of its three edges. A pyramid's apex has four edges, and contributes a gradient for each three of
+ * them. A corner of a polyhedron's face contributes one by its two edges there and the line to the cell's centre, which
+ * has the mean of the vertices' positions and values. At a corner of a shell the gradient is computed from its two
+ * edges and the normal, along which the field is taken as constant. So a linear field has its own gradient everywhere,
+ * and vertices on a boundary get theirs from the cells on one side.
  *
  * A corner's weight is its determinant over the fourth power of its edges' length l = sqrt(|a|² + |b|² + |c|²). The
- * share of the determinant in l³ tells a good shape from a sliver, which counts for nothing; 1 / l weighs small cells
- * more, whose gradients belong to nearer places. In a mesh whose cells double their size at a vertex the errors of
- * first order cancel. Weight times gradient is a sum of cross products: nothing is divided by a determinant.
+ * ratio of the determinant to l³ distinguishes a good shape from a sliver, whose weight is almost 0; the factor 1 / l
+ * gives small cells more weight, whose gradients belong to nearer positions. In a mesh whose cells double their size at
+ * a vertex the errors of first order cancel. Weight times gradient is a sum of cross products: there is no division by
+ * a determinant.
  *
- * Edges are taken in the order of coordinates, and each corner's numbers are rounded to whole ones before they are
- * summed. So the order of cells, of their vertices and of ranks does not matter. The unit follows from bounds that all
- * ranks share: with R the largest rise along an edge and l the least length of a corner, no weight is above 3^-1.5 / l,
- * and no weighted gradient above R / l²: a cross product of two edges is at most half of their squares' sum, so that
- * three, times rises of at most R, come to R l². The last bit is 2^-86 of the bound, so that fields that change little
- * from vertex to vertex keep what doubles hold. Corners shorter than 2^-32 of the scene count for nothing, since a unit
- * for them would be too coarse for all others. 2^19 corners have room at one vertex. */
+ * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed. So the
+ * result does not depend on the order of cells, of their vertices, or of ranks. The unit follows from bounds that all
+ * ranks share: with R the largest rise along an edge and l the least length of a corner, no weight exceeds 3^-1.5 / l,
+ * and no weighted gradient exceeds R / l²: a cross product of two edges is at most half of the sum of their squares, so
+ * that three, times rises of at most R, sum to R l². The last bit is 2^-86 of the bound, so that fields that change
+ * little from vertex to vertex keep the precision of doubles. Corners shorter than 2^-32 of the scene do not count,
+ * since a unit for them would be too coarse for all others. A sum can hold 2^19 corners at one vertex. */
 #include "session_gradients.h"
 
 #include <omp.h>
@@ -38,11 +40,11 @@ typedef struct node {
     int64_t vertex;
 } node;
 
-/* Pairs of numbers that are rounded and summed at once. */
+/* Pairs of numbers that are rounded and summed together. */
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* The receiver of corners: it sums them, or without sums finds their bounds. */
+/* The receiver of corners: it sums them, or, if sums is NULL, computes their bounds. */
 typedef struct target {
     const session_gradient_basis *basis;
     int64_t *sums;
@@ -53,10 +55,10 @@ typedef struct target {
     session_gradient_bounds bounds;
 } target;
 
-/* ---- whole numbers ------------------------------------------------------------------------------------------- */
+/* ---- integers ------------------------------------------------------------------------------------------------ */
 
-/* Returns the power of two by which numbers up to largest come to HIGH_BITS bits; 0, so that all are 0, where there is
- * none. */
+/* Returns the power of two that scales numbers up to largest to HIGH_BITS bits; 0, which makes all of them 0, if there
+ * is none. */
 static double unit_of(double largest)
 {
     int exponent = 0;
@@ -145,8 +147,8 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
     if (1 / squares > to->bounds.sharpness) to->bounds.sharpness = 1 / squares;
 }
 
-/* Adds a corner by its three edges, which are in order, and how much the fields rise along them. Mirrored ends change
- * the signs of both the sum and the determinant. */
+/* Adds a corner, from its three sorted edges and the rises of the fields along them. A mirrored order of the edges'
+ * ends changes the signs of both the sum and the determinant. */
 static inline __attribute__((always_inline)) void give_edges(target *to, int64_t vertex, const double edge[3][3],
                                                              const double rise[3][SESSION_GRADIENTS], int field_count)
 {
@@ -190,7 +192,7 @@ static inline __attribute__((always_inline)) void give_corner(target *to, const 
     give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
 }
 
-/* As above, of a shell: the third edge is the normal, as long as the others. It has either sign. */
+/* Adds a corner of a shell: the third edge is the normal, of the others' length and either sign. */
 static void give_shell_corner(target *to, const node *corner, const node *p, const node *q)
 {
     const int field_count = to->basis->field_count;
@@ -207,7 +209,7 @@ static void give_shell_corner(target *to, const node *corner, const node *p, con
     give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
 }
 
-/* Reads a vertex, in lengths; false where a value is not finite. */
+/* Reads a vertex, with its position in units of `length`; returns false if a value is not finite. */
 static inline __attribute__((always_inline)) bool take_node(const session_gradient_basis *basis, int64_t vertex,
                                                             double scale, int field_count, node *out)
 {
@@ -218,7 +220,7 @@ static inline __attribute__((always_inline)) bool take_node(const session_gradie
     return isfinite(sum);
 }
 
-/* Corners of cells of a fixed number of vertices: the corner, and the ends of three edges. */
+/* Corners of cells with a fixed number of vertices: the corner, and the ends of its three edges. */
 static const signed char tet_corners[][4] = {{0, 1, 2, 3}, {1, 0, 2, 3}, {2, 0, 1, 3}, {3, 0, 1, 2}};
 static const signed char hex_corners[][4] = {{0, 1, 3, 4}, {1, 0, 2, 5}, {2, 1, 3, 6}, {3, 0, 2, 7},
                                              {4, 5, 7, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 4, 6, 3}};
@@ -255,7 +257,7 @@ static inline __attribute__((always_inline)) void give_typed(target *to, int64_t
     }
 }
 
-/* A cell of a type with a fixed number of vertices. */
+/* Adds the corners of a cell of a type with a fixed number of vertices. */
 static void give_solid(target *to, int64_t cell, int type)
 {
     switch (to->basis->field_count) {
@@ -267,7 +269,7 @@ static void give_solid(target *to, int64_t cell, int type)
 
 /* ---- polyhedra and shells ------------------------------------------------------------------------------------- */
 
-/* A thread's room for the vertices of one cell. */
+/* A thread's buffer for the vertices of one cell. */
 typedef struct node_list {
     node *nodes;
     int64_t count, capacity;
@@ -297,7 +299,7 @@ static bool add_node(node_list *list, target *to, int64_t vertex)
     return take_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
 }
 
-/* Lists the vertices of the cell as it has them. False where a value is not finite, or memory ran out. */
+/* Lists the vertices of the cell in its own order. Returns false if a value is not finite, or memory ran out. */
 static bool list_nodes(node_list *list, target *to, int64_t cell)
 {
     grid_walk walk = grid_walk_cell(to->basis->cells, cell);
@@ -308,7 +310,7 @@ static bool list_nodes(node_list *list, target *to, int64_t cell)
     return list->count > 0;
 }
 
-/* The mean of the vertices, each once, in the order of coordinates. */
+/* Returns the mean of the vertices, each counted once, summed in the order of coordinates. */
 static node centre_of(node_list *list, int field_count)
 {
     node centre = {.vertex = -1};
@@ -336,7 +338,7 @@ static void give_polyhedron(target *to, int64_t cell, node_list *list)
         grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &until);
         const int64_t count = until - from;
         for (int64_t n = 0; n < count; n++) {
-            node nodes[3]; /* the one before the corner, the corner, and the one behind it */
+            node nodes[3]; /* the vertex before the corner, the corner, and the vertex behind it */
             for (int k = 0; k < 3; k++)
                 take_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
                           basis->field_count, &nodes[k]);
@@ -374,7 +376,8 @@ static bool has_entry(const session_gradient_basis *basis, int64_t cell)
     return false;
 }
 
-/* Cells are counted first, so that no list has to grow while threads fill it. */
+/* Lists the cells that have a vertex with a sum. Cells are counted first, so that no list grows while threads fill
+ * it. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };
@@ -432,7 +435,8 @@ static void give_any(target *to, int64_t cell, node_list *room)
 
 enum { NO_OWNER = 254, SHARED = 255 };
 
-/* Notes that the thread adds to the sums of the cell's vertices. If no other one does, it needs no atomic additions. */
+/* Records that the thread adds to the sums of the cell's vertices. If no other thread does, the additions need not be
+ * atomic. */
 static void own_sums(const target *to, int64_t cell)
 {
     const session_gradient_basis *basis = to->basis;
@@ -449,7 +453,7 @@ static void own_sums(const target *to, int64_t cell)
     }
 }
 
-/* Both loops share out the cells to the threads in the same way. */
+/* Adds the corners of all cells. Both loops distribute the cells among the threads in the same way. */
 static bool give_all(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
     double rise = 0, sharpness = 0;
@@ -492,7 +496,7 @@ bool session_add_gradients(const session_gradient_basis *basis, const session_ce
     double units[2];
     session_gradient_bounds unused;
     if (!owners) return false;
-    /* More threads than an owner's byte can tell apart share all sums. */
+    /* If there are more threads than a byte can number, all sums are shared. */
     memset(owners, basis->threads < NO_OWNER ? NO_OWNER : SHARED, owner_count);
     if (basis->threads > 1) to.owners = owners;
     find_units(bounds, units);

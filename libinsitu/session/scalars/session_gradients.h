@@ -1,13 +1,13 @@
-/* Gradients of fields at vertices, from the cells around them. They have the same bits for any order of the cells and
- * any ranks that have them. */
+/* Gradients of fields at vertices, from the cells around them. Their bits do not depend on the order of the cells or on
+ * the ranks that have them. */
 #ifndef SESSION_GRADIENTS_H
 #define SESSION_GRADIENTS_H
 
 #include "grid.h"
 
-enum { SESSION_GRADIENTS = 3 /* scalars at most whose gradients one pass sums */ };
+enum { SESSION_GRADIENTS = 3 /* maximum number of scalars whose gradients one pass sums */ };
 
-/* Input that sums are made from. The values are at the vertices. */
+/* Input of sums. The values are at the vertices. */
 typedef struct session_gradient_basis {
     const grid *cells;
     const grid_field *fields; /* field_count scalars */
@@ -18,9 +18,9 @@ typedef struct session_gradient_basis {
     int threads;
 } session_gradient_basis;
 
-/* A sum over the cells around a place is so many words, in whole numbers: adding two, word by word, is exact, and so
- * in any order. They are the high words of three components for each scalar, of the weights, and of none, and then the
- * low words. */
+/* A sum over the cells around a vertex consists of integer words: adding two sums word by word is exact, and so
+ * independent of the order. The words are the high words of three components for each scalar, of the weights, and of
+ * padding, and then the low words. */
 static inline int session_sum_numbers(int field_count)
 {
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;
@@ -31,32 +31,33 @@ static inline int session_sum_words(int field_count)
     return 2 * session_sum_numbers(field_count);
 }
 
-/* Bounds for what cells add to sums; over several grids or ranks they are the maximum of each. */
+/* Bounds of the numbers that cells add to sums; over several grids or ranks the maximum of each is taken. */
 typedef struct session_gradient_bounds {
-    double rise;      /* along an edge of a corner */
-    double sharpness; /* one over the sum of the squares of a corner's edges, in lengths; 0: there are no corners */
+    double rise; /* largest rise along an edge of a corner */
+    /* largest 1 / (sum of the squares of a corner's edges, in units of `length`); 0: there are no corners */
+    double sharpness;
 } session_gradient_bounds;
 
-/* Cells with a vertex that has a sum, in any order. */
+/* The cells with a vertex that has a sum, in any order. */
 typedef struct session_cell_list {
     int64_t count;
     int64_t *cells;
 } session_cell_list;
 
-/* False where memory ran out. The caller frees out->cells. Local. */
+/* Lists the cells. Returns false if memory ran out. The caller frees out->cells. Local. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out);
 
-/* The bounds of what the cells add to any sum. False where memory ran out. Local. */
+/* Computes the bounds of the numbers that the cells add to any sum. Returns false if memory ran out. Local. */
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                              session_gradient_bounds *out);
 
-/* Add what the cells give. bounds: of all grids and ranks; sums: session_sum_words() for each of entry_count. False
- * where memory ran out. Local. */
+/* Adds the cells' contributions. bounds: over all grids and ranks; sums: session_sum_words() for each of entry_count.
+ * Returns false if memory ran out. Local. */
 bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                            const session_gradient_bounds *bounds, int64_t entry_count, int64_t *sums);
 
-/* The mean gradients of a sum, in the units of values over lengths of coordinates; NaN where no cell gave one. length:
- * that of the basis. */
+/* Computes the mean gradients of a sum, in the units of values over those of coordinates; NaN if no cell contributed.
+ * length: that of the basis. */
 void session_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds, double length,
                             double out[][3]);
 

@@ -1,6 +1,6 @@
-/* Values that are found by an index are copied once into the order of the vertices, cells or corners; so are those at
- * the vertices of a torn mesh, into the order of its corners. Otherwise every tree and layer would go through the index
- * at each vertex of a cell, and kernels that take many cells at once could not be used. */
+/* Values with an index are copied once into the order of the vertices, cells or corners; values at the vertices of a
+ * torn mesh are copied into the order of its corners. Otherwise every tree and layer would follow the index at each
+ * vertex of a cell, and kernels that process many cells at once could not be used. */
 #include "session_indexed.h"
 
 #include <string.h>
@@ -53,14 +53,14 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
     return out;
 }
 
-/* The entry of the caller's arrays for a place: the number of the vertex, the cell, or the corner. */
+/* Returns the entry in the caller's arrays for a place: the number of the vertex, the cell, or the corner. */
 static int64_t entry_of(const indexed_values *v, int64_t place)
 {
     if (v->torn) return session_torn_origin(v->torn, place);
     return v->row == v->used ? place : place / v->used * v->row + place % v->used;
 }
 
-/* One tuple; false where the index is out of range. */
+/* Copies one tuple; returns false if the index is out of range. */
 static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
 {
     const int64_t entry = entry_of(v, place);
@@ -117,7 +117,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     return INSITU_OK;
 }
 
-/* Makes the copy where it is due. Scalars with values made from cells use the cells' values too. */
+/* Updates the copy if it is stale. Scalars with values averaged from cells use the cells' values too. */
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];

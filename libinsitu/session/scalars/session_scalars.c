@@ -27,7 +27,7 @@ static uint64_t joined_on(const session_mesh *mesh, const scene_field *field)
     return mesh->apart ? mesh->apart : field->joined;
 }
 
-/* joined: of recentred ones. */
+/* Finds a scalar of the mesh. joined: hash of the meshes, for recentred scalars. */
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
                                    uint64_t joined)
 {
@@ -46,7 +46,7 @@ session_scalar *session_find_recentred(const session_mesh *mesh, const char *fie
     return index < 0 ? NULL : find_scalar(mesh, index, component, true, joined);
 }
 
-/* -1 where the layer does not show the field on the mesh. */
+/* Returns the field's index on the mesh; -1 if the layer does not show it there. */
 static int find_field(const session_mesh *mesh, const scene_field *field)
 {
     return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
@@ -165,7 +165,7 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-/* Planes cut no shells. */
+/* Returns whether the extent includes shells; for distances from planes it does not, as planes do not cut shells. */
 static bool has_shells(const session_scalar *scalar, session_extent_kind kind)
 {
     return kind != SESSION_SOLID && !scalar->distances;

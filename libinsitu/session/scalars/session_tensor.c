@@ -14,7 +14,7 @@ void session_curl(const double g[3][3], double out[3])
     out[2] = g[1][0] - g[0][1];
 }
 
-/* The difference of the squares is minus half of the trace of the gradient's square. */
+/* Uses that the difference of the squares is minus half of the trace of the gradient's square. */
 double session_q_criterion(const double g[3][3])
 {
     const double squares = (g[0][0] * g[0][0] + g[1][1] * g[1][1]) + g[2][2] * g[2][2];
@@ -39,13 +39,14 @@ static double middle_eigenvalue(const double m[6])
     const double a = x / size, b = y / size, c = z / size, d = m[3] / size, e = m[4] / size, f = m[5] / size;
     const double half = 0.5 * ((a * (b * c - f * f) - d * (d * c - f * e)) + e * (d * f - b * e));
     const double third = 2 * acos(-1.0) / 3;
-    const double angle = acos(fmin(fmax(half, -1), 1)) / 3; /* 0 .. 60 degrees: the largest eigenvalue's */
+    const double angle = acos(fmin(fmax(half, -1), 1)) / 3; /* 0 .. 60 degrees: the angle of the largest eigenvalue */
     return mean + 2 * size * cos(angle - third);
 }
 
 double session_lambda2(const double g[3][3])
 {
-    /* S² + W², with the halves of the sums and differences, is half of G² and its transposed. */
+    /* S² + W², with S and W the halves of the sum and the difference of G and its transpose, is half of the sum of G²
+     * and its transpose. */
     double square[3][3], m[6];
     static const int entries[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
     for (int i = 0; i < 3; i++)

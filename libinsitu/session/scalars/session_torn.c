@@ -9,7 +9,7 @@
 #include "session_field_input.h"
 #include "session_topology.h"
 
-/* ---- which meshes -------------------------------------------------------------------------------------------- */
+/* ---- meshes with fields at corners --------------------------------------------------------------------------- */
 
 static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
 {
@@ -56,8 +56,8 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-/* Copies coordinates, packed, in their own type. Entries that no cell uses may be no vertices; they get the first one's
- * place. */
+/* Copies coordinates, packed, in their own type. Entries of connectivity that no cell uses may not be vertices; they
+ * get the first one's position. */
 static bool copy_coordinates(const grid *shared, int threads, session_torn *torn)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -104,7 +104,7 @@ static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
     return INSITU_OK;
 }
 
-/* Drops arrays that were made for other vertices. */
+/* Drops arrays that were computed for other vertices. */
 static void forget_vertices(session_meshes *meshes, session_mesh *mesh)
 {
     mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
@@ -125,7 +125,7 @@ static insitu_status update(session_meshes *meshes, session_mesh *mesh, bool is_
     return is_torn && !mesh->torn.is_made ? tear(mesh, threads, error) : INSITU_OK;
 }
 
-/* ---- all of them ----------------------------------------------------------------------------------------------- */
+/* ---- all meshes ------------------------------------------------------------------------------------------------ */
 
 static bool has_corners(const session_catalogue *catalogue)
 {
