@@ -1,4 +1,4 @@
-/* Points in cubic bins, about as many of these as there are points on a surface. */
+/* Points in cubic bins. The number of bins is about the number of points for points on a surface. */
 #ifndef SESSION_BINS_H
 #define SESSION_BINS_H
 
@@ -11,11 +11,11 @@ typedef struct session_bins {
     int64_t *starts, *items; /* the points of bin b are items[starts[b]] .. items[starts[b + 1] - 1] */
 } session_bins;
 
-/* The places of count points are stride bytes apart. False where memory runs out. */
+/* Bins count points, whose positions are stride bytes apart. Returns false if memory runs out. */
 bool session_bins_create(session_bins *bins, const double *places, int64_t stride, int64_t count);
 void session_bins_free(session_bins *bins);
 
-/* Visits the points near a box: some lie outside of it, none inside is left out.
+/* Visits the points near a box: all points inside it, and some outside.
  *
  *     for (session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin); session_next_binned(&walk, &point);)
  */

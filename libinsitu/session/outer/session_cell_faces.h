@@ -1,10 +1,10 @@
-/* The faces of a cell of any type, one after the other. A shell is its only face. */
+/* Iterates over the faces of a cell of any type. A shell is its only face. */
 #ifndef SESSION_CELL_FACES_H
 #define SESSION_CELL_FACES_H
 
 #include "grid.h"
 
-/* Quads and triangles of the types of a fixed number of vertices, in VTK's order; -1: there is no fourth vertex. */
+/* Quads and triangles of the types with a fixed number of vertices, in VTK's order; -1: there is no fourth vertex. */
 typedef struct session_face_table {
     int count;
     signed char vertices[6][4];
@@ -31,11 +31,11 @@ static inline const session_face_table *session_faces_of_type(int type)
 
 typedef struct session_cell_faces {
     const grid *cells;
-    const session_face_table *table; /* NULL: of polyhedra, and of shells but a lattice's */
+    const session_face_table *table; /* NULL for polyhedra, and for shells except those of a lattice */
     int64_t count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
-    int64_t first; /* the first entry of connectivity */
-    int64_t size;  /* the number of a shell's vertices; 0: the cell is no shell */
+    int64_t first; /* index of the first entry of connectivity */
+    int64_t size;  /* number of a shell's vertices; 0: the cell is not a shell */
 } session_cell_faces;
 
 static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t cell)
@@ -68,10 +68,10 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
     return out;
 }
 
-/* The vertices around a face: session_face_vertex() of 0 .. size - 1. */
+/* The vertices around a face; session_face_vertex() returns number 0 .. size - 1. */
 typedef struct session_face_loop {
     const session_cell_faces *faces;
-    const signed char *places; /* NULL: the entries of the list from first on */
+    const signed char *places; /* corner numbers in the cell; NULL: entries of the list from `first` on */
     const grid_array *list;
     int64_t first, size;
 } session_face_loop;

@@ -6,8 +6,8 @@
 #include "session_cell_faces.h"
 #include "vector3.h"
 
-/* Coordinates on the face are rounded to whole parts of it, from which they may be off by a hundredth of a part: 2:1,
- * 3:1 and 4:1 are exact then, however coordinates round. */
+/* Coordinates on the face are rounded to multiples of 1 / PARTS if they are within a hundredth of a part of one: 2:1,
+ * 3:1 and 4:1 are then exact, however coordinates round. */
 enum { PARTS = 96 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
@@ -35,7 +35,8 @@ double session_place_distance(const double a[3], const double b[3])
     return sqrt(vector3_dot(off, off));
 }
 
-/* side: 1 where the cell is behind the face as its places go around, -1 before it. */
+/* Computes the face's normal, bounds, area and width. side: 1 if the cell is behind the face, by the orientation of its
+ * vertices, -1 if it is in front. */
 static void measure(session_coarse_face *f, double side)
 {
     double a[3], b[3];
@@ -53,7 +54,7 @@ static void measure(session_coarse_face *f, double side)
     for (int axis = 0; axis < 3 && f->area > 0; axis++) f->normal[axis] *= side / (2 * f->area);
 }
 
-/* On which side of the face its cell is: see measure(). */
+/* Returns the side of the face on which its cell lies, as measure() takes it. */
 static double side_of(const grid *g, int64_t cell, const session_coarse_face *f)
 {
     double sums[3] = {0, 0, 0}, off[3], place[3];
@@ -174,7 +175,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
     return false;
 }
 
-/* ---- places on faces ------------------------------------------------------------------------------------------ */
+/* ---- positions on faces --------------------------------------------------------------------------------------- */
 
 bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack)
 {
@@ -183,7 +184,7 @@ bool session_is_at_corner(const session_coarse_face *face, const double place[3]
     return false;
 }
 
-/* A whole part of the face where it is one but for rounding. */
+/* Rounds a coordinate to a multiple of 1 / PARTS if it is one up to rounding. */
 static double rounded(double at)
 {
     const double parts = round(at * PARTS);
@@ -202,7 +203,7 @@ static void place_on(const session_coarse_face *f, const double at[2], double ou
     }
 }
 
-/* Newton's method, from the middle; a triangle is half of a parallelogram. */
+/* Finds the coordinates of a position by Newton's method, from the middle; a triangle is half of a parallelogram. */
 static bool solve(const session_coarse_face *f, const double place[3], double at[2])
 {
     double on[3], slopes[2][3], off[3];

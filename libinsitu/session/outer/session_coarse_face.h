@@ -1,4 +1,4 @@
-/* Triangles and quads of cells that vertices may hang on, and places on them. */
+/* Triangles and quads of cells on which vertices may hang, and positions on them. */
 #ifndef SESSION_COARSE_FACE_H
 #define SESSION_COARSE_FACE_H
 
@@ -6,10 +6,11 @@
 #include "session_mesh.h"
 
 typedef struct session_coarse_face {
-    int count;           /* the number of corners: 3 or 4 */
-    double places[4][3]; /* around, from the least on, towards the lesser of its neighbours; of a triangle the last is
-                            the third */
-    double normal[3];    /* has length 1 and points away from the cell */
+    int count; /* number of corners: 3 or 4 */
+    /* in loop order, beginning at the least corner towards the lesser of its neighbours; a triangle's fourth is its
+     * third */
+    double places[4][3];
+    double normal[3]; /* unit vector that points away from the cell */
     double lower[3], upper[3];
     double area, width;
 } session_coarse_face;
@@ -35,23 +36,23 @@ bool session_may_hold(const session_face_outline *outline, const double place[3]
  * area. */
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
 
-/* Write the face as words for another rank, and read it there. */
+/* Write the face as words for another rank, and read it from them. */
 void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS]);
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out);
 
-/* Tells whether the place is within slack of a corner. */
+/* Returns whether the position is within slack of a corner. */
 bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack);
 
-/* Finds the weights of the corners at the place, a triangle's last one 0; false where it is off the face by more than
- * slack. */
+/* Computes the weights of the corners at a position, with 0 for a triangle's fourth; returns false if the position is
+ * farther than slack from the face. */
 bool session_find_on_face(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
 
-/* By how much coordinates of the mesh may be rounded; 0 for NULL. */
+/* Returns an upper bound of the rounding of the mesh's coordinates; 0 for NULL. */
 double session_place_rounding(const session_mesh *mesh);
 
 double session_place_distance(const double a[3], const double b[3]);
 
-/* An order of places, and of faces by area, then by places. */
+/* Define an order of positions, and of faces by area and then by positions. */
 int session_compare_places(const double a[3], const double b[3]);
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
 

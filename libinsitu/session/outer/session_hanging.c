@@ -12,41 +12,42 @@
 #include "session_twins.h"
 #include "vector3.h"
 
-/* The share of a face's width by which a vertex may be off it: roundings of codes that compute hanging vertices in
- * other ways. Vertices that hang are an eighth of it apart, or more. Ranks' boxes are widened by as much
- * (session_homes.h). */
+/* Distance, as a share of a face's width, within which a vertex counts as lying on the face: it covers the rounding of
+ * codes that compute hanging vertices in other ways. Hanging vertices are at least an eighth of the width apart. Ranks'
+ * boxes are extended by the same share (session_homes.h). */
 static const double place_slack = 1e-5;
 
-/* A face must have that much more area than those whose corner a vertex is, for the vertex to hang on it: faces that
- * are divided once, along one side, have twice the area of their parts. */
+/* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces with the vertex as
+ * a corner: a face that is divided once, along one side, has twice the area of its parts. */
 static const double least_ratio = 1.25;
 
-/* Two faces look opposite ways where their normals' product is below this: exactly opposite ones, -1, but for bends of
- * faces that are divided; a wall at right angles, 0, but for rounding. */
+/* Two faces have opposite orientation if the product of their normals is below this. Exactly opposite faces have -1,
+ * apart from the curvature of divided faces; a wall at right angles has 0, up to rounding. */
 static const double opposite = -0.1;
 
 enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
     session_coarse_face face;
-    int64_t groups[4]; /* the groups if the face is this rank's own; else -1 */
-    int source;        /* the rank that sent it, */
-    int64_t number;    /* and its place in that rank's message */
+    int64_t groups[4]; /* the groups of the corners if the face is this rank's own; else -1 */
+    int source;        /* the rank that sent the face */
+    int64_t number;    /* its index in that rank's message */
 } searched_face;
 
-/* A vertex, and the faces that were found at it. */
+/* A vertex that may hang, and the faces that were found at it. */
 typedef struct candidate {
     double place[3];
     int64_t group;
-    int64_t hits, corners; /* the last of the faces that it lies on, and of those that have it as a corner; -1: none */
-    int64_t face;          /* the one that it hangs on; -1: none */
+    /* heads of two linked lists of contacts: faces that it lies on, and faces that it is a corner of; -1: empty */
+    int64_t hits, corners;
+    int64_t face; /* the face on which it hangs; -1: none */
     double weights[4];
 } candidate;
 
-/* A face at a candidate, and the one listed before. */
+/* A face at a candidate, and the contact listed before it. */
 typedef struct contact {
     int64_t face, last;
-    double weights[4]; /* where the candidate is no corner */
+    double weights[4]; /* set if the candidate is not a corner of the face */
 } contact;
 
 typedef struct hanging_search {
@@ -56,10 +57,10 @@ typedef struct hanging_search {
     int64_t face_count, own_count, candidate_count, face_room;
     searched_face *faces; /* this rank's that were read at first, then received ones, then this rank's others */
     candidate *candidates;
-    double rounding; /* the rounding of coordinates */
+    double rounding; /* bound of the rounding of coordinates */
     int64_t contact_count, contact_room;
     contact *contacts;
-    session_bins bins; /* hold the candidates */
+    session_bins bins; /* bins of the candidates */
 } hanging_search;
 
 static void search_free(hanging_search *s)
@@ -90,7 +91,7 @@ static bool keep_border(const session_mesh *mesh, session_outer *outer, const un
     return true;
 }
 
-/* mesh: NULL where this rank has no part. */
+/* Updates a mesh's border. mesh: NULL if this rank has no part of it. */
 static insitu_status update_border(const session_mesh *mesh, const session_catalogue_mesh *of, session_border *border,
                                    const session_team *team, base_error *error)
 {
@@ -338,7 +339,7 @@ static bool take_faces(hanging_search *s, const session_mail *in)
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
 
-/* Lists the face at the candidate, behind *last. */
+/* Adds the face to one of the candidate's lists, whose head is *last. */
 static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *last)
 {
     if (s->contact_count == s->contact_room) {
@@ -355,7 +356,7 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
     return true;
 }
 
-/* Lists the face with those that the candidate lies on. */
+/* Adds the face to the list of faces on which the candidate lies, if it does. */
 static bool try_hit(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -365,7 +366,7 @@ static bool try_hit(hanging_search *s, int64_t number, candidate *c)
     return add_contact(s, number, weights, &c->hits);
 }
 
-/* Lists the face with those that have the candidate as a corner, if that lies on a face. */
+/* Adds the face to the list of faces with the candidate as a corner, if the candidate lies on some face. */
 static bool try_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -387,7 +388,8 @@ static bool try_faces(hanging_search *s, try_function *try_one)
     return is_done;
 }
 
-/* The largest area of the faces with the candidate as a corner that look against the face; 0: there are none. */
+/* Returns the largest area of the faces that have the candidate as a corner and face the opposite way; 0 if there are
+ * none. */
 static double area_against(const hanging_search *s, const candidate *c, const session_coarse_face *f)
 {
     double area = 0;
@@ -418,10 +420,10 @@ static bool find_contacts(hanging_search *s)
     return is_done;
 }
 
-/* ---- what is kept --------------------------------------------------------------------------------------------- */
+/* ---- results -------------------------------------------------------------------------------------------------- */
 
-/* Marks the received faces that are used, and writes their numbers to their ranks. firsts: the place of each used
- * face's first value among those that will come. */
+/* Requests the received faces that are used: packs their numbers for the ranks that sent them. firsts: per used face,
+ * the index of its first value among those that will be received. */
 static bool want_faces(const hanging_search *s, session_mail *wanted, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
@@ -459,7 +461,7 @@ static bool keep_vertices(const hanging_search *s, const int64_t *firsts, sessio
     return true;
 }
 
-/* requests: numbers of faces of this rank's message to each rank, whose values it wants. */
+/* Stores which values other ranks request. requests: for each rank, numbers of faces in this rank's message to it. */
 static bool keep_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                           const session_mail *requests, session_hanging *out)
 {
@@ -480,9 +482,10 @@ static bool keep_requests(const hanging_search *s, const session_mail *mail, con
     return true;
 }
 
-/* ---- finding -------------------------------------------------------------------------------------------------- */
+/* ---- search --------------------------------------------------------------------------------------------------- */
 
-/* What fails here alone stays in *error. */
+/* Finds the hanging vertices, with faces of other ranks. Errors of this rank alone are stored in *error and not
+ * returned. */
 static insitu_status find_shared(hanging_search *s, session_hanging *out, base_error *error)
 {
     session_mail faces = {0}, in = {0}, wanted = {0}, requests = {0};
@@ -543,7 +546,7 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 
 /* ---- values --------------------------------------------------------------------------------------------------- */
 
-/* Returns whether a value changed. */
+/* Sets the hanging vertices to their faces' values. Returns whether a value changed. */
 static bool constrain(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;
@@ -559,7 +562,7 @@ static bool constrain(const session_hanging *hanging, const double *received, do
     return is_changed;
 }
 
-/* One round; *is_changed: on any rank. */
+/* Exchanges values and sets the hanging vertices once. *is_changed: a value changed on some rank. */
 static insitu_status constrain_once(const session_hanging *hanging, const session_team *team, double *means,
                                     int *is_changed, base_error *error)
 {

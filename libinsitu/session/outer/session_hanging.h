@@ -1,28 +1,29 @@
-/* Vertices that hang on a larger cell's face, and their values.
+/* Vertices that hang on the face of a larger cell, and their values.
  *
- * Where cells are refined, a vertex of small cells lies on a triangle or quad of a large cell, or on its edge, and is
- * no vertex of that cell. The mean over the cells around such a vertex is not what the large cell has there, so that an
- * isosurface would be torn; the value that it takes instead is the face's own, linear or bilinear in its corners.
+ * Where a mesh is refined, a vertex of small cells lies on a triangle or quad of a large cell, or on its edge, without
+ * being a vertex of that cell. The mean over the cells around such a vertex differs from the large cell's value there,
+ * so that an isosurface would have gaps. Therefore the vertex takes the face's own value, which is linear or bilinear
+ * in its corners' values.
  *
- * A face that one cell alone has, of all ranks' parts of its mesh, may bear hanging vertices; the vertices are among
- * those of faces that a rank has once. A vertex hangs on a face that holds it where faces with this vertex as a corner
- * look the other way and are all smaller: then it lies between a large cell and small ones, and not beside both, as on
- * a wall along which two meshes overlap. Of several such faces it takes the largest. Faces' corners may hang
- * themselves, on larger faces still. Which face it is, and where on it a vertex is, is found from places alone, the
- * same on all ranks, and in whichever mesh of a joint the face is. */
+ * Vertices may hang on faces that only one cell has, over all ranks' parts of its mesh. Vertices that may hang are
+ * those of faces that a rank has once. A vertex hangs on a face that contains it if faces with this vertex as a corner
+ * face the opposite way and are all smaller: then it lies between a large cell and small ones, and not beside both, as
+ * on a wall along which two meshes overlap. Of several such faces the largest is used. Faces' corners may hang
+ * themselves, on still larger faces. The face, and the vertex's position on it, are determined from coordinates alone,
+ * with the same result on all ranks, whichever mesh of a joint has the face. */
 #ifndef SESSION_HANGING_H
 #define SESSION_HANGING_H
 
 #include "session_catalogue.h"
 #include "session_exchange.h"
 
-/* This rank's vertices, those that are the same one in one group. Vertices of the meshes of the joint, and the groups
- * of their drawn cells' vertices, are numbered through. */
+/* This rank's vertices; equal vertices are in one group. Vertices of the joint's meshes, and the groups of their drawn
+ * cells' vertices, are numbered consecutively. */
 typedef struct session_hanging_basis {
     session_joint *joint;
     const session_mesh *const *meshes; /* the joint's meshes; NULL: this rank has no part of one */
-    const int64_t *firsts;             /* the number of each one's first vertex */
-    const int64_t *of_vertex;          /* the group of each vertex; -1: of no drawn cell */
+    const int64_t *firsts;             /* per mesh, the number of its first vertex */
+    const int64_t *of_vertex;          /* per vertex, its group; -1: it belongs to no drawn cell */
     int64_t group_count;
 } session_hanging_basis;
 
@@ -31,11 +32,11 @@ typedef struct session_hanging_basis {
 insitu_status session_update_borders(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
                                      base_error *error);
 
-/* Finds the joint's hanging vertices where they are not known. Its borders are. Collective, agreed. */
+/* Updates the joint's hanging vertices, unless they are up to date. Its borders must be. Collective, agreed. */
 insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error);
 
-/* Gives hanging vertices their faces' values. means: of the groups. Where a face's own values are not finite, vertices
- * keep theirs. Collective, agreed. */
+/* Sets hanging vertices to their faces' values. means: of the groups. If a face's own values are not finite, its
+ * hanging vertices keep theirs. Collective, agreed. */
 insitu_status session_constrain_hanging(const session_hanging *hanging, const session_team *team, double *means,
                                         base_error *error);
 

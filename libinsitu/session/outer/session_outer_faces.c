@@ -4,11 +4,10 @@
  * first three power sums of their vertices' hashes. So memory is needed for vertices and outer faces, not for all
  * faces, and most cells are seen twice and no more.
  *
- * Shells are faces that are always kept. One that lies on a cell's outer face replaces it, so that only one is drawn
- * there.
+ * Shells are faces that are always kept. A shell on a cell's outer face replaces it, so that only one is drawn there.
  *
- * Of the faces that a rank has once, those in other ranks' boxes go to their home (session_homes.h), which counts them
- * for all. */
+ * A face that occurs once on a rank and lies in another rank's box is sent to its home rank (session_homes.h), which
+ * counts it over all ranks. */
 #include "session_outer_faces.h"
 
 #include <omp.h>
@@ -38,7 +37,7 @@ typedef struct face_search {
     session_face *faces; /* that may be outer ones, in the order of cells */
     session_key *keys;
     int64_t *groups; /* faces with equal keys share a group */
-    int64_t *sizes;  /* the number of faces in each group */
+    int64_t *sizes;  /* number of faces in each group */
 } face_search;
 
 static void search_free(face_search *s)
@@ -310,7 +309,7 @@ static bool collect_faces(face_search *s)
     return is_done;
 }
 
-/* Counts the groups of equal keys, and their sizes. */
+/* Finds the groups of equal keys, and their sizes. */
 static bool count_keys(const session_key *keys, int64_t count, int64_t **groups, int64_t **sizes)
 {
     session_key_table table = {0};
@@ -341,8 +340,8 @@ static void keep_single_faces(face_search *s)
     s->count = kept;
 }
 
-/* Finds no faces where this rank has no part of the mesh, or one without cells: that may lack the ids that all cells'
- * vertices have. */
+/* Searches this rank's faces. There are none if this rank has no part of the mesh, or a part without cells, which may
+ * lack the ids that all cells' vertices have. */
 static insitu_status search_own(face_search *s, const session_outer *outer, bool by_id, base_error *error)
 {
     if (!s->mesh || s->mesh->cells.cell_count == 0) return INSITU_OK;
@@ -371,12 +370,12 @@ static insitu_status search_own(face_search *s, const session_outer *outer, bool
     return INSITU_OK;
 }
 
-/* ---- what ranks share ---------------------------------------------------------------------------------------- */
+/* ---- faces of several ranks ---------------------------------------------------------------------------------- */
 
 enum { KEY_WORDS = 3 };
 
-/* Returns the home of a face whose vertices are all in other ranks' boxes, or -1 where it is this rank's alone. The
- * home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
+/* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have it.
+ * The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
 static int home_of(const face_search *s, const session_homes *homes, int64_t face)
 {
     const session_cell_faces faces = session_faces_of_cell(&s->mesh->cells, s->faces[face].cell);
@@ -394,7 +393,7 @@ static int home_of(const face_search *s, const session_homes *homes, int64_t fac
     return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[face]), (int64_t)key.words[0]);
 }
 
-/* Packs the keys of faces in other ranks' boxes by their homes. order gets the face of each key. */
+/* Packs the keys of faces in other ranks' boxes by their homes. *order: the face of each key. */
 static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
     int64_t *places = base_calloc((size_t)ranks + 1, sizeof *places);
@@ -424,7 +423,7 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
     return is_done;
 }
 
-/* Answers for each key how often it came. */
+/* Computes the reply to each key: the number of its occurrences. */
 static bool answer_keys(const session_mail *in, int ranks, session_mail *reply)
 {
     const int64_t count = in->total / KEY_WORDS;

@@ -12,8 +12,8 @@
 
 /* ---- one face ------------------------------------------------------------------------------------------------ */
 
-/* Three or four corners. Their order depends on their places alone: it begins at the least corner, and goes towards the
- * lesser of its neighbours. */
+/* A face with three or four corners. Their order depends only on their positions: it begins at the least corner,
+ * towards the lesser of its neighbours. */
 typedef struct corner_loop {
     int count;
     int64_t vertices[4];
@@ -55,7 +55,7 @@ static void subtract(const double a[3], const double b[3], double out[3])
     for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
 }
 
-/* Finds the normal, whose length is twice the area. */
+/* Computes the normal, whose length is twice the area. */
 static void find_normal(const corner_loop *loop, double out[3])
 {
     double a[3], b[3];
@@ -77,12 +77,13 @@ static double perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* The share of a face's width by which a point must be off the face's plane to be on one of its sides. The middle of a
- * shell is in its plane, and rounding must not decide, since it depends on where the list of vertices begins. */
+/* Distance from the face's plane, as a share of the face's width, above which a point counts as lying on one side. The
+ * middle of a shell is in its plane; rounding must not decide there, since it depends on where the list of vertices
+ * begins. */
 static const double side_slack = 1e-9;
 
-/* Puts the apex above the middle of the corners, half a mean side away, on the side of inside, or on that of the loop's
- * own normal. False where the face's area is no more than rounding. */
+/* Places the apex above the middle of the corners, at half a mean side's distance, on the side of `inside`, or of the
+ * loop's own normal. Returns false if the face's area is only rounding. */
 static bool find_apex(const corner_loop *loop, const double inside[3], double apex[3])
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
@@ -113,8 +114,8 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 
 /* ---- the mesh ------------------------------------------------------------------------------------------------ */
 
-/* A face of more than four corners, or a concave quad, which is drawn as its triangles (polygon.h). Corners that follow
- * themselves are left out. */
+/* A face with more than four corners, or a concave quad, which is drawn as its triangles (polygon.h). Repeated
+ * consecutive corners are dropped. */
 typedef struct face_polygon {
     int count;
     int64_t *vertices;
@@ -128,11 +129,11 @@ typedef struct face_polygon {
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
-    int64_t *places; /* the place among the new vertices of each of the whole mesh's; -1: it has none yet */
+    int64_t *places; /* per vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
     float *heights;
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
-    face_polygon polygon; /* with room for the largest */
-    int64_t loop_end;     /* the end of what is filled of the loops of polygons */
+    face_polygon polygon; /* has space for the largest polygon */
+    int64_t loop_end;     /* end of the filled part of the polygons' loops */
 } outer_work;
 
 static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
@@ -150,7 +151,7 @@ static int64_t place_vertex(outer_work *w, int64_t origin, const double place[3]
     return *out;
 }
 
-/* Adds a tet on a triangle, or a pyramid on a quad, whose apex is there already. */
+/* Adds a tet on a triangle, or a pyramid on a quad, whose apex has been added. */
 static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
     w->out->offsets[w->cell_count] = w->entry_count;
@@ -162,7 +163,7 @@ static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex,
     w->out->connectivity[w->entry_count++] = apex;
 }
 
-/* As above, with an apex of its own. Adds nothing where the face has no area. */
+/* As above, with a new apex. Adds nothing if the face has no area. */
 static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
 {
     double apex[3];
@@ -171,7 +172,7 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
     if (find_apex(loop, inside, apex)) add_cell_below(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
 }
 
-/* Makes a triangle and its own apex; false where it has no area. */
+/* Computes a triangle and its own apex; returns false if it has no area. */
 static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, double apex[3])
 {
     double inside[3];
@@ -186,9 +187,9 @@ static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, dou
     return find_apex(out, inside, apex);
 }
 
-/* Finds an apex for all triangles, the mean of their own. Their tets then share faces, and a ray along the line between
- * two triangles goes from one tet into the other; between separate tets it might hit neither. False where the apex is
- * not well above each triangle, because they are too far from a plane. */
+/* Computes one apex for all triangles, the mean of their own. Their tets then share faces, and a ray along the line
+ * between two triangles goes from one tet into the other; between separate tets it might hit neither. Returns false if
+ * the apex is not well above each triangle, because the triangles are too far from a common plane. */
 static bool find_common_apex(const face_polygon *p, double out[3])
 {
     corner_loop loop;
@@ -212,8 +213,8 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     return count > 0;
 }
 
-/* Finds the polygon's normal on the side of inside, or where its largest component is positive; it is about as long as
- * the polygon is wide. */
+/* Computes the polygon's normal, on the side of `inside`, or with a positive largest component; its length is about the
+ * polygon's width. */
 static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
@@ -237,7 +238,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
 }
 
-/* Adds the loop of the polygon that the cells from first on are of. */
+/* Adds the loop of the polygon to which the cells from `first` on belong. */
 static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -262,13 +263,13 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     add_loop(w, p, first);
 }
 
-/* Tells whether a face is a concave quad. Faces of hexes, wedges and pyramids are patches, whatever their form. */
+/* Returns whether a face is a concave quad. Faces of hexes, wedges and pyramids are patches, whatever their shape. */
 static bool is_concave(const session_face_loop *face, const double (*places)[3], int count)
 {
     return count == 4 && !face->places && polygon_is_concave_quad(places);
 }
 
-/* Reads the corners around a face. */
+/* Reads the corners of a face. */
 static void read_polygon(const grid *g, const session_face_loop *face, face_polygon *p)
 {
     p->count = 0;
@@ -298,11 +299,11 @@ static void add_face(outer_work *w, const session_face *face)
     add_cell(w, &loop, inside, face->cell);
 }
 
-/* The most that the faces can take. */
+/* Upper bounds of the sizes that the faces require. */
 typedef struct outer_counts {
     int64_t cells, entries; /* entries of connectivity */
     int64_t loops;          /* entries of polygons' loops */
-    int64_t corners;        /* the corners of one face */
+    int64_t corners;        /* corners of one face */
 } outer_counts;
 
 static outer_counts count_most(const grid *g, const session_outer *outer)
@@ -369,7 +370,8 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
            make_polygon_room(&w->polygon, most.corners);
 }
 
-/* Cells of one type are handed over without types and offsets, so that kernels for many cells at once take them. */
+/* Describes the mesh as a grid. If all cells have one type, types and offsets are omitted, so that kernels that process
+ * many cells at once can be used. */
 static grid describe(const outer_work *w)
 {
     const session_outer *out = w->out;
@@ -389,7 +391,7 @@ static grid describe(const outer_work *w)
     return g;
 }
 
-/* Completes the mesh. Its scalar takes the heights over. */
+/* Completes the mesh. Its scalar becomes the owner of the heights. */
 static bool finish(const session_mesh *whole, outer_work *w)
 {
     session_mesh *out = w->out->mesh;

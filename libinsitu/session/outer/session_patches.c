@@ -1,7 +1,7 @@
-/* A face is on the boundary if one cell has it. Meshes with owners tell that themselves. In other meshes all cells'
- * faces are searched: a face's key is a hash of the first three power sums of its vertices' groups, in no order, and
- * each given face needs a cell of its own that has it. So a face between two cells is noticed, and a baffle, whose two
- * sides are one face to such a mesh, may be given once for each side.
+/* A face is on the boundary if only one cell has it. In meshes with face owners this is given. In other meshes all
+ * cells' faces are searched: a face's key is a hash of the first three power sums of its vertices' groups, independent
+ * of their order, and each given face needs its own cell that has it. So a face between two cells is detected, and a
+ * baffle, whose two sides are one face of such a mesh, may be given once for each side.
  *
  *     patches -> faces: groups of vertices, value -> is a drawn cell behind it? -> (group, value) of each vertex */
 #include "session_patches.h"
@@ -18,16 +18,16 @@ typedef struct patch_faces {
     const session_mesh *mesh;
     const session_field *field;
     const session_vertex_numbers *numbers;
-    int64_t count;   /* faces of all patches */
-    int64_t *starts; /* count + 1: where the groups of each face begin */
-    int64_t *groups; /* -1: of a vertex of no drawn cell */
+    int64_t count;   /* number of faces of all patches */
+    int64_t *starts; /* count + 1 entries: index of each face's first group */
+    int64_t *groups; /* -1: the vertex belongs to no drawn cell */
     unsigned char *is_drawn;
 } patch_faces;
 
 /* The vertices around a face. */
 typedef struct patch_face {
     session_face_row row;
-    int64_t number; /* the face's number in the mesh, from 0; -1: it is given by its vertices */
+    int64_t number; /* number of the face in the mesh, from 0; -1: it is given by its vertices */
 } patch_face;
 
 static insitu_status no_memory(int64_t entries, base_error *error)
@@ -35,7 +35,7 @@ static insitu_status no_memory(int64_t entries, base_error *error)
     return session_no_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
 }
 
-/* "mesh ...: field ...: patch 2: face 17" (or "its face 3"), and what is wrong with it. */
+/* Returns an error about a face: "mesh ...: field ...: patch 2: face 17" (or "its face 3") and `what`. */
 static insitu_status tell(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
 {
     const insitu_patch *given = &p->field->given.patches[patch];
@@ -111,7 +111,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
     return INSITU_OK;
 }
 
-/* Lists all faces of all patches, in two passes: the first counts the room that they take. */
+/* Lists all faces of all patches, in two passes: the first computes the space that they take. */
 static insitu_status list_faces(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
@@ -180,11 +180,11 @@ static insitu_status ask_owners(patch_faces *p, base_error *error)
 /* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
 
 typedef struct cell_search {
-    session_key_table keys;  /* one for each face all of whose vertices have groups */
-    int64_t *of_face;        /* its key, or -1 */
-    int64_t *given, *cells;  /* for each key: how often it is given, and how many cells have it */
-    unsigned char *is_drawn; /* one of these cells is drawn */
-    unsigned char *is_met;   /* groups that such faces have */
+    session_key_table keys;  /* one per face all of whose vertices have groups */
+    int64_t *of_face;        /* per face, the number of its key, or -1 */
+    int64_t *given, *cells;  /* per key: how often it is given, and how many cells have it */
+    unsigned char *is_drawn; /* per key: one of these cells is drawn */
+    unsigned char *is_met;   /* per group: such a face has it */
 } cell_search;
 
 static void search_free(cell_search *s)
@@ -231,7 +231,7 @@ static void enter_faces(cell_search *s, const patch_faces *p)
     }
 }
 
-/* The key of a cell's face; false where one of its vertices is on no face that is given. */
+/* Computes the key of a cell's face; returns false if one of its vertices is on no given face. */
 static bool key_of(const cell_search *s, const patch_faces *p, const session_face_loop *loop, session_key *key)
 {
     *key = (session_key){{0}};

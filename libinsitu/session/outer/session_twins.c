@@ -15,10 +15,10 @@ enum { CORNER_WORDS = 4 };
 /* A vertex of an outer face. */
 typedef struct face_corner {
     double place[3];
-    double slack; /* what is nearer is the same vertex */
+    double slack; /* vertices nearer than this are the same vertex */
 } face_corner;
 
-/* A vertex of a face that this rank has once, and the least place of those that are the same. */
+/* A vertex of a face that this rank has once, and the least position of all equal vertices. */
 typedef struct border_vertex {
     double place[3], least[3];
 } border_vertex;
@@ -28,15 +28,15 @@ typedef struct twin_search {
     const session_mesh *const *meshes;
     const session_team *team;
     int64_t corner_count, vertex_count;
-    face_corner *corners;    /* this rank's, then received ones */
-    border_vertex *vertices; /* those of all meshes, in the meshes' order */
+    face_corner *corners;    /* this rank's, then the received ones */
+    border_vertex *vertices; /* of all meshes, in the meshes' order */
     double rounding;
     session_bins bins;
 } twin_search;
 
 /* ---- corners -------------------------------------------------------------------------------------------------- */
 
-/* Finds the shortest edge at each vertex of the face. */
+/* Computes the shortest edge at each vertex of the face. */
 static void measure_edges(const grid *g, const session_face *face, double *edges)
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
@@ -92,9 +92,9 @@ static bool list_own(twin_search *s)
     return session_bins_create(&s->bins, s->vertices->place, (int64_t)sizeof *s->vertices, s->vertex_count);
 }
 
-/* ---- what ranks share ----------------------------------------------------------------------------------------- */
+/* ---- corners of several ranks --------------------------------------------------------------------------------- */
 
-/* Lists the corners for each rank in whose box they are; counts words where there is no room. */
+/* Packs the corners for each rank in whose box they are; only counts the words if mail->words is NULL. */
 static void send_corners(const twin_search *s, session_mail *mail)
 {
     const session_homes *homes = s->joint->homes;
