@@ -49,8 +49,8 @@ static insitu_status draw_numbers(const session_frame_target *target, const rend
     return status;
 }
 
-/* Makes the job without clips, volumes and opacities, so that all that is seen are its surfaces. surfaces: room for the
- * job's. */
+/* Returns the job without clips, volumes and transparency, so that only its surfaces are visible. surfaces: space for
+ * the job's. */
 static render_job opaque_job(const render_job *job, render_surface_layer *surfaces)
 {
     render_job out = *job;
@@ -67,7 +67,7 @@ static render_job opaque_job(const render_job *job, render_surface_layer *surfac
 
 /* ---- numbers ------------------------------------------------------------------------------------------------- */
 
-/* The layers and their surfaces, by the isovalues' numbers in the job. */
+/* The numbers of the layer and of its surface, per isovalue of the job. */
 typedef struct surface_numbers {
     int count;
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
@@ -126,7 +126,7 @@ static void fill_items(session_channels *c)
     memcpy(c->items, items, sizeof items);
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all channels -------------------------------------------------------------------------------------------- */
 
 insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
                                     const scene_image *image, const render_job *job, session_channels *out,

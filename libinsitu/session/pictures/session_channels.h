@@ -1,4 +1,4 @@
-/* Channels that an EXR may hold beside colours and depth: the nearest surface's normal, value and numbers. */
+/* Channels that an EXR file may hold besides colours and depth: the nearest surface's normal, value and numbers. */
 #ifndef SESSION_CHANNELS_H
 #define SESSION_CHANNELS_H
 
@@ -12,15 +12,15 @@
 enum { SESSION_CHANNELS = 6 };
 
 typedef struct session_channels {
-    float *normals, *values; /* rank 0's, 4 floats a pixel; of values the last is the number of the surface */
+    float *normals, *values; /* on rank 0, 4 floats per pixel; the last one of values is the number of the surface */
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;
 
-/* Tells whether an output of the image asks for them. */
+/* Returns whether an output of the image has such channels. */
 bool session_wants_channels(const scene_image *image);
 
-/* Draw them in two frames: the job's surfaces, all of them opaque, through the pixels' centres. taken: what the frames
- * took is added. Collective; what is made is to be freed in any case. */
+/* Draws them in two frames: the job's surfaces, all of them opaque, through the pixels' centres. *taken: the cost of
+ * the frames. Collective; the channels must be freed even after an error. */
 insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
                                     const scene_image *image, const render_job *job, session_channels *out,
                                     session_frame *taken, base_error *error);

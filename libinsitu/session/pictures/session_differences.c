@@ -1,11 +1,11 @@
-/* The rank that has a hit by differences asks its own cells for the six samples about it, and every rank whose cells'
- * box one of the six points is in. A question is the hit, 16 bytes; its answer the samples, 32 bytes. In a partition
- * into blocks hits near the faces between blocks alone have questions to ask.
+/* The rank that has a hit by differences samples its own cells at the six points around it, and requests samples from
+ * every rank whose cells' box contains one of the six points. A request is the hit, 16 bytes; its answer the samples,
+ * 32 bytes. In a partition into blocks, only hits near the faces between blocks cause requests.
  *
  *     rank A   hits -> own samples -> questions to ranks by their boxes ........... and all samples -> light
  *     rank B                          questions -> own samples -> answers
  *
- * Hits go in rounds, so that no rank holds more than a round's mail. */
+ * Hits are processed in rounds, so that no rank holds more than a round's messages. */
 #include "session_differences.h"
 
 #include <math.h>
@@ -28,19 +28,20 @@ typedef struct differing {
     render_waiting_list *list;
     int rank, ranks;
     int64_t round_hits, rounds;
-    /* Ranks that may have samples about any of this rank's hits, and their boxes. */
+    /* Ranks that may have samples for any of this rank's hits, and their boxes. */
     int near_count;
     int *near;
     render_box *boxes;
-    /* The round's hits, their samples, and the hits that other ranks are asked about. */
+    /* The round's hits and their samples. */
     int64_t first, count;
     render_samples_about *samples;
-    int64_t *asked; /* the hits that are asked about, in the order of the mail */
+    int64_t *asked; /* the hits for which samples are requested, in the order of the message */
 } differing;
 
-/* ---- what ranks know of each other --------------------------------------------------------------------------- */
+/* ---- data shared by all ranks -------------------------------------------------------------------------------- */
 
-/* All are maxima over the ranks: the ends of the surfaces' fields (lower ones negated), the rounds, and a failure. */
+/* Layout of a maximum over the ranks: the ranges of the surfaces' fields (minima negated), the number of rounds, and a
+ * failure. */
 enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
 
 static insitu_status share_ranges(differing *d, base_error *error)
@@ -67,7 +68,8 @@ static insitu_status share_ranges(differing *d, base_error *error)
     return INSITU_OK;
 }
 
-/* Hits lie in this rank's box, so their samples are no farther from it than the farthest reach. */
+/* Keeps the ranks near enough to this rank's hits. Hits lie in this rank's box, so their samples are no farther from it
+ * than the largest reach. */
 static void keep_near(differing *d)
 {
     const render_box *own = &d->boxes[d->rank];
@@ -95,7 +97,7 @@ static insitu_status share_boxes(differing *d, base_error *error)
 
 /* ---- a round ------------------------------------------------------------------------------------------------- */
 
-/* Fills the mail with the round's questions. False where memory ran out. */
+/* Packs the round's requests. Returns false if memory ran out. */
 static bool write_questions(differing *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
@@ -124,7 +126,7 @@ static bool write_questions(differing *d, session_mail *out)
     return true;
 }
 
-/* Answers the questions, for which the words are aligned. Returns false where memory ran out. */
+/* Computes the answers to requests, for which the words are aligned. Returns false if memory ran out. */
 static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / QUESTION_WORDS;
@@ -138,7 +140,7 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     return true;
 }
 
-/* An error on any rank is passed to all ranks by the next delivery. */
+/* Exchanges requests and answers. The next delivery passes an error on any rank to all ranks. */
 static insitu_status ask_others(differing *d, base_error *error)
 {
     session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};

@@ -8,9 +8,9 @@
 #include "fragment.h"
 #include "render.h"
 
-/* Lights the hits of job->waiting by the samples of all ranks and adds them to fragments; the list is freed. *ms grows
- * by what it took. *error may have come from tracing on some ranks. Collective, agreed, but for what fails on this rank
- * at the very end: then *error alone has it, for the next phase to agree on. */
+/* Lights the hits of job->waiting by the samples of all ranks, adds them to fragments, and frees the list. Adds the
+ * time taken to *ms. *error may hold an error of tracing on some ranks. Collective, agreed; an error of this rank at
+ * the very end is stored only in *error, for the next phase to agree on. */
 insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
                                        base_error *error);
 

@@ -1,7 +1,7 @@
-/* Drawing: each due image in turn, frame by frame, so that the memory of one is given back before the next begins.
+/* Draws all due images one after the other, frame by frame, so that the memory of one is freed before the next begins.
  *
- * What may fail on one rank alone (memory, mostly) is agreed on before the next collective call. An image that fails is
- * left out, the next is tried; the first reason is the step's. */
+ * Errors that may occur on one rank alone (mostly lack of memory) are agreed on before the next collective call. An
+ * image that fails is skipped and the next one is drawn; the first error is the step's. */
 #include "session_draw.h"
 
 #include <string.h>
@@ -21,21 +21,21 @@
 #include "session_shells.h"
 #include "session_view.h"
 
-/* Fragments that a rank makes at once for pixels in which cells overlap: 64 MiB. */
+/* Number of fragments that a rank computes at once for pixels in which cells overlap: 64 MiB. */
 enum { overlap_fragments = 1 << 21 };
 
-/* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
+/* Rank 0's pictures: the current frame, and the sum of frames if there are several. Other ranks only have the size. */
 typedef struct canvas {
     image frame;
-    session_picture memory; /* holds the frame; the writer owns it and takes it with the picture */
-    float *depth;           /* the frame's, put by while it is drawn without */
-    image samples;          /* where edges alone take more than one frame: those, and their sums */
+    session_picture memory; /* memory of the frame; it is owned by the writer, which receives it with the picture */
+    float *depth;           /* depth of the frame, saved here while further frames are drawn without depth */
+    image samples;          /* if only edges take more than one frame: their frames, and their sums */
     int64_t edge_count, *edges;
     double *edge_sums;
-    double *sum; /* NULL: there is one frame */
+    double *sum; /* NULL if there is only one frame */
     session_channels channels;
     deep_image deep;
-    session_decorations *decorations; /* NULL: there are none, and the frame has its background */
+    session_decorations *decorations; /* NULL: there are none, and the frame contains its background */
 } canvas;
 
 static void canvas_free(canvas *c, session_writer *writer)
@@ -63,7 +63,7 @@ static bool has_edges_alone(const scene_image *image)
     return image->antialias > 1 && image->volume_count == 0;
 }
 
-/* A disk that is slower than the run holds it up. */
+/* Warns if a slow disk delays the run. */
 static void warn_of_wait(session_report *report, double seconds)
 {
     static const double noticed = 0.1;
@@ -80,7 +80,7 @@ static void reserve_frame(const session_drawing *d, size_t bytes, canvas *c)
     const double start = MPI_Wtime();
     c->memory = session_writer_reserve(d->writer, bytes);
     c->frame.rgba = c->memory.pixels;
-    const double seconds = MPI_Wtime() - start; /* waiting for room */
+    const double seconds = MPI_Wtime() - start; /* time spent waiting for space in the queue */
     d->report->numbers.write_ms += 1e3 * seconds;
     warn_of_wait(d->report, seconds);
 }
@@ -115,7 +115,7 @@ static void canvas_add(canvas *c, int threads)
     }
 }
 
-/* Room for the pixels of the set and the frames that they are in. False: no memory. */
+/* Allocates memory for the pixels of the set and for frames with these. Returns false if there is no memory. */
 static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height, edges = pixel_set_count(pixels, count);
@@ -166,7 +166,7 @@ static void average_frames(canvas *c, int frames, int threads)
     }
 }
 
-/* Turns depths from the rays' t into distances along the camera's axis. Infinity stays. */
+/* Converts depths from the rays' t to distances along the camera's axis. Infinity stays. */
 static void scale_depths(canvas *c, const render_space *space, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height;
@@ -243,13 +243,13 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
         image->name, (long long)pixels);
 }
 
-/* State that the frames of an image share. */
+/* State shared by the frames of an image. */
 typedef struct frames_basis {
     const session_drawing *drawing;
     session_frame_target target;
     canvas *canvas;
-    int64_t overlaps; /* pixels, at most of any frame */
-    deep_image *deep; /* the next frame fills it; NULL: it is not wanted, or is drawn */
+    int64_t overlaps; /* number of pixels, the maximum over the frames */
+    deep_image *deep; /* filled by the next frame; NULL: there is none, or it has been drawn */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
@@ -263,7 +263,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     return status;
 }
 
-/* Rank 0 knows the picture, and tells all ranks which pixels are at edges. *pixels is the caller's to free. */
+/* Finds the pixels at edges in rank 0's picture and sends them to all ranks. The caller frees *pixels. */
 static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
 {
     canvas *c = b->canvas;
@@ -279,7 +279,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Draws frames through the places in the pixels, in turn. If only edges are drawn, the job has their pixels. */
+/* Draws frames through the sample positions in the pixels, in turn. If only edges are drawn, the job has their
+ * pixels. */
 static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -294,8 +295,8 @@ static insitu_status draw_samples(frames_basis *b, const scene_image *image, ren
     return status;
 }
 
-/* A picture without volumes is drawn once through the pixels' centres, and then again only at edges. With volumes the
- * frame through the centres gives the depth alone, and is not averaged. */
+/* Draws all frames of an image. A picture without volumes is drawn once through the pixels' centres, and then again
+ * only at edges. With volumes the frame through the centres is used only for depth, and is not averaged. */
 static insitu_status draw_all(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -316,7 +317,7 @@ static insitu_status draw_all(frames_basis *b, const scene_image *image, render_
 static insitu_status draw_frames(const session_drawing *d, const scene_image *image, const session_view *view,
                                  const session_layers *layers, canvas *canvas, base_error *error)
 {
-    static const float no_background[4] = {0, 0, 0, 0}; /* edges may go between it and the picture */
+    static const float no_background[4] = {0, 0, 0, 0}; /* edges may be drawn between the background and the picture */
     const float *background = image->decorations.is_given ? no_background : image->background;
     const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
     _Static_assert((int)SCENE_SCHEDULE_BINARY == (int)COMP_BINARY, "a scene's schedules are those of compositing");
@@ -347,7 +348,7 @@ static scene_moment moment_of(const session_drawing *d, const scene_image *image
     return scene_moment_of(image, d->cycle, d->report->numbers.time);
 }
 
-/* On rank 0: gives what was drawn to the writer, which leaves the canvas without it. */
+/* On rank 0: passes the picture to the writer, which becomes the owner of its memory. */
 static void give_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
     session_files *files = base_calloc(1, sizeof *files);
@@ -373,8 +374,9 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     session_writer_give(d->writer, files, error);
 }
 
-/* Where nothing is written in the step, only rank 0's lack of memory to hand the picture over can go wrong. The next
- * step reports that, as it does the errors of the writing thread. ranges is NULL, or those of the run. */
+/* Passes an image to the writer. If nothing is written in the step, the only possible error is rank 0's lack of memory
+ * for passing the picture. The next step reports that, as it does errors of the writing thread. ranges: NULL, or the
+ * ranges over the run. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
@@ -392,8 +394,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* On rank 0. The words are laid out here, before the writing thread does it again, so that the warnings come with the
- * step that draws them. */
+/* Warns of texts that cannot be drawn as written, on rank 0. The texts are laid out here, and later again by the
+ * writing thread, so that the warnings belong to the step that draws them. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
@@ -405,7 +407,8 @@ static void warn_of_words(const session_drawing *d, const scene_image *image, co
                          "image \"%s\": %.900s", image->name, texts[i]);
 }
 
-/* Collective where the outline is of meshes or ranks; what fails on rank 0 alone is for the next agreement. */
+/* Computes the decorations. Collective if the outline is of meshes or ranks; an error of rank 0 alone is left to the
+ * next agreement. */
 static insitu_status decorate(const session_drawing *d, const scene_image *image, const session_view *view,
                               const session_layers *layers, canvas *out, base_error *error)
 {
@@ -424,8 +427,8 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
     return INSITU_OK;
 }
 
-/* An error of one rank alone, such as lack of memory, goes in *error to the next agreement: that of the layers or of
- * the first frame. */
+/* Draws an image. An error of one rank alone, such as lack of memory, is passed in *error to the next agreement: that
+ * of the layers or of the first frame. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {
     const session_extent *extent = &d->space->extent;
@@ -483,11 +486,12 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
                                   base_error *error)
 {
     base_error first = plan->refusal;
-    bool has_lines = !d->writes_behind; /* rank 0 may have warnings for all */
+    bool has_lines = !d->writes_behind; /* rank 0 may have warnings for all ranks */
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         has_lines = has_lines || scene_has_words(plan->images[i]);
-        scene_image placed = *plan->images[i]; /* with its camera's present place; all else is the scene's */
+        /* with the camera's current position; everything else belongs to the scene */
+        scene_image placed = *plan->images[i];
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {
             *drawn |= (uint64_t)1 << placed.variant.source;

@@ -1,4 +1,4 @@
-/* Turns the plan's images into pictures on rank 0. */
+/* Draws the plan's images on rank 0. */
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
@@ -15,7 +15,7 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* Input that images are drawn from. */
+/* Input of images. */
 typedef struct session_drawing {
     const session_team *team;
     const char *scene_path; /* for messages */
@@ -30,14 +30,14 @@ typedef struct session_drawing {
     session_cinema *cinema;     /* rank 0's */
     session_montages *montages; /* rank 0's */
     session_overwrites *overwrites;
-    session_writer *writer; /* rank 0's */
+    session_writer *writer; /* on rank 0 */
     const session_catalogue *catalogue;
-    bool writes_behind; /* pictures are written when the step is over */
+    bool writes_behind; /* pictures are written after the step is over */
 } session_drawing;
 
-/* Draw the plan's images and give them to the writer. One that fails is left out. The plan's refusal, if there is one,
- * else the first failure, is the error. The bits of those that were drawn, by the file's image that they are of, are
- * set in *drawn. Collective. */
+/* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the plan's refusal if
+ * there is one, else the first failure. *drawn: set to the bits, by number of the image in the file, of the images that
+ * were drawn. Collective. */
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 

@@ -57,7 +57,7 @@ static void write_output(session_files *files, const scene_output *output)
     base_free(path);
 }
 
-/* Milliseconds on a clock. This thread may not call MPI. */
+/* Returns milliseconds on a clock. This thread may not call MPI. */
 static double milliseconds(void)
 {
     struct timespec now;

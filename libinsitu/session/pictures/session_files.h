@@ -1,4 +1,4 @@
-/* A drawn picture on its way to its files: all that writing needs, so that the step which drew it may be over. */
+/* A drawn picture with all data needed to write its files, so that the step that drew it may be over. */
 #ifndef SESSION_FILES_H
 #define SESSION_FILES_H
 
@@ -14,10 +14,10 @@
 #include "session_picture.h"
 #include "session_report.h"
 
-/* Rank 0's. */
+/* A picture to write, on rank 0. */
 typedef struct session_files {
-    struct session_files *next; /* in a list of the writer's (session_writer.h) */
-    const scene *scene;         /* the image's scene: it stays until this is written */
+    struct session_files *next; /* next in one of the writer's lists (session_writer.h) */
+    const scene *scene;         /* the image's scene; it must exist until this is written */
     session_cinema *cinema;
     session_montages *montages;
     bool has_picture; /* else this is news, or else the tables of databases and pictures side by side, which are written
@@ -26,21 +26,21 @@ typedef struct session_files {
     scene_image image; /* its camera is that of the step, its lists are the scene's */
     scene_moment moment;
     image frame;
-    session_picture memory; /* holds the frame */
+    session_picture memory; /* memory of the frame */
     session_channels channels;
-    deep_image deep;                  /* without counts: there is none */
-    session_decorations *decorations; /* NULL: none, and the frame has its background */
+    deep_image deep;                  /* without counts if there is none */
+    session_decorations *decorations; /* NULL: none, and the frame contains its background */
     base_error error;                 /* the first reason why a file could not be written */
-    double ms;                        /* that writing took */
+    double ms;                        /* duration of writing */
 } session_files;
 
-/* Bytes that it holds. */
+/* Returns the size of the files' data in bytes. */
 int64_t session_files_bytes(const session_files *files);
 
-/* Write them all, though some fail. Local; on any thread, one set of files after the other. */
+/* Writes all files, even if some fail. Local; may be called on any thread, for one set of files at a time. */
 void session_write_files(session_files *files);
 
-/* files may be NULL. The frame's memory is freed too. */
+/* Frees the files, and the frame's memory; NULL is allowed. */
 void session_files_free(session_files *files);
 
 #endif

@@ -1,11 +1,11 @@
-/* A frame, and the second look at its pixels where cells overlap.
+/* A frame, and a second drawing of the pixels in which cells overlap.
  *
- * Fragments that overlap cannot be sorted into a picture, and the ranks that made them have thrown away what it would
- * take: where each sample stood. So these pixels, which compositing finds and tells all ranks, are traced once more
- * with every sample on its own (render.h), composited beside the picture, and take their place in it. In a mesh whose
- * cells overlap here and there that is a few pixels more. Two meshes that fill the same space may make a thousand
- * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as the busiest rank may hold
- * the fragments of. Segments of several volumes are drawn so on all pixels from the first. */
+ * Fragments that overlap cannot be sorted into a picture, and the ranks that computed them no longer have the position
+ * of each sample. So these pixels, which compositing finds and sends to all ranks, are traced once more with every
+ * sample as a separate fragment (render.h), composited beside the picture, and copied into it. In a mesh with a few
+ * overlapping cells that is a few more pixels. Two meshes that fill the same space may make a thousand fragments in
+ * each of a million pixels: such pixels are drawn in turns, each with as many pixels as the busiest rank can hold
+ * fragments for. Segments of several volumes are drawn this way on all pixels at once. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ static void add_to_frame(session_frame *frame, const render_statistics *rendered
     frame->composite_ms += composite_ms;
 }
 
-/* One rank with something to trace: composited as it is traced (comp_tiles.h). */
+/* Draws a frame if only one rank has cells: it is composited while it is traced (comp_tiles.h). */
 static insitu_status draw_alone(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
                                 comp_overlaps *overlaps, base_error *error)
 {
@@ -46,8 +46,8 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     return session_agree(t->comm, error);
 }
 
-/* All ranks trace; where normals are by differences, they ask each other for samples. What fails otherwise is in *error
- * alone. */
+/* Traces on all ranks; for normals by differences, ranks exchange samples. Other errors of this rank are stored in
+ * *error and not returned. */
 static insitu_status trace(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                            render_statistics *rendered, base_error *error)
 {
@@ -61,7 +61,7 @@ static insitu_status trace(const session_frame_target *t, const render_job *job,
     return session_differ_fragments(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
-/* The occluders of a frame are those of all its turns, which differ in their pixels alone. */
+/* Lights the fragments. All turns of a frame have the same occluders, as only their pixels differ. */
 static insitu_status light(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                            session_frame *frame, render_statistics *rendered, base_error *error)
 {
@@ -93,7 +93,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
                                            &composited, error)
                  : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited, error);
     if (status && !composited.has_failed) *error = (base_error){0};
-    if (status) status = session_agree(t->comm, error); /* compositing agrees on the status alone */
+    if (status) status = session_agree(t->comm, error); /* compositing agrees only on the status */
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
     frame->sent_bytes += composited.sent_bytes;
@@ -103,8 +103,8 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Estimates how many pixels make so many fragments: of samples, by the scene's extent, which is near 1 in scaled units,
- * and at most sqrt(3) times that; of segments by experience. */
+/* Estimates the number of pixels that make fragment_limit fragments: for samples from the scene's extent, which is near
+ * 1 in scaled units, and at most sqrt(3) times that; for segments from experience. */
 static int64_t first_turn(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
@@ -116,8 +116,8 @@ static int64_t first_turn(const render_job *job, int64_t fragment_limit)
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* Finds how many pixels the next turn takes, from what the last one made on the busiest rank. It grows by bounded
- * steps, as few pixels tell little about the others. Collective; the same on all ranks. */
+/* Computes the number of pixels of the next turn from the fragments of the last one on the busiest rank. The growth is
+ * bounded, as a few pixels say little about the others. Collective; the same on all ranks. */
 static insitu_status next_turn(const session_frame_target *t, int64_t fragments, int64_t *pixels, base_error *error)
 {
     enum { MOST_GROWTH = 8 };
@@ -130,9 +130,8 @@ static insitu_status next_turn(const session_frame_target *t, int64_t fragments,
     return INSITU_OK;
 }
 
-/* A picture's pixels in the order of turns: by squares, whose pixels are neighbours as the rays of a packet are.
- * Squares that follow each other are far apart, by the golden ratio of their number, so that each turn has its share
- * of what is dense. */
+/* Order of a picture's pixels for turns: by squares, so that rays of a packet are neighbours. Consecutive squares are
+ * far apart, by the golden ratio of their number, so that each turn has its share of dense regions. */
 typedef struct turn_order {
     int width, height, across;
     int64_t squares, stride;
@@ -159,7 +158,7 @@ static turn_order turn_order_of(const image *out)
     return order;
 }
 
-/* Returns the k-th place's pixel, or -1 where a square goes beyond the picture. */
+/* Returns the k-th pixel of the order, or -1 if it is outside the picture. */
 static int64_t turn_pixel(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
@@ -168,7 +167,7 @@ static int64_t turn_pixel(const turn_order *order, int64_t k)
     return x < order->width && y < order->height ? y * order->width + x : -1;
 }
 
-/* Takes the next pixels of a set, at most so many; returns where to go on. */
+/* Moves up to `most` pixels of a set into `taken`, from index first on; returns the index at which to continue. */
 static int64_t take_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
                            unsigned char *taken)
 {
@@ -194,7 +193,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
-/* Forgets the pixels' samples in rank 0's deep picture, because they are drawn again. */
+/* Removes the pixels' samples from rank 0's deep picture, because they are drawn again. */
 static void forget_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;
@@ -202,10 +201,10 @@ static void forget_samples(const unsigned char *pixels, const image *out)
         if (pixel_set_has(pixels, p)) out->deep->counts[p] = 0;
 }
 
-/* A second picture beside the first, on rank 0, of so many pixels at once. */
+/* A second picture beside the first, on rank 0, for the pixels of a turn. */
 typedef struct second_picture {
     image picture;
-    unsigned char *turn; /* a set of pixels, on every rank */
+    unsigned char *turn; /* set of pixels, on every rank */
 } second_picture;
 
 static insitu_status second_create(const session_frame_target *t, const comp_overlaps *overlaps, const image *first,
@@ -272,9 +271,9 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
     return status;
 }
 
-/* Segments of several volumes are at one place on every pixel: there is no first picture to put right. Samples of
- * several are mixed by a rank that has them all, and in another order of roundings by compositing; so are all by that,
- * if pictures are to be the same to the bit. */
+/* Returns whether all pixels must be drawn with separate fragments. Segments of several volumes overlap on every pixel.
+ * Samples of several volumes round differently if one rank mixes them than if compositing does; for reproducible
+ * pictures compositing mixes all. */
 static bool is_mixed_throughout(const render_job *job)
 {
     return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;
@@ -302,7 +301,8 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
-        /* Separate samples tell whether any has two owners but by rounding of their common face: see redraw(). */
+        /* Samples of cells that share a face up to rounding may also have two owners; redraw() counts the true overlaps
+         * from the separate samples. */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);

@@ -1,12 +1,12 @@
-/* The image library is loaded by its full path, so that no other of its name gets into someone's run: from the folder
- * of the object that this code is in (libinsitu), or from the lib folder next to that one, where it is for a program in
- * bin that links libinsitu statically. Only if it is in neither, the loader searches for it, unless LD_LIBRARY_PATH
- * would make it search the working directory. It stays loaded until the process ends: C++ libraries with threads and
- * static objects do not survive being unloaded.
+/* The image library is loaded by its full path, so that no other library of its name is used: from the folder of the
+ * object with this code (libinsitu), or from the lib folder next to it, where it is for a program in bin that links
+ * libinsitu statically. Only if it is in neither, the loader searches for it, unless LD_LIBRARY_PATH would make it
+ * search the working directory. It stays loaded until the process ends: C++ libraries with threads and static objects
+ * do not survive being unloaded.
  *
- * Some library behind OpenImageIO starts threads when it is loaded. They sleep, but would take the simulation's signals
- * and run its handlers, so they are started with every signal blocked. Other libraries end the process where their
- * constructors find no memory, so nothing is loaded unless there is memory to spare. */
+ * Some library behind OpenImageIO starts threads when it is loaded. They sleep, but would receive the simulation's
+ * signals and run its handlers, so they are started with every signal blocked. Other libraries end the process if their
+ * constructors find no memory, so nothing is loaded unless enough memory is available. */
 #define _GNU_SOURCE 1 /* dladdr1 */
 #include "session_image.h"
 
@@ -39,19 +39,20 @@ static void *open_library(const char *path, char *why, size_t size)
     if (handle) return handle;
     const char *reason = dlerror();
     const bool is_absent =
-        strncmp(reason, path, strlen(path)) == 0; /* else the file is there, but something that it needs is not */
+        strncmp(reason, path, strlen(path)) == 0; /* else the file exists, but something that it needs does not */
     if (!*why || !is_absent) snprintf(why, size, "%s", reason);
     return NULL;
 }
 
-/* The folder of the object this code is in, as it was when that was loaded. */
+/* Finds the folder of the object with this code, as it was when the object was loaded. */
 static bool find_own_folder(char folder[PATH_MAX])
 {
     Dl_info object;
     struct link_map *map = NULL;
     if (!dladdr1((const void *)library, &object, (void **)&map, RTLD_DL_LINKMAP) || !map) return false;
     if (*map->l_name) return dlinfo(map, RTLD_DI_ORIGIN, folder) == 0;
-    const ssize_t length = readlink("/proc/self/exe", folder, PATH_MAX - 1); /* the program: it has no name there */
+    /* the main program, which has no name in the link map */
+    const ssize_t length = readlink("/proc/self/exe", folder, PATH_MAX - 1);
     if (length <= 0) return false;
     folder[length] = '\0';
     char *slash = strrchr(folder, '/');
@@ -66,7 +67,8 @@ static void *open_beside(const char *own_folder, const char *between, char *why,
     return length > 0 && (size_t)length < sizeof path ? open_library(path, why, size) : NULL;
 }
 
-/* An empty entry, or a relative one, is the working directory or below it. */
+/* Returns whether the loader would search the working directory. An empty entry, or a relative one, is the working
+ * directory or below it. */
 static bool searches_working_directory(void)
 {
     const char *entries = getenv("LD_LIBRARY_PATH");
@@ -90,7 +92,8 @@ static void *open_anywhere(char *why, size_t size)
     return handle;
 }
 
-/* Memory that the libraries take when they are loaded, rounded up: 430 MiB of addresses, of them 100 MiB of memory. */
+/* Returns whether 512 MiB of address space can be mapped and 128 MiB of it committed. Loading the libraries takes 430
+ * MiB of addresses, of which 100 MiB are used. */
 static bool has_memory_to_load(void)
 {
     const size_t addresses = (size_t)512 << 20, memory = (size_t)128 << 20;

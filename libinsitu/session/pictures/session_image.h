@@ -7,8 +7,8 @@
 #include "error.h"
 #include "insitu/image_output.h"
 
-/* Write by libinsitu_image, which the first call of the process loads. If that fails it is an error, and the next call
- * tries again. Local. Thread-safe. */
+/* Writes an image by libinsitu_image, which the process's first call loads. If loading fails it is an error, and the
+ * next call tries again. Local. Thread-safe. */
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
 
@@ -19,11 +19,12 @@ insitu_status session_place_image(const insitu_image *image, const insitu_place 
  * where it was there. Local. Thread-safe. */
 double session_load_image_library(void);
 
-/* Finds what hinders the words of a picture (image_output.h), of which only the size and the decorations are read.
- * Nothing if the library cannot be loaded or memory runs out, as writing the picture then fails. Local. Thread-safe. */
+/* Finds the reasons why a picture's texts cannot be drawn (image_output.h); only the size and the decorations are read.
+ * Finds none if the library cannot be loaded or memory runs out, as writing the picture then fails. Local.
+ * Thread-safe. */
 void session_check_words(const insitu_image *image, insitu_word_faults *out);
 
-/* Whether pictures may be written by a thread of their own (session_writer.h). Tests that replace this file set it to
+/* Whether pictures may be written by a separate thread (session_writer.h). Tests that replace this file set it to
  * false. */
 extern bool session_writes_behind;
 

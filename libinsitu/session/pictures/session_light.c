@@ -1,11 +1,11 @@
-/* The rank that has a hit lights it: it asks its own cells first, which most of what is near a hit lies in, and then
- * the ranks whose cells' box an open ray meets. What is sent is the hit with the rays that are asked for, 32 bytes for
- * all of them: the other rank finds the rays as this one does. 8 or 16 bytes come back, a bit a ray.
+/* The rank that has a hit lights it. It first tests its own cells, which block most rays of a hit, and then sends
+ * requests to the ranks whose cells' box an open ray meets. A request is the hit and the set of its rays, 32 bytes for
+ * all of them, as the other rank computes the rays in the same way. The answer has 8 or 16 bytes, a bit per ray.
  *
  *     rank A   hits -> own cells -> open rays -> mail to ranks by their boxes ......... and of all answers -> colours
  *     rank B                                     mail -> own cells -> open rays -> mail
  *
- * Hits go in rounds, so that no rank holds more than a round's mail. */
+ * Hits are processed in rounds, so that no rank holds more than a round's messages. */
 #include "session_light.h"
 
 #include <string.h>
@@ -17,7 +17,7 @@
 
 enum { ROUND_HITS = 1 << 16 };
 
-/* A question: a hit, and which of its rays are asked for; its answer. */
+/* Sizes of a request, which is a hit and the set of its rays to test, and of its answer. */
 enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
 
 /* A round: some of this rank's hits, and the rays that are still open. */
@@ -27,23 +27,23 @@ typedef struct lighting {
     int rank, ranks;
     render_occluders *occluders; /* this rank's */
     int64_t round_hits;
-    render_box *boxes; /* one for each rank */
+    render_box *boxes; /* one per rank */
     int64_t count;
-    int64_t *fragments; /* whose hits these are */
+    int64_t *fragments; /* indices of the hits' fragments */
     render_hit *hits;
     render_hit_rays *rays;
 } lighting;
 
-/* Questions in the order in which they are found, and to whom; and in the order of ranks. */
+/* Requests in the order in which they are found, with the rank that each is for; and their order by rank. */
 typedef struct questions {
     int64_t count, capacity;
     int *ranks;
     int64_t *hits;
     render_hit_rays *rays;
-    int64_t at; /* the hit that is looked at */
+    int64_t at; /* the current hit */
     const lighting *of;
     int64_t *starts; /* ranks + 1 */
-    int64_t *sent;   /* questions by their place in the mail */
+    int64_t *sent;   /* requests by their position in the message */
     bool has_no_memory;
 } questions;
 
@@ -97,7 +97,7 @@ static void take_question(void *state, int rank, const render_hit_rays *rays)
     q->rays[q->count++] = *rays;
 }
 
-/* Puts them in the order of ranks. */
+/* Sorts the requests by rank. */
 static bool sort_questions(questions *q)
 {
     const int ranks = q->of->ranks;
@@ -143,7 +143,7 @@ static insitu_status ask(const lighting *l, questions *q, session_mail *in, base
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* Copies the questions out of the mail, whose words are not aligned for them. */
+/* Copies the requests out of the message, whose words are not aligned for them. */
 static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / ASKED_WORDS;
@@ -158,7 +158,7 @@ static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays
     return true;
 }
 
-/* Turns the questions in *in into their answers. */
+/* Replaces the requests in *in by their answers. */
 static insitu_status answer(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;
@@ -204,7 +204,8 @@ static insitu_status ask_others(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* Takes the hits of the fragments from the first on, and lights those without rays at once. Returns where to go on. */
+/* Collects the hits of the fragments from index first on, and lights those without rays directly. Returns the index at
+ * which to continue. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};
@@ -224,7 +225,7 @@ static void shade_hits(const lighting *l, fragment_list *fragments)
         render_light_fragment(l->job, &l->rays[i], &fragments->items[l->fragments[i]]);
 }
 
-/* Tells whether any rank has fragments left. */
+/* Determines whether any rank has fragments left. */
 static insitu_status agree_to_go_on(const lighting *l, bool has_more, bool *out, base_error *error)
 {
     int own = has_more, all = 0;

@@ -9,9 +9,9 @@
 #include "render.h"
 #include "render_light.h"
 
-/* Makes fragments that were painted RENDER_UNLIT what they are by the light that comes to them past the opaque surfaces
- * of all ranks. *occluders: this rank's, made here if it is NULL, of this job or of one that differs from it in its
- * pixels alone; the caller frees them. *ms grows by what it took. Collective; agreed. */
+/* Lights fragments that were painted RENDER_UNLIT by the light that reaches them past the opaque surfaces of all ranks.
+ * *occluders: this rank's; created here if NULL, and valid for jobs that differ only in their pixels; the caller frees
+ * them. Adds the time taken to *ms. Collective; agreed. */
 insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, render_occluders **occluders,
                                       fragment_list *fragments, double *ms, base_error *error);
 

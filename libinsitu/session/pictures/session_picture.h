@@ -1,4 +1,4 @@
-/* Rank 0's memory of the last picture, for the next one: fresh pages cost as much as filling them. */
+/* Rank 0's memory of the last picture, reused for the next one: new pages cost as much as filling them. */
 #ifndef SESSION_PICTURE_H
 #define SESSION_PICTURE_H
 
@@ -15,19 +15,20 @@ typedef struct session_picture {
     size_t bytes;
 } session_picture;
 
-/* Reserves at least so many bytes, with undefined contents; NULL where there is no memory. */
+/* Ensures at least `bytes` bytes, uninitialized, and returns them; NULL if there is no memory. */
 float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);
 
-/* The pictures of the last step, for the caller: rank 0's copies. */
+/* The pictures of the last step for the caller: copies on rank 0. */
 typedef struct session_kept_pictures {
-    bool is_on; /* the same on every rank, because it makes all images have depth */
+    bool is_on; /* the same on every rank, because all images then have depth */
     int count;
-    insitu_picture items[SCENE_MAX_PICTURES]; /* names are the scene's; pixels and depth of each are one block */
+    /* names belong to the scene; pixels and depth of each picture are one block */
+    insitu_picture items[SCENE_MAX_PICTURES];
 } session_kept_pictures;
 
-/* Copy a picture that has depth. Local. */
+/* Copies a picture that has depth. Local. */
 insitu_status session_keep_picture(session_kept_pictures *kept, const scene_image *image, const struct image *picture,
                                    base_error *error);
 

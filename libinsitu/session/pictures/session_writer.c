@@ -1,11 +1,11 @@
-/* The image library is loaded by the caller's thread before the writing thread is there. Loading takes 0.1 s, or 1 s
- * from a cold disk, and holds the loader's lock, which every start of a thread needs: a thread that loaded it beside
- * the first step would have all ranks wait there.
+/* The caller's thread loads the image library before the writing thread exists. Loading takes 0.1 s, or 1 s from a cold
+ * disk, and holds the loader's lock, which every start of a thread needs: if the writing thread loaded it during the
+ * first step, all ranks would be blocked there.
  *
- * Some library behind OpenImageIO makes threads and static objects when it is loaded. These are destroyed as the
- * process exits, in the reverse of the order in which they were made. So the wait at exit is registered again once the
- * library is loaded, and once the first pictures are written, which make more such objects, and comes before: no
- * picture is written with half-destroyed objects. */
+ * Some library behind OpenImageIO creates threads and static objects when it is loaded. These are destroyed as the
+ * process exits, in the reverse order of their creation. So the function that waits at exit is registered again after
+ * the library is loaded, and after the first pictures are written, which create more such objects; it then runs first,
+ * and no picture is written with half-destroyed objects. */
 #include "session_writer.h"
 
 #include <mpi.h>
@@ -44,7 +44,7 @@ static void wait_for_all(void)
     pthread_mutex_unlock(&all_mutex);
 }
 
-/* MPI_Finalize() begins with the attributes of MPI_COMM_SELF (MPI-3.1, 8.7.1). */
+/* Waits for all pictures. MPI_Finalize() begins by deleting the attributes of MPI_COMM_SELF (MPI-3.1, 8.7.1). */
 static int wait_in_finalize(MPI_Comm comm, int key, void *value, void *state)
 {
     (void)comm, (void)key, (void)value, (void)state;
@@ -84,7 +84,7 @@ static void strike_off(session_writer *w)
 
 /* ---- memory of pictures --------------------------------------------------------------------------------------- */
 
-/* Locked. */
+/* Returns the size of the free memory that is kept. The mutex must be held. */
 static int64_t free_bytes(const session_writer *w)
 {
     int64_t bytes = 0;
@@ -92,7 +92,7 @@ static int64_t free_bytes(const session_writer *w)
     return bytes;
 }
 
-/* Fresh pages cost as much as filling them, so some are kept. Locked. */
+/* Keeps or frees memory: some is kept, as new pages cost as much as filling them. The mutex must be held. */
 static void keep_memory(session_writer *w, session_picture *memory)
 {
     for (int i = 0; i < SESSION_FREE_PICTURES; i++)
@@ -103,8 +103,8 @@ static void keep_memory(session_writer *w, session_picture *memory)
     session_drop_picture(memory);
 }
 
-/* Takes kept memory of at least so many bytes. If none is large enough, *memory stays empty, and one that is too small
- * is freed. Locked. */
+/* Takes kept memory of at least `bytes` bytes. If none is large enough, *memory stays empty, and one block that is too
+ * small is freed. The mutex must be held. */
 static void take_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
     int small = -1;
@@ -159,7 +159,7 @@ int64_t session_writer_bytes(session_writer *w, int *waiting)
 
 /* ---- the thread ----------------------------------------------------------------------------------------------- */
 
-/* Locked. */
+/* Appends files to a list. The mutex must be held. */
 static void append(session_files **first, session_files **last, session_files *files)
 {
     files->next = NULL;
@@ -170,7 +170,7 @@ static void append(session_files **first, session_files **last, session_files *f
     *last = files;
 }
 
-/* Locked. */
+/* Moves the first files of the queue to the finished ones. The mutex must be held. */
 static void finish_first(session_writer *w)
 {
     session_files *files = w->first;
@@ -235,7 +235,7 @@ double session_writer_begin(session_writer *w, const scene *scene)
     return ms;
 }
 
-/* ---- what goes in and what comes out -------------------------------------------------------------------------- */
+/* ---- input and results ---------------------------------------------------------------------------------------- */
 
 void session_writer_give(session_writer *w, session_files *files, base_error *error)
 {
