@@ -15,7 +15,7 @@ enum {
     SESSION_ALLOW_ANY = 32, /* all integers, aligned or not; floats need not be aligned either */
 };
 
-/* What an array must be. */
+/* The requirements of an array. */
 typedef struct session_array_rule {
     const char *name; /* in the plural */
     int64_t count;    /* number of its elements */
@@ -28,7 +28,7 @@ typedef struct session_array_rule {
 insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                   base_error *error);
 
-/* As above, for an array of pointers: its type is that of what they point to. It is given. */
+/* As above, for an array of pointers, which must be given; its type is that of the elements to which they point. */
 insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                      base_error *error);
 
@@ -37,7 +37,7 @@ insitu_status session_check_pointers(const insitu_array *array, const session_ar
 insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_anywhere,
                                        const char *name, base_error *error);
 
-/* Tells whether both are read from the same place in the same way. */
+/* Returns whether both descriptions have the same address and layout. */
 bool session_is_same_array(const insitu_array *a, const insitu_array *b);
 
 #endif

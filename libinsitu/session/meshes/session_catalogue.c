@@ -1,10 +1,10 @@
-/* The catalogue lists the meshes and fields of all ranks. By it every rank finds out alone, and all alike, whether a
- * picture can be drawn, so that no rank misses a field in the middle of a collective call.
+/* The catalogue lists the meshes and fields of all ranks. From it every rank determines, without communication and with
+ * the same result, whether a picture can be drawn, so that no rank lacks a field in the middle of a collective call.
  *
  * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <centring> <name>"
- * is a field of it, "e <status> 0 <message>" says what is wrong with the mesh or field before it, if there is one.
- * Ranks whose tables are alike (the usual case, found by hashes in the step's one reduction) exchange nothing; else the
- * texts are gathered by all. */
+ * is a field of it, "e <status> 0 <message>" is the fault of the preceding mesh or field, if it has one. If all ranks'
+ * tables are equal (the usual case, which the step's one reduction finds by hashes) nothing is exchanged; else all
+ * ranks gather all texts. */
 #include "session_catalogue.h"
 
 #include <inttypes.h>
@@ -18,7 +18,7 @@
 
 /* ---- a rank's table as text ---------------------------------------------------------------------------------- */
 
-/* Writes at most capacity bytes; returns how many there are. */
+/* Writes a line within capacity bytes; returns the size of the text including the line, even if it does not fit. */
 static size_t append_line(char *text, size_t capacity, size_t at, char kind, int a, int b, const char *name)
 {
     const size_t room = at < capacity ? capacity - at : 0;
@@ -160,7 +160,7 @@ static session_catalogue_mesh *find_mesh(const session_catalogue *catalogue, con
     return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, by_mesh_name);
 }
 
-/* Stores the names of the meshes in the text, if names is not NULL. Returns how many there are. */
+/* Stores the names of the meshes in the text, if names is not NULL. Returns their number. */
 static size_t list_names(const char *text, size_t size, const char **names)
 {
     size_t count = 0;
@@ -175,7 +175,7 @@ static size_t list_names(const char *text, size_t size, const char **names)
     return count;
 }
 
-/* Makes the catalogue's meshes, by name, of the tables of all ranks. */
+/* Adds the catalogue's meshes, sorted by name, from the tables of all ranks. */
 static bool add_meshes(session_catalogue *catalogue, const char *text, size_t size)
 {
     const size_t count = list_names(text, size, NULL);
@@ -233,7 +233,7 @@ static session_catalogue_field *take_field(session_catalogue_mesh *mesh, bool ha
     return field;
 }
 
-/* Ends a rank's table of a mesh: notes the fields that were not in it. */
+/* Ends a rank's table of a mesh: records the fields that were missing from it. */
 static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;
@@ -253,8 +253,9 @@ static bool keep_fault(base_error **fault, int rank, insitu_status status, const
     return *fault != NULL;
 }
 
-/* Notes what is wrong on the rank; field: NULL where that is the mesh, mesh: NULL where it is not known. Where memory
- * ran out it is not known either: callers mostly leave out what they would have handed over next. */
+/* Records a fault of the rank. field: NULL if the mesh has the fault; mesh: NULL if its owner is unknown. Lack of
+ * memory is also recorded for the catalogue, because callers then mostly skip the data that they would have passed
+ * next. */
 static bool take_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
                        int rank, insitu_status status, const char *message)
 {
@@ -342,7 +343,7 @@ void session_catalogue_drop_derived(session_catalogue *catalogue)
     catalogue->are_derived = false;
 }
 
-/* ---- over all ranks ------------------------------------------------------------------------------------------ */
+/* ---- tables of all ranks ------------------------------------------------------------------------------------- */
 
 typedef struct gathered_tables {
     char *mine, *all;
@@ -451,7 +452,7 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
-/* 0 where this rank has no part. */
+/* Returns a hash of the rank and the stamp; 0 if this rank has no part. */
 static uint64_t stamp_of(int rank, int64_t stamp)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -460,7 +461,7 @@ static uint64_t stamp_of(int rank, int64_t stamp)
     return stamp ? hash : 0;
 }
 
-/* Adds up the ranks' hashes of when each mesh was last new. */
+/* Sums up, over the ranks, hashes of the stamps at which each mesh last changed. */
 static insitu_status update_parts(session_catalogue *catalogue, const session_meshes *meshes, const session_team *team,
                                   base_error *error)
 {

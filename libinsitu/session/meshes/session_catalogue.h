@@ -11,122 +11,123 @@ typedef struct session_catalogue_field {
     char *name;
     int component_count;
     insitu_centring centring;
-    int first_rank;    /* that has it */
-    int last_rank;     /* that has it together with cells; -1: none */
-    int odd_rank;      /* -1, or one that has it with another centring or count of components */
-    int lacking_rank;  /* -1, or one that has cells of the mesh but not the field */
-    int derived;       /* which of the scene's derived fields it is; -1: the caller's */
-    base_error *fault; /* what is wrong with it on some rank, the lowest; NULL: nothing */
+    int first_rank;    /* first rank that has it */
+    int last_rank;     /* last rank that has it together with cells; -1: none */
+    int odd_rank;      /* a rank that has it with another centring or number of components, or -1 */
+    int lacking_rank;  /* a rank that has cells of the mesh but not the field, or -1 */
+    int derived;       /* index among the scene's derived fields; -1: the caller's field */
+    base_error *fault; /* the fault on the lowest rank on which the field is faulty; NULL: none */
 } session_catalogue_field;
 
-/* A vertex that hangs on a face: its value is the sum of those of the face's corners, times weights. */
+/* A vertex that hangs on a face: its value is the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
-    int64_t group;      /* the group of the vertices that are this one (session_hanging.h) */
-    int64_t corners[4]; /* groups, or places among the values that come from other ranks */
+    int64_t group;      /* the group of equal vertices to which it belongs (session_hanging.h) */
+    int64_t corners[4]; /* groups, or indices among the values received from other ranks */
     double weights[4];
     bool is_received;
 } session_hanging_vertex;
 
-/* A vertex that is the same as others but for rounding, and the least of their places. */
+/* A vertex that is equal to others up to rounding, and the least position of these. */
 typedef struct session_twin {
     int64_t vertex;
     double place[3];
 } session_twin;
 
-/* What vertices may hang on, and which may, of this rank's part of a mesh; kept while vertices move. */
+/* This rank's outer faces of a mesh, on which vertices may hang, and the vertices that may hang; kept while vertices
+ * move. */
 typedef struct session_border {
-    uint64_t cells; /* session_catalogue_mesh.cells that it is of; 0: not known */
+    uint64_t cells; /* value of session_catalogue_mesh.cells for which it was computed; 0: unknown */
     int64_t face_count, vertex_count;
-    session_face *faces; /* that one cell alone has, over all ranks */
+    session_face *faces; /* faces that only one cell has, over all ranks */
     int64_t *vertices;   /* vertices of faces that this rank has once */
-    int64_t twin_count;  /* found again where vertices move: session_hanging.twins */
-    session_twin *twins; /* in the order of vertices */
+    int64_t twin_count;  /* updated if vertices move: session_hanging.twins */
+    session_twin *twins; /* sorted by vertex */
 } session_border;
 
-/* This rank's hanging vertices of the meshes of a joint, and what it sends to others for theirs. */
+/* This rank's hanging vertices in the meshes of a joint, and the values that it sends to other ranks for theirs. */
 typedef struct session_hanging {
     uint64_t places;         /* session_joint.places that it is of; 0: not known */
     session_border *borders; /* one for each mesh; NULL: none are known */
     uint64_t twins;          /* version of the vertex places for which the twins of borders were found */
     int64_t count, total;    /* on this rank, on all */
     session_hanging_vertex *vertices;
-    int64_t *sent_counts, *sent_groups; /* to each rank; whose values, rank by rank */
+    int64_t *sent_counts, *sent_groups; /* per rank, the number of values sent; their groups, in the order of ranks */
     int64_t sent_total;
 } session_hanging;
 
 typedef struct session_catalogue_mesh {
     char *name;
-    int first_rank;        /* that has cells of it; -1: none */
-    bool has_ids;          /* all of these give vertex ids */
-    bool has_shells_alone; /* the cells that are drawn, of all ranks; found by session_check_vertex_order() */
-    base_error *fault;     /* likewise: then the step does without the mesh, but knows the names of its fields */
+    int first_rank;        /* first rank that has cells of it; -1: none */
+    bool has_ids;          /* all ranks with cells give vertex ids */
+    bool has_shells_alone; /* all drawn cells, over all ranks, are shells; set by session_check_vertex_order() */
+    base_error *fault;     /* likewise a fault: the step then ignores the mesh, but its fields' names are kept */
     int field_count;
     session_catalogue_field *fields;
-    uint64_t apart;         /* session_joint.name of this mesh alone, if it has ids; else 0 */
-    uint64_t cells, places; /* hashes of when cells and coordinates were last new on each rank; 0: not known */
-    session_homes homes;    /* this rank's view of the parts; known where it has been asked for at these places */
+    uint64_t apart;         /* session_joint.name of a joint with only this mesh if it has ids; else 0 */
+    uint64_t cells, places; /* hashes of the stamps of cells and of coordinates over the ranks; 0: unknown */
+    session_homes homes;    /* this rank's view of the parts; up to date if it was requested for these places */
 } session_catalogue_mesh;
 
-/* Meshes whose vertices, where they are the same, have one mean of cell values: those that have a layer's field, and no
- * vertex ids. A mesh with ids is a joint of its own. */
+/* A set of meshes over which equal vertices have one mean of cell values: the meshes that have a layer's field, and no
+ * vertex ids. A mesh with ids is a joint by itself. */
 typedef struct session_joint {
     uint64_t name; /* scene_field.joined, or session_catalogue_mesh.apart */
     int count;
-    session_catalogue_mesh **meshes; /* by name */
-    bool by_id;                      /* the joint is one mesh, whose vertices are the same by global ids */
-    uint64_t places;                 /* the places of all its meshes */
+    session_catalogue_mesh **meshes; /* sorted by name */
+    bool by_id;                      /* the joint is one mesh, whose vertices are equal if their global ids are */
+    uint64_t places;                 /* hash of the positions of all its meshes */
     session_homes own_homes;         /* used by a joint of several meshes */
     const session_homes *homes;
     session_hanging hanging;
 } session_joint;
 
 typedef struct session_catalogue {
-    bool is_known;        /* by a step before this one */
-    bool has_faults;      /* anywhere in it */
-    bool are_derived;     /* the derived fields of the present scene are in it */
-    bool are_joined;      /* joints are those of the present scene */
-    bool are_parts_known; /* the meshes' cells and places are the present ones */
-    base_error *fault;    /* a fault whose cause is not known, with which no image can be drawn */
+    bool is_known;        /* known from an earlier step */
+    bool has_faults;      /* some mesh or field has a fault */
+    bool are_derived;     /* contains the derived fields of the current scene */
+    bool are_joined;      /* joints are those of the current scene */
+    bool are_parts_known; /* the meshes' hashes of cells and places are up to date */
+    base_error *fault;    /* a fault with unknown cause, with which no image can be drawn */
     int mesh_count, joint_count;
     session_catalogue_mesh *meshes;
     session_joint **joints;
 } session_catalogue;
 
-/* is_shared: all ranks have the same names, by session_names_hash(), and nothing is wrong with any mesh or field.
- * Meshes with a fault are put aside. Collective. */
+/* Updates the catalogue. is_shared: all ranks have the same names, by session_names_hash(), and no mesh or field has a
+ * fault. Meshes with a fault are put aside. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
-/* Finds the homes of all meshes and joints where they are not known. half_diagonal: of the scene. Collective, agreed.
- */
+/* Updates the homes of all meshes and joints that are out of date. half_diagonal: of the scene. Collective, agreed. */
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error);
-/* Call this on all ranks where cells have changed on any: then update finds of which meshes. Local. */
+/* Call this on all ranks if cells have changed on any; session_update_homes() then finds which meshes changed.
+ * Local. */
 void session_forget_homes(session_catalogue *catalogue);
 
-/* The name of the joint that the mesh is in where the layer's meshes are joined. */
+/* Returns the name of the joint to which the mesh belongs if the layer's meshes are joined. */
 static inline uint64_t session_joint_name(const session_catalogue_mesh *mesh, uint64_t joined)
 {
     return mesh->apart ? mesh->apart : joined;
 }
 
-/* The joint of this name; NULL: there is none. */
+/* Returns the joint of this name; NULL if there is none. */
 session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t name);
 void session_drop_joints(session_catalogue *catalogue);
-/* Frees what is known of vertices, and if with_borders that of faces too. count: of meshes. */
+/* Frees the data of vertices, and if with_borders also that of faces. count: number of meshes. */
 void session_hanging_free(session_hanging *hanging, int count, bool with_borders);
 
-/* A hash of this rank's names: equal on two ranks when their tables say the same. Local. */
+/* Returns a hash of this rank's names, which is equal on two ranks if their tables are. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);
 
-/* Adds a field that all ranks with cells of the mesh have; there is none of the name. NULL where memory ran out. */
+/* Adds a field that all ranks with cells of the mesh have; its name must be new. Returns NULL if memory ran out. */
 session_catalogue_field *session_catalogue_add(session_catalogue_mesh *mesh, const char *name, int component_count,
                                                insitu_centring centring, int derived);
 /* Removes the derived fields. */
 void session_catalogue_drop_derived(session_catalogue *catalogue);
 
-/* NULL: no rank has the field. Local. */
+/* Returns the field; NULL if no rank has it. Local. */
 const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name);
 
 #endif

@@ -1,6 +1,6 @@
-/* The rooms below read each cell's vertices one after the other, in VTK's order. Kernels that take eight cells at once
- * rely on it, so another order is a copy of connectivity rather than a case in each of them. Cells that are the same in
- * both orders, as tets, are not copied. */
+/* All other code reads each cell's vertices contiguously, in VTK's order. Kernels that process eight cells at once rely
+ * on it, so for another order connectivity is copied, instead of a case in each of these kernels. Cells that are the
+ * same in both orders, such as tets, are not copied. */
 #include "session_cell_order.h"
 
 #include "region.h"
@@ -25,7 +25,7 @@ bool session_is_reordered(const insitu_mesh *given)
     return has_gaps || session_vertex_turn(given->vertex_order, type);
 }
 
-/* Tells whether any of mixed cells is in another order than VTK's. */
+/* Returns whether a mesh of mixed cells has any cell in another order than VTK's. */
 static bool has_turned_cells(const session_mesh *mesh)
 {
     const grid *g = &mesh->cells;
@@ -34,7 +34,7 @@ static bool has_turned_cells(const session_mesh *mesh)
     return cell < g->cell_count;
 }
 
-/* Entries of the caller's connectivity that cells use, and where they stand. */
+/* Entries of the caller's connectivity that cells use, and their layout. */
 typedef struct cell_rows {
     const grid_array *connectivity;
     int64_t count, row, used; /* `used` entries of each row are read */
@@ -57,8 +57,8 @@ static cell_rows rows_of(const session_mesh *mesh)
     return rows;
 }
 
-/* Tells whether all entries fit into 4 bytes. One that does not, though vertices are few, is a bad index, and is copied
- * whole so that it is reported as it is. */
+/* Returns whether all entries fit into 4 bytes. If one does not although there are few vertices, it is a bad index;
+ * entries are then copied with 8 bytes, so that it is reported with its value. */
 static bool fit_narrow(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;
@@ -76,7 +76,7 @@ static bool fit_narrow(const cell_rows *rows, int threads)
     return least >= INT32_MIN && most <= INT32_MAX;
 }
 
-/* The cell's place in the copy; false where its offsets are bad. */
+/* Computes the cell's position in the copy; returns false if its offsets are bad. */
 static bool place_of(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
 {
     *first = cell * count;

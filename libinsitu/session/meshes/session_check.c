@@ -1,9 +1,9 @@
-/* Proof of a mesh, before anything below the session reads it: grid's accessors trust their arrays.
+/* Validation of a mesh, before any other code reads it: the grid's accessors rely on valid arrays.
  *
- * One pass over the cells in parallel, in blocks. A thread that meets a bad cell keeps the lowest one it knows of, and
- * the cell named in the end is the lowest of all, whatever the number of threads. What is wrong with it is worked out
- * once, afterwards. Coordinates are looked at where a drawn cell uses them: vertices of no cell, or of ghosts alone,
- * may hold anything. Indices are proved for ghosts too. */
+ * The cells are checked in one parallel pass, in blocks. Each thread keeps the lowest bad cell that it meets, and the
+ * reported cell is the lowest of all, for any number of threads. Its fault is determined once, afterwards. Coordinates
+ * are checked if a drawn cell uses them: vertices of no cell, or only of ghosts, may have any coordinates. Indices are
+ * checked for ghosts too. */
 #include "session_check.h"
 
 #include <omp.h>
@@ -21,15 +21,15 @@
 
 /* ---- polyhedra -----------------------------------------------------------------------------------------------
  *
- * The faces of a polyhedron are faces, and together they bound something. A ray that goes into a cell must come out:
- * along every edge of the faces exactly two of them meet. The edges are sorted, so that those of a pair stand side by
- * side; an edge from a vertex to itself bounds nothing and is left out. */
+ * Checks that the faces of a polyhedron are valid and together bound a volume. A ray that enters a cell must leave it,
+ * so exactly two faces must meet at every edge. The edges are sorted, so that the two of a pair are adjacent; an edge
+ * from a vertex to itself bounds nothing and is skipped. */
 
 typedef struct face_edge {
     int64_t low, high, face;
 } face_edge;
 
-/* Room that grows with the cells: one for each thread, zeroed at first. */
+/* A growing buffer per thread; initially zero. */
 typedef struct face_room {
     face_edge *edges;
     int64_t capacity;
@@ -38,21 +38,21 @@ typedef struct face_room {
 typedef enum face_fault {
     FACES_GOOD,
     FACES_NO_MEMORY,
-    FACES_TOO_FEW,       /* a cell of less than 4 faces */
-    FACE_BAD_INDEX,      /* no such face */
-    FACE_BAD_OFFSETS,    /* outside face_connectivity, or falling */
+    FACES_TOO_FEW,       /* a cell with less than 4 faces */
+    FACE_BAD_INDEX,      /* a face that does not exist */
+    FACE_BAD_OFFSETS,    /* offsets outside face_connectivity, or decreasing */
     FACE_TOO_SMALL,      /* less than 3 vertices */
-    FACE_BAD_VERTEX,     /* no such vertex */
-    FACE_BAD_COORDINATE, /* not finite; not looked at in ghosts */
-    FACES_OPEN           /* an edge that is not one of exactly two faces */
+    FACE_BAD_VERTEX,     /* a vertex that does not exist */
+    FACE_BAD_COORDINATE, /* not finite; not checked in ghosts */
+    FACES_OPEN           /* an edge that does not belong to exactly two faces */
 } face_fault;
 
 typedef struct face_place {
-    int64_t count; /* the number of the cell's faces */
-    int64_t face;  /* index as it stands in the connectivity */
+    int64_t count; /* number of the cell's faces */
+    int64_t face;  /* index as stored in the connectivity */
     int64_t first, next;
-    int64_t vertex, other; /* at fault; the ends of an edge */
-    int sharing;           /* faces that have the edge */
+    int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
+    int sharing;           /* number of faces that have the edge */
     double position[3];
 } face_place;
 
@@ -151,7 +151,7 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
                                     base_error *error)
 {
     const char *name = mesh->name;
-    const long long base = mesh->given.index_base; /* indices and offsets are told as the caller has them */
+    const long long base = mesh->given.index_base; /* indices and offsets are reported as the caller has them */
     const long long at = cell, face = place->face + base, vertex = place->vertex + base;
     switch (fault) {
     case FACES_NO_MEMORY:
@@ -202,7 +202,7 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 typedef struct fault_place {
     int type;
     int64_t first, next; /* offsets */
-    int64_t vertex;      /* index as it stands in the connectivity */
+    int64_t vertex;      /* index as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
     face_place faces;
@@ -231,7 +231,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
-/* Checks a polygon, the type whose number of vertices differs from cell to cell. */
+/* Checks a polygon. Only for this type the number of vertices differs from cell to cell. */
 static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_place *place)
 {
     const grid *g = &mesh->cells;
@@ -257,7 +257,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
-    if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD; /* padding has no vertices, others are in range */
+    if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD; /* padding has no vertices; others are in range */
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
         place->next = grid_offset_end(&g->offsets, cell);
@@ -303,7 +303,7 @@ static const char *type_name(int type)
     }
 }
 
-/* The name of the type that the caller gave: a polyhedron may be read as another type. */
+/* Returns the name of the type that the caller gave: a polyhedron may be read as another type. */
 static const char *given_name(const session_mesh *mesh, int64_t cell)
 {
     return type_name(session_given_type(mesh, cell));
@@ -338,7 +338,7 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
-/* The cell is checked again; if it is good now, memory ran out before. */
+/* Reports a bad cell, which is checked again; if it is valid now, memory ran out before. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
@@ -372,7 +372,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     return describe_faces(mesh, cell, FACES_NO_MEMORY, &place.faces, error);
 }
 
-/* Cells of any layout, one by one. */
+/* Checks cells of any layout one by one. */
 static int64_t check_each(const session_mesh *mesh, int64_t begin, int64_t end, face_room *room, mesh_tally *tally)
 {
     mesh_tally own = tally_empty();
@@ -384,7 +384,7 @@ static int64_t check_each(const session_mesh *mesh, int64_t begin, int64_t end, 
     return cell;
 }
 
-/* The lowest bad cell, or cell_count. */
+/* Returns the lowest bad cell, or cell_count. */
 static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
 {
     const int64_t count = mesh->cells.cell_count;
@@ -400,7 +400,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
             const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
-            /* A run ends at a bad cell, or at a polygon, which it does not know. */
+            /* A run ends at a bad cell, or at a polygon, which it cannot check. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
             if (at < end) at = check_each(mesh, at, end, &room, &mine);
             if (at < end) first_bad = at;
@@ -424,10 +424,10 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
                      mesh->name, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
-/* With larger coordinates, squares and volumes would overflow double. */
+/* Largest coordinate with which squares and volumes do not overflow double. */
 static const double largest_coordinate = 1e100;
 
-/* The first drawn cell with too large a coordinate. */
+/* Reports the first drawn cell with too large a coordinate. */
 static insitu_status describe_far_cell(const session_mesh *mesh, base_error *error)
 {
     const grid *g = &mesh->cells;
@@ -450,8 +450,8 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
     return INSITU_OK;
 }
 
-/* Cells of three dimensions in a mesh without z have no volume. The first drawn one is told; mixed cells alone come
- * here, as the set call knows the type of others. */
+/* Reports the first drawn cell with volume in a mesh without z, in which it would have none. Only mixed cells are
+ * checked here, as insitu_set_mesh() knows the type of others. */
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
@@ -489,7 +489,7 @@ static void find_flat(const grid *g, int threads, uint64_t *flat)
     }
 }
 
-/* Finds the cells without volume, which trees leave out. If they are others than before, the tree is dropped. */
+/* Finds the cells without volume, which are omitted from trees. If they have changed, the tree is dropped. */
 static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads, base_error *error)
 {
     const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat;
@@ -529,7 +529,8 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     return INSITU_OK;
 }
 
-/* Where cells are wrong, the topology made of them is dropped, as the caller may mend them in place. */
+/* Checks a mesh. If cells are invalid, the topology computed from them is dropped, as the caller may correct them in
+ * place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     session_fill_conformed(mesh, threads);

@@ -1,6 +1,6 @@
-/* A lattice's cells need no connectivity: the number of a vertex follows from its three indices. Uniform and
- * rectilinear coordinates are a table along each axis. A uniform coordinate is origin + spacing * index with the index
- * in the whole lattice, so that blocks and ranks that share a vertex compute the same bits. */
+/* A lattice's cells need no connectivity: the number of a vertex is computed from its three indices. Uniform and
+ * rectilinear coordinates are stored as a table along each axis. A uniform coordinate is origin + spacing * index with
+ * the index in the whole lattice, so that blocks and ranks that share a vertex compute the same bits. */
 #include "session_lattice.h"
 
 #include <math.h>
@@ -64,7 +64,7 @@ static insitu_status check_cells(const insitu_lattice *l, base_error *error)
                      (long long)l->cells[0], (long long)l->cells[1], (long long)l->cells[2]);
 }
 
-/* The axes in the order of their strides; an axis with a single index comes first, as its stride is never used. */
+/* Sorts the axes by stride; an axis with a single index comes first, as its stride is never used. */
 static void order_axes(const int64_t strides[3], const int64_t counts[3], int order[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -76,12 +76,12 @@ static void order_axes(const int64_t strides[3], const int64_t counts[3], int or
     }
 }
 
-/* Checks that the strides nest, and that the numbers of all count[0] x count[1] x count[2] lie within an array. */
+/* Checks that the strides nest, and that all count[0] x count[1] x count[2] numbers lie within an array. */
 static insitu_status check_strides(const char *what, const int64_t strides[3], const int64_t counts[3], int64_t length,
                                    base_error *error)
 {
     int order[3];
-    int64_t reach = 1; /* numbers from the first to the last of the axes so far */
+    int64_t reach = 1; /* count of numbers from the first to the last of the axes so far */
     order_axes(strides, counts, order);
     for (int i = 0; i < 3; i++) {
         const int axis = order[i];
@@ -102,7 +102,8 @@ static insitu_status check_strides(const char *what, const int64_t strides[3], c
     return INSITU_OK;
 }
 
-/* Packed strides of so many, the first index fastest. The last cannot overflow where counts have been checked. */
+/* Computes packed strides for these counts, with the first index fastest. The last stride cannot overflow if counts
+ * have been checked. */
 static void packed_strides(const int64_t counts[3], int64_t out[3])
 {
     out[0] = 1;
@@ -144,7 +145,7 @@ static insitu_status check_interior(const insitu_lattice *l, base_error *error)
     return INSITU_OK;
 }
 
-/* Beyond it some whole numbers have no double. */
+/* Some integers above this are not representable as doubles. */
 static const int64_t largest_first = (int64_t)1 << 53;
 
 static insitu_status check_uniform(const insitu_lattice *l, base_error *error)
@@ -178,7 +179,7 @@ static insitu_status check_axes(const insitu_lattice *l, base_error *error)
     return INSITU_OK;
 }
 
-/* What a mesh with a lattice must not have. */
+/* Checks that a mesh with a lattice has no other description of its cells. */
 static insitu_status check_others(const insitu_mesh *mesh, base_error *error)
 {
     const struct {

@@ -1,4 +1,4 @@
-/* The table of meshes: ordered by name, so that all ranks go through theirs in one order. */
+/* The table of meshes, sorted by name, so that all ranks visit theirs in the same order. */
 #include "session_mesh.h"
 
 #include <string.h>
@@ -44,7 +44,7 @@ grid_array session_grid_array(const insitu_array *array)
 
 grid_array session_coordinates(const insitu_mesh *mesh, int axis)
 {
-    static const double zero = 0; /* and its first half is a float's */
+    static const double zero = 0; /* its first half is a float's zero */
     const insitu_array *given = &mesh->coordinates[axis];
     if (given->data) return session_grid_array(given);
     return (grid_array){.data = (const char *)&zero, .is_wide = session_type_size(mesh->coordinates[0].type) == 8};
@@ -333,7 +333,7 @@ static void free_mesh(session_mesh *mesh)
     base_free(mesh);
 }
 
-/* Where name stands, or would stand, among the meshes. */
+/* Returns the index at which name is, or would be inserted, among the meshes. */
 static int mesh_position(const session_meshes *meshes, const char *name)
 {
     int low = 0, high = meshes->count;
@@ -353,7 +353,7 @@ session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
     return at < meshes->count && strcmp(meshes->items[at]->name, name) == 0 ? meshes->items[at] : NULL;
 }
 
-/* Makes room for one more mesh. */
+/* Ensures space for one more mesh. */
 static bool make_room(session_meshes *meshes)
 {
     if (meshes->count < meshes->capacity) return true;

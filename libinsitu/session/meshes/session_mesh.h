@@ -1,4 +1,4 @@
-/* This rank's parts of the meshes: what the caller gave, what is known of it, and the trees over it. */
+/* This rank's parts of the meshes: the caller's data, data derived from it, and the trees over it. */
 #ifndef SESSION_MESH_H
 #define SESSION_MESH_H
 
@@ -15,9 +15,9 @@ typedef struct session_field {
     base_error problem;          /* what was wrong with the last insitu_set_field(), */
     bool is_problem_of_contents; /* or with its values, found by this step's check */
     bool has_index;
-    bool is_copy_stale; /* it was made of other values or by another index */
-    bool is_wanted;     /* by statistics of this step; fields of images have scalars */
-    bool is_filled;     /* given.fill has made the values in this step, unless it failed: */
+    bool is_copy_stale; /* the values or the index have changed since the copy was made */
+    bool is_wanted;     /* needed by statistics of this step; fields of images have scalars */
+    bool is_filled;     /* given.fill was called in this step; its values are valid unless it failed: */
     base_error fill_problem;
     bool is_derived;          /* the session makes it of other fields, in copy (plan/session_derived.h) */
     bool is_source;           /* a derived field that this step needs is made of it */
@@ -29,10 +29,10 @@ typedef struct session_field {
     int64_t copy_bytes;
 } session_field;
 
-/* Which of the drawn cells all of whose values are finite. */
+/* The cells over which an extent is taken. All are drawn and have only finite values. */
 typedef enum session_extent_kind {
     SESSION_SEEN,     /* all of them */
-    SESSION_POSITIVE, /* the least value over those of them all of whose values are positive */
+    SESSION_POSITIVE, /* for the minimum, only cells all of whose values are positive */
     SESSION_SOLID,    /* without shells */
     SESSION_EXTENTS
 } session_extent_kind;
@@ -43,18 +43,20 @@ typedef struct session_extremes {
     double low, high;
 } session_extremes;
 
-/* A plane that meshes are cut by. */
+/* A plane that cuts meshes. */
 typedef struct session_plane {
-    double normal[3]; /* has length 1 */
-    double point[3];  /* on it */
-    bool is_central; /* the point is this far along the normal from the middle of the data's bounds, and goes with it */
-    double offset, share; /* share: as a scene_plane has it */
+    double normal[3]; /* unit normal */
+    double point[3];  /* a point on the plane */
+    /* the point is at `offset` along the normal from the middle of the data's bounds, and moves with them */
+    bool is_central;
+    /* share: additional shift along the normal, as a fraction (-1 .. 1) of half the data's extent */
+    double offset, share;
 } session_plane;
 
-/* A scalar that a layer uses: a component or the magnitude of a field, as it is or recentred to vertices; or the
+/* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;     /* in the mesh's fields; -1: distances */
+    int field;     /* index of the field in the mesh; -1: distances */
     int component; /* as grid_field.component */
     bool is_recentred;
     uint64_t joined;    /* scene_field.joined of recentred values */
@@ -63,7 +65,8 @@ typedef struct session_scalar {
     bool is_used;       /* an image of this step uses it */
     bool wants_ranges;  /* an image of this step needs its trees' ranges; colours need none */
     bool needs_all;     /* an image of this step may need any cell */
-    int interval_count; /* else the values that this step's images show: cells with some are candidates */
+    /* unless needs_all: intervals of the values that this step's images show; cells that meet one are candidates */
+    int interval_count;
     mmbvh_interval *intervals;
     session_plane plane;       /* the plane that distances are from */
     float *distances;          /* at vertices, a declared copy; NULL until computed */
@@ -73,20 +76,20 @@ typedef struct session_scalar {
                                   smooth normals of the last step that drew some */
     float (*gradients)[3];
     int64_t gradient_count;
-    bool are_values_stale; /* recentred ones are to be computed again */
-    bool is_suspect;       /* the values were set anew: they may have changed */
+    bool are_values_stale; /* recentred values must be computed again */
+    bool is_suspect;       /* the values were set anew and may have changed */
     bool has_checksum;
     uint64_t checksum;
-    uint64_t sample;     /* a checksum of a few of the values */
-    int64_t version;     /* counts the changes of the values that checksums have seen */
-    bool has_own_ranges; /* the tree nodes' own, else pairs */
+    uint64_t sample;     /* checksum of a few of the values */
+    int64_t version;     /* number of changes of the values that checksums have found */
+    bool has_own_ranges; /* ranges are in the tree's nodes, else in pairs */
     float *pairs;        /* NULL until computed */
     bool are_ranges_stale;
     int64_t unusable;
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
-/* A face of a cell, by its place in the cell's faces (session_cell_faces.h). */
+/* A face of a cell, by its index among the cell's faces (session_cell_faces.h). */
 typedef struct session_face {
     int64_t cell;
     int64_t face;
@@ -94,15 +97,15 @@ typedef struct session_face {
 
 struct session_mesh;
 
-/* The cells whose values of a scalar lie within bounds, all vertices' where the field is at vertices. */
+/* The cells whose values of a scalar lie within bounds; for a field at vertices, all vertices' values. */
 typedef struct session_threshold {
     bool is_given; /* else all cells */
-    int field;     /* in the mesh's fields; -1: the mesh does not have it, so that no cell is within */
+    int field;     /* index of the field in the mesh; -1: the mesh does not have it, so that no cell is within */
     int component; /* as grid_field.component */
     double low, high;
 } session_threshold;
 
-/* The faces of a mesh that one cell alone has, of the cells of a threshold over all ranks, and a mesh of tets and
+/* The faces of a mesh that only one cell has, among the cells of a threshold over all ranks, and a mesh of tets and
  * pyramids on them; a declared copy (session_outer_mesh.h). */
 typedef struct session_outer {
     session_threshold threshold;
@@ -115,33 +118,35 @@ typedef struct session_outer {
     double *coordinates;       /* the mesh's vertices × 3 */
     int64_t *connectivity, *offsets;
     unsigned char *types;
-    int64_t *loops;                         /* as render_part.loops */
-    int64_t *vertex_origins, *cell_origins; /* the vertex and the cell of the whole mesh whose values each has */
+    int64_t *loops; /* as render_part.loops */
+    /* per vertex and per cell of the outer mesh: that of the whole mesh whose values it has */
+    int64_t *vertex_origins, *cell_origins;
     int64_t bytes;
 } session_outer;
 
-/* Arrays of the session's own that are read in place of the caller's (session_topology.h). They are made once for each
+/* Arrays owned by the session that are read in place of the caller's (session_topology.h). They are computed once per
  * topology, and are declared copies. */
 typedef struct session_topology {
-    bool is_made;                     /* for the present cells, even if nothing had to be made */
-    bool has_own_order;               /* connectivity is read, beside the caller's offsets and types */
-    bool has_own_cells;               /* those next are read, else the caller's */
-    grid_array offsets, connectivity; /* no offsets: all cells are of cell_type */
-    unsigned char *cell_types;        /* NULL: all cells are of cell_type */
+    bool is_made;                     /* up to date for the current cells, even if there was nothing to compute */
+    bool has_own_order;               /* `connectivity` is read, with the caller's offsets and types */
+    bool has_own_cells;               /* the next members are read, else the caller's cells */
+    grid_array offsets, connectivity; /* no offsets: all cells have type cell_type */
+    unsigned char *cell_types;        /* NULL: all cells have type cell_type */
     int cell_type;
-    bool has_own_faces;                                  /* those next are read, else the caller's */
-    grid_array face_offsets, face_connectivity;          /* no data: there are no polyhedra */
-    int64_t connectivity_count, face_connectivity_count; /* lengths of what is read, the caller's or these */
+    bool has_own_faces;                         /* the next members are read, else the caller's faces */
+    grid_array face_offsets, face_connectivity; /* no data: there are no polyhedra */
+    /* lengths of the arrays that are read, the caller's or these */
+    int64_t connectivity_count, face_connectivity_count;
     int64_t cell_bytes, face_bytes;
-    int64_t polyhedron_count; /* how many the caller gave */
-    int64_t recognised_count; /* how many of them are read as tets, hexes, wedges or pyramids */
+    int64_t polyhedron_count; /* number of polyhedra that the caller gave */
+    int64_t recognised_count; /* number of these that are read as tets, hexes, wedges or pyramids */
 } session_topology;
 
-/* Vertices of its own for each corner of each cell, read in place of those that cells share (session_torn.h). A
- * declared copy. Corners count as the caller's connectivity has them, rows without their rests. */
+/* Separate vertices for each corner of each cell, read in place of the vertices that cells share (session_torn.h). A
+ * declared copy. Corners are numbered as in the caller's connectivity, without the unused ends of rows. */
 typedef struct session_torn {
-    bool is_torn; /* else all is empty */
-    bool is_made; /* from the present coordinates */
+    bool is_torn; /* if false, all else is empty */
+    bool is_made; /* from the current coordinates */
     int64_t corner_count;
     grid_array shared;  /* the connectivity that is torn */
     grid_array corners; /* the corner of each entry of shared; the map is its own inverse */
@@ -151,7 +156,7 @@ typedef struct session_torn {
 
 /* A structured block. */
 typedef struct session_lattice {
-    insitu_lattice given; /* what given.lattice of the mesh points to, unless that is NULL */
+    insitu_lattice given; /* given.lattice of the mesh points to it, unless that is NULL */
     grid_lattice cells;
     double *places[3]; /* coordinates along the axes, of uniform and rectilinear ones: a declared copy */
     int64_t bytes;     /* size of places in bytes */
@@ -183,10 +188,10 @@ typedef struct session_mesh {
     int field_count;
     session_field *fields;
 
-    int64_t cells_stamp, places_stamp; /* session_meshes.stamp when cells and coordinates were last new */
+    int64_t cells_stamp, places_stamp; /* session_meshes.stamp when cells and coordinates last changed */
     bool is_check_stale;
-    bool is_topology_stale;    /* the tree is of other cells */
-    bool is_geometry_stale;    /* the tree is of other coordinates */
+    bool is_topology_stale;    /* the tree belongs to other cells */
+    bool is_geometry_stale;    /* the tree belongs to other coordinates */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count; /* shells are drawn and flat */
     bool has_shells_alone; /* as session_catalogue_mesh.has_shells_alone: on all ranks */
@@ -197,35 +202,36 @@ typedef struct session_mesh {
     bool is_needed; /* an image of this step draws it */
     bool has_tree;
     mmbvh tree;
-    bool is_partial;         /* the tree is over the candidates of candidates_key, while nothing changes */
-    bool are_bounds_partial; /* the full tree's bounds are of the candidates, likewise */
+    bool is_partial;         /* the tree contains only the candidates of candidates_key, as long as nothing changes */
+    bool are_bounds_partial; /* the full tree's bounds are those of the candidates, likewise */
     double built_surface;    /* half the surface of the mesh's bounds when the tree was built */
     uint64_t candidates_key;
-    int full_tree_steps; /* steps that the present full tree, or the last one, has served; 0: there was none yet */
-    double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */
+    /* number of steps that the current full tree, or the last one, has been used; 0: there was none yet */
+    int full_tree_steps;
+    double rent; /* seconds spent on partial trees since the cells last changed, beyond the cost of a full tree */
     int scalar_count;
     session_scalar *scalars;
 
-    int outer_count; /* one for each threshold, and one without */
+    int outer_count; /* one per threshold, and one without a threshold */
     session_outer **outers;
 } session_mesh;
 
-/* The fill of the caller's that is running (session_filled.h). */
+/* The fill function of the caller that is running (session_filled.h). */
 typedef struct session_filling {
     const char *mesh, *field; /* NULL: none is running */
-    base_error refused;       /* the first call of the fill on its session */
+    base_error refused;       /* error of the first session call that the fill function made */
 } session_filling;
 
 /* All meshes of this rank. */
 typedef struct session_meshes {
     int count, capacity;
-    session_mesh **items;               /* by name */
-    bool are_cells_changed;             /* or coordinates, since the last agreed extent */
-    bool are_names_changed;             /* since the last agreed catalogue */
-    int64_t stamp;                      /* one more for each change of cells or coordinates */
-    base_error pending;                 /* the error of a set call that had no mesh to keep it; for one step */
-    char *pending_mesh, *pending_field; /* that it is about; NULL: of any */
-    int aside_count;                    /* meshes that this step does without, beyond count in items */
+    session_mesh **items;               /* sorted by name */
+    bool are_cells_changed;             /* cells or coordinates have changed since the last agreed extent */
+    bool are_names_changed;             /* names have changed since the last agreed catalogue */
+    int64_t stamp;                      /* incremented by each change of cells or coordinates */
+    base_error pending;                 /* error of a set call for which there was no mesh to keep it; for one step */
+    char *pending_mesh, *pending_field; /* its mesh and field; NULL: any */
+    int aside_count;                    /* number of meshes that this step ignores, stored in items behind count */
     session_filling filling;
 } session_meshes;
 
@@ -252,7 +258,7 @@ bool session_is_aligned(const insitu_array *array);
 /* An array as the rooms below read it; its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
-/* The vertices' coordinates along an axis: 0 along z, one element for all of them, where none are given. */
+/* Returns the vertices' coordinates along an axis; if z is not given, a single 0 for all vertices. */
 grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
 /* As above, for an array whose indices count from the mesh's index_base. */
@@ -275,24 +281,24 @@ static inline void session_put_index(const grid_array *array, int64_t i, int64_t
         *(int32_t *)(void *)p = (int32_t)value;
 }
 
-/* Frees an array of the session's own. */
+/* Frees an array owned by the session. */
 void session_drop_array(grid_array *array);
 
-/* NULL: there is none of this name. */
+/* Returns the mesh; NULL if there is none of this name. */
 session_mesh *session_find_mesh(const session_meshes *meshes, const char *name);
-int session_find_field(const session_mesh *mesh, const char *name); /* -1: there is none */
+int session_find_field(const session_mesh *mesh, const char *name); /* index, or -1 */
 
-/* Adds a field without values, whose name is new and is copied. NULL where memory runs out. */
+/* Adds a field without values; its name must be new and is copied. Returns NULL if memory runs out. */
 session_field *session_add_field(session_mesh *mesh, const char *name);
 
-/* Add an empty mesh, whose name is new. NULL where memory runs out. */
+/* Adds an empty mesh, whose name must be new. Returns NULL if memory runs out. */
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error);
-/* Nothing happens where there is none of this name. */
+/* Removes the mesh if there is one of this name. */
 void session_remove_mesh(session_meshes *meshes, const char *name);
 
-/* Free what depends on the fields' values, on the cells, or all that is known of the mesh. */
+/* Free the data that depends on the fields' values, on the cells, or all data of the mesh. */
 void session_drop_scalars(session_mesh *mesh);
-/* Frees one of them; those after it move up. */
+/* Frees one scalar; those after it move up. */
 void session_drop_scalar(session_mesh *mesh, int number);
 void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
@@ -306,12 +312,12 @@ void session_drop_copy(session_field *field);
 void session_drop_field_tables(session_field *field);
 /* Removes the derived fields, and with them all scalars and thresholds, which go by the numbers of fields. */
 void session_drop_derived(session_mesh *mesh);
-/* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
+/* Frees the mesh of outer faces, and if with_faces also the faces; its threshold stays. */
 void session_drop_outer(session_outer *outer, bool with_faces);
-/* Drops all outer surfaces of a mesh; where cells are new, thresholds go too. */
+/* Drops all outer surfaces of a mesh; if cells are new, thresholds too. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
-/* Drops all that is known of a mesh whose description is wrong, but the names of its fields: images that show these
+/* Drops all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
  * need the mesh. */
 void session_refuse_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
@@ -323,52 +329,53 @@ void session_meshes_free(session_meshes *meshes);
 typedef struct session_part_walk {
     const session_meshes *meshes;
     session_mesh *part;
-    session_mesh *whole;  /* the mesh whose outer faces the part is made of; NULL: the part is a mesh itself */
-    session_outer *outer; /* these faces; NULL likewise */
+    session_mesh *whole;  /* the mesh to which the part's outer faces belong; NULL: the part is a mesh itself */
+    session_outer *outer; /* these faces, or NULL */
     int mesh_at, whole_at, outer_at;
 } session_part_walk;
 
 /* Returns false after the last part. */
 bool session_next_part(session_part_walk *walk);
 
-/* The number of cells that the caller gave; a lattice's array of cells may have padding. */
+/* Returns the number of cells that the caller gave; a lattice's array of cells may have padding. */
 static inline int64_t session_cell_count(const session_mesh *mesh)
 {
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
 }
 
-/* The number of vertices that scalars have values at. */
+/* Returns the number of vertices at which scalars have values. */
 static inline int64_t session_vertex_count(const session_mesh *mesh)
 {
     return mesh->torn.is_torn ? mesh->torn.corner_count : mesh->cells.vertex_count;
 }
 
-/* The first error that a set call left behind, or NULL. */
+/* Returns the first error of a set call that has not been returned by a step yet, or NULL. */
 const base_error *session_pending_error(const session_meshes *meshes);
 
-/* Keep an error of a set call that has no mesh to keep it. field: NULL where no field is to blame alone. */
+/* Stores an error of a set call for which there is no mesh to keep it. field: NULL if the error does not belong to a
+ * single field. */
 void session_keep_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
-/* Keeps what is wrong with a field's values for the rest of the step, and passes it on if it is the first. */
+/* Stores an error in a field's values for the rest of the step; copies it to *first if that holds no error yet. */
 void session_keep_problem(session_field *field, const base_error *problem, base_error *first);
 
-/* Takes a mesh out of the list for the rest of a step, as if this rank had no part of it. */
+/* Removes a mesh from the list for the rest of a step, as if this rank had no part of it. */
 void session_put_aside(session_meshes *meshes, session_mesh *mesh);
-/* Takes back the meshes that were put aside. */
+/* Returns the meshes that were put aside to the list. */
 void session_take_back(session_meshes *meshes);
 
-/* Refuses a public call if a fill of the session makes it: it would change what the step reads. Returns whether it
- * does; filling.refused says so, and is what the step fails with. Local. */
+/* Refuses a public call if it is made inside a fill function, as it would change data that the step reads. Returns
+ * whether it was refused; the error is stored in filling.refused, and the step fails with it. Local. */
 bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
-/* Tells whether cells are given by the owners of their faces. */
+/* Returns whether cells are described by the owners of their faces. */
 static inline bool session_has_owners(const insitu_mesh *mesh)
 {
     return mesh->owner.data || mesh->boundary_owner.data;
 }
 
-/* The number of given faces: those of the list for the boundary come behind the others. */
+/* Returns the number of given faces. Those of the separate list for the boundary come after the others. */
 static inline int64_t session_face_count(const insitu_mesh *mesh)
 {
     return mesh->face_count + mesh->boundary_face_count;

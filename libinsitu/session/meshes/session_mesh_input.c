@@ -1,6 +1,6 @@
 /* The set calls fill in the table of meshes. Only descriptions are checked here; a step reads the arrays. An error is
- * returned at once, and stays with the mesh or the field until that is set again, so that the next step can return it
- * on every rank. */
+ * returned immediately, and kept with the mesh or the field until that is set again, so that the next step can return
+ * it on every rank. */
 #include "session_mesh_input.h"
 
 #include <stdio.h>
@@ -66,7 +66,7 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Tells whether cells without z coordinates may be seen: shells in the plane z = 0. */
+/* Returns whether cells without z coordinates may be visible: as shells in the plane z = 0. */
 static bool may_be_plane(const insitu_mesh *mesh)
 {
     if (mesh->lattice) return session_is_plane(mesh->lattice);
@@ -122,7 +122,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* An array of pointers: its type is that of what they point to. */
+/* Checks arrays of pointers, whose type is that of the elements to which they point. */
 static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_array *lists = &mesh->face_lists;
@@ -138,7 +138,8 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
     return session_check_pointers(lists, &rule, INSITU_ERROR_MESH, error);
 }
 
-/* Cells that have their faces by owner and neighbour have them by nothing else. */
+/* Checks a description of faces by owners and neighbours; such a mesh must not describe its cells in another way
+ * too. */
 static insitu_status check_owner(const insitu_mesh *mesh, base_error *error)
 {
     if (!session_has_owners(mesh)) {
@@ -193,7 +194,7 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks that cells given in rows are not given in another way as well. */
+/* Checks that cells given in rows are not described in another way as well. */
 static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = grid_type_vertices((int)mesh->cell_type);
@@ -255,7 +256,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Tells whether cells must differ, whatever the caller says. */
+/* Returns whether cells must differ, whatever the caller declares. */
 static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 {
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||

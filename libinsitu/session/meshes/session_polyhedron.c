@@ -1,14 +1,14 @@
-/* The unit of sample distances is the mean size of cells, which comes from volumes. So a volume depends on the cell's
- * geometry alone: another rank may list a face from another vertex on or the other way round, and faces in another
- * order. Differences by rounding remain, but not in the mean size (session_space.c). */
+/* The distance between samples depends on the mean size of cells, which is computed from volumes. So a volume must
+ * depend only on the cell's geometry: another rank may list a face beginning at another vertex or in the opposite
+ * direction, and faces in another order. Differences by rounding remain, but not in the mean size (session_space.c). */
 #include "session_polyhedron.h"
 
 #include <string.h>
 
 typedef struct cell_frame {
-    double mean[3]; /* the mean of the vertices, each as often as faces have it */
+    double mean[3]; /* mean of the vertices, each weighted by the number of its faces */
     double least[3];
-    double box; /* volume */
+    double box; /* volume of the bounding box */
 } cell_frame;
 
 static bool comes_before(const double a[3], const double b[3])
@@ -23,7 +23,7 @@ typedef struct frame_sums {
     double count;
 } frame_sums;
 
-/* Adds a face's vertices. One that follows itself counts once. */
+/* Adds a face's vertices. Repeated consecutive vertices count once. */
 static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
 {
     int64_t from, to;
@@ -73,7 +73,7 @@ static void corner_from(const grid *g, int64_t entry, const double mean[3], doub
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
-/* Adds the tet on a triangle with a corner of the cell, all relative to the mean. */
+/* Returns the volume of the tet between a triangle and a corner of the cell, all relative to the mean. */
 static double volume_from(const double origin[3], double corners[3][3])
 {
     double d[3][3];
@@ -82,8 +82,8 @@ static double volume_from(const double origin[3], double corners[3][3])
     return tet_volume(d[0], d[1], d[2]);
 }
 
-/* The entry of a face's least vertex, from which its canonical triangles fan out. Where a face passes it twice, either
- * will do: the fan has the same triangles, and some of no area. */
+/* Returns the entry of a face's least vertex, at which its canonical fan of triangles begins. If the face contains that
+ * vertex twice, either entry is right: the fan has the same triangles, and some without area. */
 static int64_t least_entry(const grid *g, int64_t from, int64_t to)
 {
     int64_t least = from;
@@ -121,10 +121,11 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     }
 }
 
-/* The share of the cell's box that rounding may leave of a triangle's tet with a corner in the same plane. With u =
- * 2^-53: an edge is of three differences, each off by u of the box's side (the mean, whatever it is, drops out), a
- * determinant's six products of three edges by 9 u more, 2 u and 3 u of sums and products: 6 times 14 u, over 6. 32 u
- * leaves room for the sum over triangles, which are few beside 1 / u, the box's own roundings and squares of u. */
+/* Upper bound of the rounding of the volume of a triangle's tet with a corner in the same plane, as a share of the
+ * cell's box. With u = 2^-53: an edge is computed by three differences, each with an error of u of the box's side (the
+ * mean cancels, whatever it is); a determinant's six products of three edges add 9 u, and 2 u and 3 u for products and
+ * sums: 6 times 14 u, over 6. 32 u leaves a margin for the sum over triangles, whose number is small compared to 1 / u,
+ * the box's own rounding, and squares of u. */
 static const double flat_share = 0x1p-48;
 
 double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)

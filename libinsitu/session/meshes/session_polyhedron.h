@@ -4,8 +4,9 @@
 
 #include "grid.h"
 
-/* The volume: exact for cells that are star-shaped from their vertices' mean, else somewhat more; however faces are
- * listed the same but for rounding. Flat, of volume 0: in one plane, but for rounding. */
+/* Returns the volume: exact if the cell is star-shaped from the mean of its vertices, else somewhat larger. Up to
+ * rounding it does not depend on the order of faces and vertices. *is_flat: the cell lies in one plane up to rounding,
+ * and its volume is 0. */
 double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat);
 
 #endif

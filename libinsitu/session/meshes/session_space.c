@@ -1,14 +1,14 @@
-/* All numbers here come from reductions, and so are the same on every rank and for every partition. A new space means
- * new trees, so the old one is kept while the cells stay about where they were, even if the mesh moves a little in
- * every step. */
+/* All numbers here are results of reductions, and so are the same on every rank and for every partition. A new space
+ * requires new trees, so the old one is kept while the cells stay approximately in place, even if the mesh moves
+ * slightly in every step. */
 #include "session_space.h"
 
 #include "session_agree.h"
 
-/* Rounds the mean size to 13 bits, which is within 1.6e-4. Steps are derived from it, and the sum over cells is off by
- * 1e-12 or so, depending on the order of cells, of their vertices and of ranks. Rounding up begins at the golden ratio,
- * which is far from all fractions of small numbers, as the means of regular and refined lattices are. Halves are among
- * these: at them that error would decide. */
+/* Rounds the mean size to 13 bits, an error of at most 1.6e-4. Steps are derived from it, and the sum over cells has an
+ * error of about 1e-12, which depends on the order of cells, of their vertices and of ranks. Numbers are rounded up
+ * from the golden ratio on, which is far from all fractions of small integers; the means of regular and refined
+ * lattices are such fractions. Halves are too, so that ordinary rounding would be decided by that error. */
 static double rounded_size(double size)
 {
     enum { BITS = 13 };
@@ -42,7 +42,7 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
         status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .solid_count = totals[2], .rank_count = (int)totals[1]};
-    /* The mean is over cells that have a size: flat ones change no sample. */
+    /* The mean is over cells with a volume: flat cells do not affect samples. */
     if (totals[2] > 0) out->cell_size = rounded_size(all_sizes / (double)totals[2]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];
@@ -68,7 +68,8 @@ int session_flat_axis(const session_extent *extent)
     return flat;
 }
 
-/* Kept while the bounds' centre is inside the old ones and the size is within a factor of 4 up, 8 down. */
+/* Returns whether the space can be kept: the bounds' centre is inside the old bounds, and the size is at most 4 times
+ * and at least 1/8 of the old one. */
 static bool still_fits(const session_space *space)
 {
     if (!space->has_origin) return false;

@@ -54,11 +54,12 @@ double tally_signed_volume(int type, double points[][3])
     return signed_volume(type, points);
 }
 
-/* The share of its box's volume ex ey ez that rounding may leave of a cell without volume. With u = 2^-53: a
- * determinant is six products of one component along each axis, none longer than the box, and each passes at most 8
- * roundings (3 of edges, 2 of products, 3 of sums), so it is off by 48 u of the box at most. n of them sum with n - 1
- * roundings more of 6 of the box each, and count over shares: (8 + n - 1) 6 n / shares, 8 u of a tet, 90 u of a hex, 39
- * u of a wedge, 22 u of a pyramid. 128 u leaves room for the division's rounding, the box's own and squares of u. */
+/* Upper bound of the rounding of the volume of a flat cell, as a share of its box's volume ex ey ez. With u = 2^-53: a
+ * determinant is six products of one component along each axis, none longer than the box, and each has at most 8
+ * roundings (3 of edges, 2 of products, 3 of sums), so its error is at most 48 u of the box. The sum of n of them has n
+ * - 1 more roundings of 6 of the box each, and is divided by shares: (8 + n - 1) 6 n / shares, which is 8 u for a tet,
+ * 90 u for a hex, 39 u for a wedge, 22 u for a pyramid. 128 u leaves a margin for the division's rounding, the box's
+ * own and squares of u. */
 static const double flat_share = 0x1p-46;
 
 MMBVH_INLINE bool is_flat(double volume, double box)
@@ -80,8 +81,8 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
     return box;
 }
 
-/* Tells whether the cell has no volume at any of its corners. A cell that is turned through itself may have none in
- * sum, and still be there. */
+/* Returns whether the cell has no volume at any of its corners. A cell that intersects itself may have a sum of 0
+ * without being flat. */
 static bool is_flat_everywhere(int type, double points[][3])
 {
     const cell_corners of = corners_of(type);
@@ -90,7 +91,7 @@ static bool is_flat_everywhere(int type, double points[][3])
     return is_flat(sum / of.shares, box_volume(points, grid_type_vertices(type)));
 }
 
-/* The cube root as lanes have it (session_lane_loops.c): a library's would take longer than the volume. */
+/* Computes the cube root as lanes do (session_lane_loops.c): the library's would take longer than the volume. */
 MMBVH_INLINE double cell_size(double volume)
 {
     if (!(volume > 1e-280 && volume < 1e280)) return cbrt(volume);
@@ -106,7 +107,7 @@ MMBVH_INLINE double cell_size(double volume)
     return y;
 }
 
-/* 0 of a flat cell, whatever sign and size rounding left it. */
+/* Adds a cell's volume. For a flat cell it must be 0, whatever sign and size rounding left. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn++;
@@ -160,13 +161,13 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
     tally->flat += is_flat_cell;
 }
 
-/* ---- corners that do not agree ------------------------------------------------------------------------------- */
+/* ---- corners with different signs ---------------------------------------------------------------------------- */
 
 /* A corner counts as flat if its volume is less than this share of the cell's largest. Hexes with two coincident
  * vertices have such corners, and so have cells with a vertex on a nearly straight edge. */
 static const double least_share = 1e-6;
 
-/* A quad's corner has an area along the normal at the first corner. */
+/* Computes the areas at a quad's corners, along the normal at the first corner. */
 static void quad_corners(double points[][3], double out[4])
 {
     double normals[4][3];
@@ -217,7 +218,8 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
     return first >= 0 && next >= first && next <= mesh->topology.connectivity_count && next - first == count;
 }
 
-/* The vertices' positions; false where an index is out of range or, of a drawn cell, a coordinate is not finite. */
+/* Reads the vertices' positions; returns false if an index is out of range or, for a drawn cell, a coordinate is not
+ * finite. */
 MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_ghost, double points[][3],
                               const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
@@ -227,13 +229,13 @@ MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_g
         if (vertex < 0 || vertex >= g->vertex_count) return false;
         for (int axis = 0; axis < 3; axis++) {
             points[i][axis] = fetch_number(&g->coordinates[axis], vertex, wide_number);
-            poison += points[i][axis] - points[i][axis]; /* 0 while all are finite, then not a number */
+            poison += points[i][axis] - points[i][axis]; /* 0 while all are finite, then NaN */
         }
     }
     return is_ghost || poison == 0;
 }
 
-/* False where the cell is bad. */
+/* Adds one cell; returns false if it is bad. */
 MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, double *least,
                            const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
@@ -258,7 +260,7 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
     return true;
 }
 
-/* Cells from this one on, of its type, whose vertices follow each other: lanes take them. */
+/* Returns the run of cells from this one on that have its type and contiguous vertices, for processing in lanes. */
 MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
     const grid *g = &mesh->cells;
@@ -269,19 +271,20 @@ MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
     if (next > cell) alike.entry = fetch_first(g, cell, count, shape);
-    alike.count = next > cell ? next - cell : 1; /* one with wrong offsets stands alone */
+    alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is a run by itself */
     return alike;
 }
 
-/* Room for the connectivity of some of a lattice's cells. */
+/* Buffer for the connectivity of some of a lattice's cells. */
 enum { ROW_CELLS = 512 };
 typedef struct lattice_row {
     grid cells;
     int32_t vertices[ROW_CELLS * GRID_MAX_CELL_VERTICES];
 } lattice_row;
 
-/* Cells of a lattice from this one on, of one row; their connectivity is written into the room. One that is not drawn
- * stands alone, as do all of lattices whose cells do not follow each other along an axis. */
+/* Returns the run of a lattice's cells from this one on in one row, and writes their connectivity into the buffer. A
+ * cell that is not drawn is a run by itself, as is each cell of a lattice whose cells are not consecutive along an
+ * axis. */
 static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
 {
     const grid *g = &mesh->cells;
@@ -306,12 +309,12 @@ static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, 
     return alike;
 }
 
-/* Takes the first so many of the cells, and returns how many; *alone tells how many after them are to be taken one by
- * one. */
+/* Tallies the first cells of the run in lanes, and returns their number; *alone: number of the next cells that must be
+ * tallied one by one. */
 static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    if (alike->count < LANES || alike->g->lattice) return 0; /* as a cell that stands alone */
+    if (alike->count < LANES || alike->g->lattice) return 0; /* a run of a single cell */
     lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
@@ -324,8 +327,8 @@ static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, 
     return taken;
 }
 
-/* Cells of a run are tallied again, each with its own box, only if the least volume may be flat beside the box of all
- * of them. Computing all boxes would take a thirtieth of the time of a mesh of tets. */
+/* Tallies cells of a run again, each with its own box. This is needed only if the least volume may be flat compared to
+ * the box of all of them; computing all boxes would take a thirtieth of the time for a mesh of tets. */
 static mesh_tally tally_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
@@ -342,8 +345,8 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 
 /* The lengths of the drawn cells along an axis. */
 typedef struct axis_lengths {
-    int64_t positive, negative; /* how many; others are 0 */
-    double sizes;               /* the sum of their cube roots */
+    int64_t positive, negative; /* numbers of positive and negative lengths; others are 0 */
+    double sizes;               /* sum of their cube roots */
     double lower, upper;
 } axis_lengths;
 

@@ -1,12 +1,12 @@
-/* The rooms below the session read cells -> faces -> vertices. Codes of finite volumes hold faces -> vertices and, for
- * each face, the cell that owns it and the neighbour beyond. The link between the two is built here, once for each
- * topology: the faces of each cell, in the order of their numbers. The rooms below do not care which way round a face
- * runs, so nothing is turned. The faces' vertices are read where they are; only if each face has a list of its own, or
- * those of the boundary are in another list than the others, they are copied into one.
+/* All other code reads cells -> faces -> vertices. Finite-volume codes store faces -> vertices and, for each face, the
+ * cell that owns it and the neighbour beyond. The link between the two is computed here, once per topology: the faces
+ * of each cell, in the order of their numbers. The direction of a face's loop does not matter, so faces are not
+ * reversed. The faces' vertices are read in place; only if each face has its own list, or those of the boundary are in
+ * a separate list, they are copied into one.
  *
- * A polyhedron of six quads may be a hex, which is drawn in a fraction of the time. It is recognised by its faces
- * alone, never by coordinates: all ranks that have the cell take it for the same, and so does every step of a mesh that
- * moves.
+ * A polyhedron with six quads may be a hex, which is drawn in a fraction of the time. It is recognized by its faces
+ * alone, never by coordinates: all ranks that have the cell recognize it alike, and so does every step of a moving
+ * mesh.
  *
  *      t3 ------ t2
  *      /|        /|      The base is any face of the right size. The face on the other side of each of its edges
@@ -17,7 +17,7 @@
  *     |/       |/        where the base has four vertices, and a wedge where it has three. Sides that are triangles
  *     a0 ----- a1        have one top, which is that of a pyramid or a tet. The faces' own directions do not matter.
  *
- * If any cell is wrong, nothing is recognised in the mesh, so that session_check.c reports the error in the caller's
+ * If any cell is invalid, nothing is recognized in the mesh, so that session_check.c reports the error in the caller's
  * terms. */
 #include "session_topology.h"
 
@@ -94,7 +94,7 @@ int session_given_type(const session_mesh *mesh, int64_t cell)
     return grid_cell_type(&given, cell);
 }
 
-/* ---- faces' vertices out of several lists --------------------------------------------------------------------- */
+/* ---- faces' vertices from several lists ------------------------------------------------------------------------ */
 
 session_face_row session_given_face(const insitu_mesh *mesh, int64_t face)
 {
@@ -133,7 +133,7 @@ static insitu_status check_row(const session_mesh *mesh, int64_t face, const ses
     return INSITU_OK;
 }
 
-/* Returns how many vertices all faces have, or -1 if a list is bad. */
+/* Returns the total number of all faces' vertices, or -1 if a list is bad. */
 static int64_t count_listed(const session_mesh *mesh, base_error *error)
 {
     int64_t total = 0;
@@ -177,9 +177,9 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- cells' faces out of owner and neighbour ------------------------------------------------------------------ */
+/* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-static const int64_t outside = INT64_MIN; /* a cell of the halo, or none of an own list's face */
+static const int64_t outside = INT64_MIN; /* a halo cell, or no cell for a face of a separate list */
 
 session_face_sides session_sides(const insitu_mesh *given)
 {
@@ -200,7 +200,7 @@ void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_
     if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
     for (int i = 0; i < 2; i++)
         if (cells[i] >= given->cell_count && cells[i] - given->cell_count < given->halo_cell_count) cells[i] = outside;
-    /* CGNS has 0 for no cell on either side. */
+    /* CGNS uses 0 for no cell, on either side. */
     if (cells[1] >= 0 && (cells[0] == outside || (base == 1 && cells[0] == -1))) {
         cells[0] = cells[1];
         cells[1] = -1;
@@ -226,7 +226,7 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
     return INSITU_OK;
 }
 
-/* offsets[c + 1] becomes how many faces cell c has. */
+/* Stores in offsets[c + 1] the number of faces of cell c. */
 static insitu_status count_faces(const session_mesh *mesh, const session_face_sides *sides, const grid_array *offsets,
                                  base_error *error)
 {
@@ -240,8 +240,8 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
     return INSITU_OK;
 }
 
-/* The counts are turned into where each cell begins. As its faces are put there, that moves to where the cell ends,
- * which is where the next one begins. */
+/* Turns counts into offsets, then stores each face at the offsets of its cells. This advances each offset to the next
+ * cell's begin; the last loop shifts them back. */
 static void put_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
@@ -289,7 +289,7 @@ typedef struct face_ring {
     int64_t vertex[4];
 } face_ring;
 
-/* False where the face has another number of vertices, or is none. */
+/* Reads a face's vertices; returns false if it does not have 3 or 4 vertices, or does not exist. */
 static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
 {
     const grid *g = &mesh->cells;
@@ -306,8 +306,8 @@ static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
     return true;
 }
 
-/* Finds the unused face on the edge between ends, and the vertices that follow each of them on it; -1: there is none.
- */
+/* Finds the unused face on the edge between `ends`, and stores the vertices next to them on it; returns -1 if there is
+ * none. */
 static int find_side(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {
@@ -324,7 +324,7 @@ static int find_side(const face_ring *rings, int count, unsigned used, const int
     return -1;
 }
 
-/* Tells whether the ring goes around the tops, from any of them on and either way. */
+/* Returns whether the ring is the loop of the tops, beginning at any of them and in either direction. */
 static bool goes_around(const face_ring *ring, const int64_t *top, int n)
 {
     if (ring->count != n) return false;
@@ -345,7 +345,7 @@ static bool are_distinct(const int64_t *vertices, int count)
     return true;
 }
 
-/* The cell on a base, with sides of so many vertices, in VTK's order but for its handedness. */
+/* Constructs the cell on a base, with sides of side_size vertices, in VTK's order except for its handedness. */
 static bool erect(const face_ring *rings, int count, int base, int side_size, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int n = rings[base].count, tops = side_size == 3 ? 1 : n;
@@ -377,8 +377,8 @@ static void swap_vertices(int64_t *vertices, int i, int j)
     vertices[j] = v;
 }
 
-/* Turns a left-handed cell round, judged by where its vertices are now, since faces may run either way. Pictures are
- * the same in both cases. */
+/* Mirrors a left-handed cell, judged by the current positions of its vertices, since faces may have either direction.
+ * Pictures are the same in both cases. */
 static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
@@ -389,7 +389,7 @@ static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
     if (count == 2 * n) swap_vertices(vertices, n + 1, 2 * n - 1);
 }
 
-/* Returns the type that a polyhedron's faces make, with its vertices in that type's order, or GRID_POLYHEDRON. */
+/* Returns the type that a polyhedron's faces form, with its vertices in that type's order, or GRID_POLYHEDRON. */
 static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     static const struct {
@@ -420,14 +420,14 @@ static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GR
 enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
-    bool is_faulty;                /* some cell is wrong in some way */
-    int64_t polyhedra, recognised; /* the polyhedra that were, and those that are others now */
-    int64_t of_type[TYPES];        /* cells by their type, now */
-    int64_t entries;               /* the entries of all cells, now */
+    bool is_faulty;                /* some cell is invalid */
+    int64_t polyhedra, recognised; /* number of original polyhedra, and of those with another type now */
+    int64_t of_type[TYPES];        /* number of cells by their new type */
+    int64_t entries;               /* number of entries of all cells, with their new types */
     unsigned char *types;
 } recognition;
 
-/* Tells whether the cell's entries lie within the connectivity and are indices of faces or vertices. */
+/* Returns whether the cell's entries lie within the connectivity and are indices of faces or vertices. */
 static bool has_good_entries(const session_mesh *mesh, int64_t cell, int type)
 {
     const grid *g = &mesh->cells;
@@ -481,7 +481,7 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
     }
 }
 
-/* The type that all cells are of, or 0. */
+/* Returns the type that all cells have, or 0. */
 static int only_type(const recognition *r, int64_t count)
 {
     int type = TYPES - 1;
@@ -513,7 +513,8 @@ static void put_offsets(const session_mesh *mesh, const recognition *r, const gr
     }
 }
 
-/* Writes the cells by the types found; they are read from then on. Cells of one type need neither types nor offsets. */
+/* Writes the cells by the types found, and makes the grid read them. Cells of one type need neither types nor
+ * offsets. */
 static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;
@@ -577,7 +578,7 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
     return INSITU_OK;
 }
 
-/* Tells whether some cells may be polyhedra. */
+/* Returns whether some cells may be polyhedra. */
 static bool may_have_polyhedra(const grid *g)
 {
     return g->cell_count && g->offsets.data && grid_has_faces(g) && (g->cell_types || g->cell_type == GRID_POLYHEDRON);
