@@ -15,9 +15,9 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
                    (int)SCENE_MAX_VOLUMES == (int)RENDER_MAX_VOLUMES,
                "a scene may have as many surfaces and volumes as can be drawn");
 
-/* ---- which values show ---------------------------------------------------------------------------------------- */
+/* ---- visible values --------------------------------------------------------------------------------------------- */
 
-/* Fields of a sweep have their isosurfaces in common. */
+/* Returns whether the scalar already has the interval: the images of a sweep over fields share their isosurfaces. */
 static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
@@ -39,7 +39,7 @@ static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, in
 
 static bool add_surface(session_scalar *scalar, const scene_isosurface *layer)
 {
-    /* Differences look at cells around the surface's. */
+    /* Central differences also sample neighbours of crossed cells, so all cells are kept. */
     if (layer->normals == SCENE_DIFFERENCES) scalar->needs_all = true;
     bool is_added = true;
     for (int i = 0; i < layer->value_count && is_added; i++) {
@@ -53,7 +53,7 @@ static bool add_volume(session_scalar *scalar, const scene_volume *layer)
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     const int count = session_visible_intervals(layer, intervals);
-    /* A range from the data is known when all ranks have told theirs. */
+    /* A range from the data is known only after a reduction over all ranks, so all cells are kept. */
     if (!layer->colour_map.range.is_fixed) scalar->needs_all = true;
     return scalar->needs_all || add_intervals(scalar, intervals, count);
 }
@@ -65,7 +65,7 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
     return !scalar || add_volume(scalar, layer);
 }
 
-/* The distance that is drawn is 0 or nearly so: see session_slice_distance(). */
+/* Marks a plane. Its isovalue is 0 or very small: see session_slice_distance(). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);
@@ -141,7 +141,7 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
     return true;
 }
 
-/* ---- which cells have them ------------------------------------------------------------------------------------ */
+/* ---- cells with these values ------------------------------------------------------------------------------------ */
 
 bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
 {

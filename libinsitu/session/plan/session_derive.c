@@ -1,13 +1,13 @@
-/* Derived fields are made one after the other, each after those that it is made of:
+/* Derived fields are computed in order, each after the fields on which it depends:
  *
- *     cells' values that it wants at vertices  ->  session_recentre()
+ *     cells' values that are needed at vertices  ->  session_recentre()
  *     an expression:  blocks of vertices or cells, each instruction for a whole block
- *     a gradient, or what is made of one:  sums over the cells around each vertex and over all ranks
+ *     a gradient, or a quantity computed from one:  sums over the cells around each vertex and over all ranks
  *         (session_vertex_sums.h), over all meshes that have the field as one, so that blocks show no seam
  *
- * The values are copies of the session's, packed, of 4 bytes if all that they are made of has 4, else of 8. A hash of
- * the versions that they were made of tells whether they still hold; they are made anew where that differs on any rank.
- */
+ * The values are copies owned by the session, packed, with 4 bytes if all values on which they depend have 4, else with
+ * 8. A hash of the versions of these values determines whether the copies are up to date; they are recomputed if it has
+ * changed on any rank. */
 #include "session_derive.h"
 
 #include <omp.h>
@@ -26,7 +26,7 @@
 
 enum { SPACE = 3 };
 
-/* The work on one derived field. */
+/* Data of the computation of one derived field. */
 typedef struct derive_work {
     const session_derive_basis *basis;
     const scene_derived *derived;
@@ -36,9 +36,9 @@ typedef struct derive_work {
     int *stale; /* nonzero for each recentring or mesh that is out of date */
 } derive_work;
 
-/* ---- where it is, and what it is made of ---------------------------------------------------------------------- */
+/* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
 
-/* The field on the mesh over all ranks; NULL where it is not, or is not sound. */
+/* Returns the field on the mesh over all ranks; NULL if the mesh does not have it, or it has a fault. */
 static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
@@ -46,7 +46,8 @@ static const session_catalogue_field *find_field(const derive_work *w, const ses
     return NULL;
 }
 
-/* This rank's part of a mesh with the field, and the field's number there; NULL: there is none here. */
+/* Returns this rank's part of a mesh with the field, and stores the field's index there; NULL if this rank has no
+ * part. */
 static session_mesh *find_part(const derive_work *w, const session_catalogue_mesh *mesh, int *index)
 {
     session_mesh *part = find_field(w, mesh) ? session_find_mesh(w->basis->meshes, mesh->name) : NULL;
@@ -55,13 +56,13 @@ static session_mesh *find_part(const derive_work *w, const session_catalogue_mes
     return *index < 0 ? NULL : part;
 }
 
-/* A component as grid_field.component. */
+/* Returns the input's component, as grid_field.component. */
 static int component_of(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
 
-/* Tells whether values of this input on the mesh are taken to vertices first. */
+/* Returns whether values of this input on the mesh are first recentred to vertices. */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find(mesh, input->name);
@@ -73,9 +74,9 @@ static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *
     return session_joint_name(mesh, input->joined);
 }
 
-/* ---- values at vertices of those of cells ---------------------------------------------------------------------- */
+/* ---- cells' values, recentred to vertices ---------------------------------------------------------------------- */
 
-/* Adds the scalar that is recentred to this rank's part of the mesh. */
+/* Adds a scalar for the recentred values to this rank's part of the mesh. */
 static bool add_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
                           int component)
 {
@@ -120,7 +121,7 @@ static bool list_recentrings(derive_work *w)
     return w->stale != NULL;
 }
 
-/* ---- what is out of date ---------------------------------------------------------------------------------------- */
+/* ---- stale values ----------------------------------------------------------------------------------------------- */
 
 static session_scalar *find_recentred(const derive_work *w, const session_catalogue_mesh *mesh,
                                       const session_mesh *part, int input, int component)
@@ -129,7 +130,7 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
     return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, joint_of(mesh, of)) : NULL;
 }
 
-/* A hash of all that the values on this rank's part are made of. */
+/* Returns a hash of all data from which the values on this rank's part are computed. */
 static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -148,7 +149,7 @@ static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh 
     return hash | 1;
 }
 
-/* Finds the meshes on which the values are out of date on some rank. error: what failed before. Collective, agreed. */
+/* Finds the meshes on which the values are stale on some rank. *error may hold an earlier error. Collective, agreed. */
 static insitu_status find_stale(derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
@@ -167,7 +168,7 @@ static insitu_status find_stale(derive_work *w, base_error *error)
 
 /* ---- values of one mesh ------------------------------------------------------------------------------------------ */
 
-/* The values of an input, or of one of its components, where the derived field has its own. */
+/* Returns the values of an input, or of one of its components, at the derived field's centring. */
 static grid_field input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                                int input, int component)
 {
@@ -187,7 +188,7 @@ static int64_t place_count(const session_mesh *part, const session_field *field)
     return field->given.centring == INSITU_CELL ? part->cells.cell_count : session_vertex_count(part);
 }
 
-/* Makes room for the values; keeps what there is if it has the size. */
+/* Allocates the values, unless they have the right size. */
 static bool make_room(const derive_work *w, session_mesh *part, session_field *field)
 {
     bool is_wide = false;
@@ -216,7 +217,7 @@ static void store(const session_field *field, int64_t place, const double *value
             ((float *)(void *)field->copy)[place * count + c] = (float)values[c];
 }
 
-/* Notes that the values are new, for scalars and for fields that are made of them. */
+/* Records that the values are new, for scalars and for fields that depend on them. */
 static void note_values(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
 {
     session_spoil_scalars(part, index);
@@ -245,7 +246,7 @@ static void load_block(const grid_field *field, int64_t first, int count, double
         for (int i = 0; i < count; i++) out[i] = (double)*(const float *)(const void *)(data + i * stride);
 }
 
-/* What a thread needs for a block. */
+/* A thread's buffers for a block. */
 typedef struct block_room {
     const double **inputs;
     double *values; /* values of the inputs, followed by the stack */
@@ -339,7 +340,7 @@ static int keep_component(int component, const double vector[3], double *out)
     return component == SCENE_COMPONENT_DEFAULT ? SPACE : 1;
 }
 
-/* Makes the values at a vertex of the gradient of each component. */
+/* Computes the values at a vertex from the gradient of each component. */
 static void make_values(const scene_derived *derived, const double gradient[SPACE][SPACE], double out[SPACE])
 {
     double curl[SPACE];
@@ -377,7 +378,7 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
     }
 }
 
-/* The scalars whose gradients are taken. A vector of two components has none along z. */
+/* Lists the scalars whose gradients are computed. A vector with two components has none along z. */
 static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                         grid_field out[SESSION_GRADIENTS])
 {
@@ -390,7 +391,8 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     return count;
 }
 
-/* The first of the joint's meshes on which the field is sound. All such have a vector of as many components. */
+/* Returns the first of the joint's meshes on which the field has no fault. On all such meshes the vector has the same
+ * number of components. */
 static const session_catalogue_mesh *first_sound(const derive_work *w, const session_joint *joint)
 {
     int i = 0;
@@ -398,7 +400,7 @@ static const session_catalogue_mesh *first_sound(const derive_work *w, const ses
     return i < joint->count ? joint->meshes[i] : NULL;
 }
 
-/* A number that ranks without a part of a mesh have to know, too. */
+/* Returns the number of scalars; ranks without a part of a mesh need it, too. */
 static int count_scalars(const derive_work *w, const session_joint *joint)
 {
     if (!session_takes_vector(w->derived)) return w->derived->input_count;
@@ -423,7 +425,8 @@ static insitu_status begin_sums(const derive_work *w, const session_joint *joint
     return session_key_all_vertices(sums, error);
 }
 
-/* Takes the gradients over the meshes of a joint. Collective; what fails at the very end is in *error alone. */
+/* Computes the gradients over the meshes of a joint. Collective; an error of this rank at the very end is stored only
+ * in *error. */
 static insitu_status derive_joint(const derive_work *w, const session_joint *joint, base_error *error)
 {
     session_vertex_sums sums = {.by_id = joint->by_id, .field_count = count_scalars(w, joint)};
@@ -448,7 +451,7 @@ static bool is_joint_stale(const derive_work *w, const session_joint *joint)
     return is_stale;
 }
 
-/* Goes through the joints of the meshes with the field, each once. */
+/* Computes the gradients of each joint of the meshes with the field, unless they are up to date. */
 static insitu_status derive_joints(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;

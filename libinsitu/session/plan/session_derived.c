@@ -18,7 +18,7 @@ int session_find_derived(const scene *scene, const char *name)
     return -1;
 }
 
-/* ---- what is needed ------------------------------------------------------------------------------------------- */
+/* ---- needed fields -------------------------------------------------------------------------------------------- */
 
 static uint64_t bit_of(const scene *scene, const scene_field *field)
 {
@@ -26,7 +26,7 @@ static uint64_t bit_of(const scene *scene, const scene_field *field)
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 
-/* Adds those that the fields are made of, which come before them. */
+/* Adds the fields on which the needed ones depend, which come before them. */
 static uint64_t with_sources(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
@@ -76,7 +76,7 @@ void session_mark_sources(const scene *scene, uint64_t needed, const session_mes
     }
 }
 
-/* ---- what is wrong with one on a mesh ------------------------------------------------------------------------- */
+/* ---- faults of a derived field on a mesh ---------------------------------------------------------------------- */
 
 typedef struct derived_place {
     const char *scene_path;
@@ -104,7 +104,7 @@ static insitu_status refuse_components(const derived_place *at, const scene_fiel
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-/* Vectors on meshes that are taken as one have as many components. */
+/* Checks that vectors on meshes that are joined have the same number of components. */
 static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {

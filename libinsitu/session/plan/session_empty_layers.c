@@ -1,5 +1,5 @@
-/* Trees have the ranges of what they hold, rounded outwards to float32. A layer that shows some value of them is right.
- * Else the range of all cells is found, once, and decides. */
+/* Trees have the ranges of their cells' values, rounded outward to float32. If the layer shows some value within these,
+ * it is not empty. Otherwise the range of all cells is computed, once, and decides. */
 #include "session_empty_layers.h"
 
 #include <math.h>
@@ -13,28 +13,28 @@
 #include "session_transfer.h"
 #include "session_unusable.h"
 
-/* The least value and the greatest negated, so that one minimum finds both. */
+/* The minimum and the negated maximum, so that one reduction by minimum computes both. */
 typedef struct field_range {
     double low, minus_high;
 } field_range;
 
 static const field_range no_range = {INFINITY, INFINITY};
 
-/* A layer of the plan that may be empty. One of the three is given. */
+/* A layer of the plan that may be empty. One of the three pointers to layers is set. */
 typedef struct planned_layer {
     const scene_image *image;
     const scene_isosurface *isosurface;
     const scene_volume *volume;
-    const scene_surface *surface; /* with a threshold */
-    int number;                   /* the number of its first warning */
-    field_range range;            /* the surface's range: 0 if any cell is within the threshold, else empty */
-    bool is_empty;                /* the surface */
-    bool is_news;                 /* it seems to show nothing by the trees, and no warning has said so yet */
+    const scene_surface *surface; /* has a threshold */
+    int number;                   /* number of its first warning */
+    field_range range;            /* for a surface: 0 if any cell is within the threshold, else empty */
+    bool is_empty;                /* of a surface: it is empty */
+    bool is_news;                 /* by the trees it seems to show nothing, and no warning has been reported yet */
 } planned_layer;
 
-/* ---- which layers ---------------------------------------------------------------------------------------------- */
+/* ---- layers ---------------------------------------------------------------------------------------------------- */
 
-/* The layers are looked at so many at a time: they lie on the stack. */
+/* Number of layers that are processed at a time, on the stack. */
 enum { WINDOW = 128 };
 
 typedef struct layer_window {
@@ -101,7 +101,7 @@ static void take(double low, double high, field_range *range)
     range->minus_high = fmin(range->minus_high, -high);
 }
 
-/* Takes the range at the root of the tree, which holds all that shows. */
+/* Takes the range at the root of the tree, which contains all visible values. */
 static void take_root(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
@@ -144,13 +144,13 @@ static field_range own_range(const session_meshes *meshes, const planned_layer *
     return range;
 }
 
-/* What ranks also tell each other. */
+/* Further data in the reduction. */
 typedef struct layer_news {
-    bool has_other_cells; /* that are not shown, on any rank; see session_unusable.h */
-    int telling;          /* the greatest session_telling_word() */
+    bool has_other_cells; /* some rank has cells that are not shown; see session_unusable.h */
+    int telling;          /* maximum of session_telling_word() */
 } layer_news;
 
-/* Reduces the ranges over all ranks, together with errors from before and the news; on an error the rest means nothing.
+/* Reduces the ranges over all ranks, together with earlier errors and the news; after an error the rest is undefined.
  * Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_window *window,
                                    bool of_all_cells, layer_news *news, base_error *error)
@@ -176,9 +176,10 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
     return status;
 }
 
-/* ---- what shows nothing ---------------------------------------------------------------------------------------- */
+/* ---- empty layers ---------------------------------------------------------------------------------------------- */
 
-/* In a sweep over isovalues each picture has one, whose number is that in the file. */
+/* Returns the warning's subject. In a sweep over isovalues each picture has one isovalue, whose number is that in the
+ * file. */
 static session_warning warning_of(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
@@ -187,7 +188,8 @@ static session_warning warning_of(const planned_layer *layer, int value)
     return (session_warning){kind, layer->image->name, NULL, layer->number + value};
 }
 
-/* A crossing belongs to the cell that reaches the value from below, so that the least value of all has none. */
+/* Returns whether an isovalue has no crossing. A crossing belongs to the cell that reaches the value from below, so
+ * that the minimum of all values has none. */
 static bool is_outside(double value, const field_range *range)
 {
     return value <= range->low || value > -range->minus_high;
@@ -202,7 +204,8 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     return true;
 }
 
-/* The least value may be as much above the trees' as float32 rounds. */
+/* Returns the trees' range with its minimum raised by the rounding to float32, by which the true minimum may be
+ * larger. */
 static field_range least_of_trees(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
@@ -214,7 +217,7 @@ static int value_count(const planned_layer *layer)
     return layer->isosurface ? layer->isosurface->value_count : 1;
 }
 
-/* Tells whether the layer, or this isovalue of it, shows nothing of values in the range. */
+/* Returns whether the layer, or this isovalue of it, shows no value of the range. */
 static bool shows_nothing(const planned_layer *layer, int value, const field_range *range)
 {
     if (layer->isosurface) return is_outside(layer->isosurface->values[value], range);
@@ -269,7 +272,7 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
                  -layer->range.minus_high);
 }
 
-/* Where there is no value at all, other warnings say why. */
+/* Warns of an empty layer. If there is no value at all, other warnings give the reason. */
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {
     const bool has_values = layer->range.low <= -layer->range.minus_high || !layer->is_news;

@@ -5,9 +5,9 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* What meshes are joined for: a layer's field, or the gradients of a derived one. */
+/* The purpose for which meshes are joined: a layer's field, or the gradients of a derived field. */
 typedef struct join_wish {
-    const scene_field *field; /* NULL: derived */
+    const scene_field *field; /* NULL: derived is set */
     int derived;
 } join_wish;
 
@@ -24,7 +24,7 @@ static bool is_member(const session_catalogue_mesh *mesh, const join_wish *wish)
     return found && session_is_recentred(field, found->centring);
 }
 
-/* Adds a joint of up to count meshes, which is empty. NULL where memory runs out. */
+/* Adds an empty joint for up to count meshes. Returns NULL if memory runs out. */
 static session_joint *add_joint(session_catalogue *catalogue, uint64_t name, int count)
 {
     session_joint **joints = base_realloc(catalogue->joints, (size_t)(catalogue->joint_count + 1) * sizeof *joints);
@@ -50,7 +50,7 @@ static bool set_apart(session_catalogue *catalogue, session_catalogue_mesh *mesh
     return true;
 }
 
-/* Names the joint of the meshes, those with ids left out, and adds it where it is new. */
+/* Computes the name of the meshes' joint, without meshes with ids, and adds the joint if it is new. */
 static bool join(session_catalogue *catalogue, const join_wish *wish, uint64_t *joined)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -93,7 +93,7 @@ static bool join_derived(session_catalogue *catalogue, scene *scene, int number)
     return is_done;
 }
 
-/* Meshes with ids are joints of their own. */
+/* Adds meshes with ids as joints by themselves. */
 static void find_apart(session_catalogue *catalogue, const session_meshes *meshes)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {

@@ -1,5 +1,6 @@
-/* The plan: trees, recentred values and ranges are made only if an image of this step names them. All ranks have the
- * same catalogue, which tells whether an image can be drawn, so all come to the same answer without asking. */
+/* The plan: trees, recentred values and ranges are computed only if an image of this step uses them. All ranks have the
+ * same catalogue, which determines whether an image can be drawn, so all reach the same decision without
+ * communication. */
 #include "session_plan.h"
 
 #include <math.h>
@@ -18,11 +19,11 @@
 #include "session_scalars.h"
 #include "session_shells.h"
 
-/* ---- can the image be drawn? --------------------------------------------------------------------------------- */
+/* ---- images that can be drawn ------------------------------------------------------------------------------- */
 
 enum { NAMES_SIZE = 700 };
 
-/* Lists the names there are, for a message. */
+/* Lists the existing names for a message. */
 static void list_fields(const session_catalogue *catalogue, char names[NAMES_SIZE])
 {
     size_t size = 0;
@@ -52,7 +53,8 @@ static insitu_status refuse_fault(const base_error *fault, base_error *error)
     return error->status;
 }
 
-/* A field that is on no mesh may be that of one with a fault. */
+/* Returns the fault of a mesh that the layer is on: the field that no mesh has may be on that one. NULL if there is
+ * none. */
 static const base_error *find_hidden(const session_plan_basis *basis, const scene_field *field)
 {
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
@@ -69,7 +71,7 @@ static bool is_anywhere(const session_catalogue *catalogue, const char *name)
     return false;
 }
 
-/* The field's name that was probably meant, in words; "" if none is near. */
+/* Writes "did you mean" with the most similar field name; "" if none is similar. */
 static void word_meant(const session_catalogue *catalogue, const char *name, char words[300])
 {
     const char *candidates[256];
@@ -82,7 +84,7 @@ static void word_meant(const session_catalogue *catalogue, const char *name, cha
     if (meant) snprintf(words, 300, " (did you mean %.255s?)", meant);
 }
 
-/* Refuses a derived field that is on no mesh, by what it is made of and no mesh has. */
+/* Refuses a derived field that is on no mesh, because of an input that no mesh has. */
 static insitu_status refuse_sources(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
@@ -116,7 +118,7 @@ static insitu_status refuse_missing(const session_plan_basis *basis, const scene
                      basis->scene_path, field->line, field->name, meant, names);
 }
 
-/* Checks that a mesh that the layer names is there, and has the field unless it has no cells anywhere. */
+/* Checks that a mesh that the layer names exists, and has the field unless it has no cells anywhere. */
 static insitu_status check_named_mesh(const session_plan_basis *basis, const scene_field *field, const char *name,
                                       base_error *error)
 {
@@ -162,13 +164,13 @@ static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_
     return INSITU_OK;
 }
 
-/* The mesh's field where the layer shows it there, else NULL. */
+/* Returns the mesh's field if the layer shows it there, else NULL. */
 static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
 {
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Checks that some mesh has the field, and that it is sound on those that the layer is on. */
+/* Checks that some mesh has the field, and that it has no fault on those that the layer is on. */
 static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, const scene_field *layer,
                                  base_error *error)
 {
@@ -249,7 +251,7 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
     return status;
 }
 
-/* ---- what is to be recentred --------------------------------------------------------------------------------- */
+/* ---- fields to recentre -------------------------------------------------------------------------------------- */
 
 static bool add_recentrings(const session_catalogue *catalogue, session_plan *plan, const scene_field *field)
 {
@@ -279,10 +281,10 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
     return is_planned && plan->stale;
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all images ---------------------------------------------------------------------------------------------- */
 
-/* Counts the multiples of the interval up to the time. A time within rounding of a multiple counts, as steps of 0.1 add
- * up to less. */
+/* Returns the number of multiples of the interval up to the time. A time within rounding of a multiple counts, as steps
+ * of 0.1 sum up to less. */
 static double intervals(double time, double interval)
 {
     const double count = time / interval;
@@ -296,7 +298,8 @@ static bool is_due(const scene_image *image, const session_moment *m)
     return image->every <= 1 || m->cycle % image->every == 0;
 }
 
-/* If no rank has cells, fields are not asked for, and the picture is its background. */
+/* Returns whether any rank has cells or any mesh a fault. If not, fields are not required, and the picture is its
+ * background. */
 static bool has_anything(const session_plan_basis *basis)
 {
     return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
@@ -379,7 +382,8 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
                  image->name, layer, field->name, name ? name : "", field->name);
 }
 
-/* Warns of a mesh with vertex ids among others that a layer shows by means at vertices: its vertices are not theirs. */
+/* Warns of a mesh with vertex ids if a layer shows it by means at vertices together with other meshes: its vertices are
+ * not equal to theirs. */
 static void warn_of_apart(const session_catalogue *catalogue, const scene_image *image, const char *layer,
                           const scene_field *field, session_report *report)
 {
@@ -442,7 +446,7 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
-/* An image without outputs is for those who keep its pictures in memory. */
+/* Returns whether an image has no outputs and its pictures are not kept in memory, and warns of it. */
 static bool is_for_nobody(const session_plan_basis *basis, const scene_image *image, session_report *report)
 {
     const bool is_for_none = image->output_count == 0 && !basis->are_kept;
@@ -454,7 +458,8 @@ static bool is_for_nobody(const session_plan_basis *basis, const scene_image *im
     return is_for_none;
 }
 
-/* Views of an orbit share their layers, and so the warnings about these. */
+/* Selects the images that are due and can be drawn. Views of an orbit share their layers, and so the warnings about
+ * these. */
 static void take_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
     bool is_well = false;
@@ -491,7 +496,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =
-        basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* taking the values may be collective */
+        basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* fill functions may be collective */
     if (!status) {
         if (is_whole) session_fill_fields(meshes, basis->catalogue, true, error);
         if (is_whole) session_copy_used(meshes, team->threads, error);

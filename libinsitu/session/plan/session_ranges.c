@@ -1,7 +1,8 @@
-/* Percentiles are found digit by digit. Values are doubles, read as whole numbers in the same order. A pass takes the
+/* Percentiles are computed digit by digit. Values are doubles, mapped to integers in the same order. A pass takes the
  * values whose leading bits are those found so far, and counts them by the next 11 bits; the sum of all ranks' counts
- * tells in which bin the wanted value is. Six passes find all 64 bits, and so the value itself, not an estimate, for
- * any partition. From the third pass on few values are left: a pass keeps them, and the next ones read no cells. */
+ * determines the bin of the wanted value. Six passes find all 64 bits, and so the value itself instead of an estimate,
+ * for any partition. From the third pass on few values are left: a pass stores them, and the next ones do not read
+ * cells. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -13,7 +14,7 @@
 #include "session_distances.h"
 #include "session_scalars.h"
 
-/* ---- least and greatest ---------------------------------------------------------------------------------------- */
+/* ---- minimum and maximum --------------------------------------------------------------------------------------- */
 
 insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
                                     const session_range_subject *of, double *low, double *high, base_error *error)
@@ -43,7 +44,7 @@ enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 6 };
 
 static const uint64_t sign_bit = UINT64_C(1) << 63;
 
-/* Maps values to whole numbers in the same order. */
+/* Maps a value to an integer, preserving the order. */
 static uint64_t order_of(double value)
 {
     uint64_t bits;
@@ -59,23 +60,23 @@ static double value_of(uint64_t order)
     return value;
 }
 
-/* The lowest bit that a pass looks at: the last one has 9 bits left. */
+/* Returns the lowest bit that a pass counts by: the last pass has 9 bits left. */
 static int shift_of(int pass)
 {
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
-/* The bits that a pass has found before it. */
+/* Returns the mask of the bits found before a pass. */
 static uint64_t known_of(int pass)
 {
     return pass ? ~UINT64_C(0) << shift_of(pass - 1) : 0;
 }
 
-/* A rank's values that a pass has taken, if they are that few, in any order. */
+/* A rank's values that a pass has taken, unsorted, if there are at most MOST_KEPT. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct kept_values {
-    int count; /* MOST_KEPT + 1: more */
+    int count; /* MOST_KEPT + 1: there are more */
     uint64_t orders[MOST_KEPT];
 } kept_values;
 
@@ -83,7 +84,7 @@ typedef struct digit_count {
     uint64_t found[2]; /* leading bits of both ends, the rest 0 */
     int pass;
     bool is_positive;
-    bool is_kept; /* read the kept values, no cells */
+    bool is_kept; /* the kept values are read instead of cells */
     kept_values kept;
 } digit_count;
 
@@ -98,7 +99,8 @@ static void keep_value(uint64_t order, kept_values *kept)
     if (at < MOST_KEPT) kept->orders[at] = order;
 }
 
-/* Counts the value by its next digit, for each end whose leading bits it has. Returns whether it has any. */
+/* Counts the value by its next digit, for each end whose leading bits it has. Returns whether it has those of any
+ * end. */
 static bool count_value(const digit_count *of, uint64_t order, int64_t counts[2 * DIGITS])
 {
     const uint64_t known = known_of(of->pass);
@@ -155,7 +157,7 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                        "MPI_Allreduce");
 }
 
-/* Finds the bin of the value with this rank in order; *rank becomes its rank within the bin. */
+/* Returns the bin of the value with this rank in the order; *rank becomes its rank within the bin. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;
@@ -184,7 +186,7 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
     return INSITU_OK;
 }
 
-/* ---- the whole ------------------------------------------------------------------------------------------------- */
+/* ---- all sources of ranges ------------------------------------------------------------------------------------- */
 
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error)

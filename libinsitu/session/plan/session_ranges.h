@@ -1,4 +1,4 @@
-/* The ranges of values that colour maps stand for, where the scene does not fix them. */
+/* The ranges of values of colour maps, if the scene does not fix them. */
 #ifndef SESSION_RANGES_H
 #define SESSION_RANGES_H
 
@@ -7,21 +7,20 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* The scalar that extremes are taken of: a field, or, where a plane is given, the distances from it on the meshes that
- * have the field.
- */
+/* The scalar whose extremes are computed: a field, or, if a plane is given, the distances from it on the meshes that
+ * have the field. */
 typedef struct session_range_subject {
     const scene_field *field;
     const scene_plane *plane; /* NULL: the field's own values */
-    bool is_positive;         /* only such values count (session_scalars.h) */
+    bool is_positive;         /* only positive values count (session_scalars.h) */
 } session_range_subject;
 
-/* Least and greatest value over all ranks' drawn cells; low > high: there are none. Collective. */
+/* Computes the minimum and maximum over all ranks' drawn cells; low > high: there are no values. Collective. */
 insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
                                     const session_range_subject *of, double *low, double *high, base_error *error);
 
-/* The range of a layer's field over all ranks' drawn cells, by the map's source; for SCENE_RANGE_RUN that of this step
- * alone. low > high: there are no values. It has the same bits on any partition. Collective. */
+/* Computes the range of a layer's field over all ranks' drawn cells, by the map's source; for SCENE_RANGE_RUN only that
+ * of this step. low > high: there are no values. It has the same bits on any partition. Collective. */
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error);
 

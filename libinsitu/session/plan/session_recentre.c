@@ -1,12 +1,13 @@
-/* Recentring: the value at a vertex is the mean over its cells (or, of values at corners, over the corners there) on
- * all ranks, and bitwise the same for any partition. Where the field has values on faces of the boundary, a vertex of
- * such faces gets the mean over them instead, even if all of them are on other ranks than its cells.
+/* Recentring: the value at a vertex is the mean over its cells (or, for values at corners, over the corners there) on
+ * all ranks, with the same bits for any partition. If the field has values on faces of the boundary, a vertex of such
+ * faces gets the mean over these instead, even if all of them are on other ranks than its cells.
  *
- * Sums depend on their order, so partial sums of ranks would not do: all ranks' single values are brought together,
- * sorted, and summed in that order. Vertices with equal keys are one (global ids where all ranks give them, else the
- * bits of the coordinates, -0 as +0), also on a single rank: otherwise a mesh that doubles its vertices along a crack
- * would look different on one rank and on two. So it is with the meshes on which a layer shows one field, as blocks and
- * levels of refinement are (session_joints.h): by coordinates, since ids are of one mesh.
+ * Sums depend on their order, so sums of ranks' partial sums would depend on the partition. Instead all ranks' single
+ * values are gathered, sorted, and summed in that order. Vertices with equal keys are one vertex (global ids if all
+ * ranks give them, else the bits of the coordinates, -0 as +0), also on a single rank: otherwise a mesh that doubles
+ * its vertices along a crack would look different on one rank and on two. The same holds for the meshes on which a
+ * layer shows one field, such as blocks and levels of refinement (session_joints.h): by coordinates, since ids belong
+ * to one mesh.
  *
  *     local:  vertices -> groups of equal keys -> values of incident cells, group by group -> means
  *     shared: groups inside another rank's box  --(key, values)-->  their home (session_homes.h): merged by key, means
@@ -14,8 +15,8 @@
  *
  * Then vertices that hang on larger cells take those cells' values (outer/session_hanging.h).
  *
- * Ranks wait for each other twice a field. What fails goes with that to all; what fails in receiving the means, with
- * the next phase. */
+ * Each field takes two collective deliveries. The first passes errors to all ranks; errors in receiving the means are
+ * passed by the next phase. */
 #include "session_recentre.h"
 
 #include <stdlib.h>
@@ -33,28 +34,28 @@
 /* Values by group: those of group g are values[starts[g]] .. values[starts[g + 1] - 1]. */
 typedef struct value_groups {
     int64_t count;
-    int64_t *starts; /* count + 1 */
+    int64_t *starts; /* count + 1 entries */
     double *values;
-    double *means;            /* count */
-    unsigned char *are_faces; /* count: the values are those of faces, else those of cells or corners */
+    double *means;            /* count entries */
+    unsigned char *are_faces; /* count entries: the values are those of faces, else those of cells or corners */
 } value_groups;
 
 /* This rank's part of one of the meshes. */
 typedef struct mesh_part {
-    session_scalar *scalar; /* NULL: the mesh has no such field here */
-    grid_field field;       /* the values that are recentred */
+    session_scalar *scalar; /* NULL: the mesh does not have the field on this rank */
+    grid_field field;       /* the values to recentre */
 } mesh_part;
 
-/* The vertices of all parts, numbered through. */
+/* The vertices of all parts, numbered consecutively. */
 typedef struct vertex_groups {
     bool by_id;
     int part_count;
     mesh_part *parts;
-    const session_mesh **meshes; /* one for each part; NULL: this rank has none of it */
-    int64_t *firsts;             /* part_count + 1: the number of each part's first vertex */
+    const session_mesh **meshes; /* one per part; NULL: this rank has no part of the mesh */
+    int64_t *firsts;             /* part_count + 1 entries: number of each part's first vertex */
     session_key_table keys;
-    int64_t *of_vertex; /* -1: a vertex of no drawn cell */
-    int64_t *vertex;    /* by id: one of each group */
+    int64_t *of_vertex; /* -1: the vertex belongs to no drawn cell */
+    int64_t *vertex;    /* if by_id: one vertex of each group */
     value_groups values;
 } vertex_groups;
 
@@ -69,8 +70,8 @@ static bool groups_create(value_groups *groups, int64_t count)
     return groups->starts && groups->means && groups->are_faces;
 }
 
-/* Makes room for the values, after starts[g + 1] was filled with the count of group g. Filling then moves starts[g] to
- * where g ends; groups_close() moves them back. */
+/* Allocates the values, after starts[g + 1] was filled with the count of group g. Filling then advances starts[g] to
+ * the end of g; groups_close() shifts them back. */
 static bool groups_open(value_groups *groups)
 {
     for (int64_t g = 0; g < groups->count; g++) groups->starts[g + 1] += groups->starts[g];
@@ -132,7 +133,7 @@ static session_key key_of_place(const double place[3])
     return key;
 }
 
-/* Until they have a group, of_vertex has -2 - i of the i-th twin. */
+/* Assigns groups to the vertices of drawn cells. Until then of_vertex is -2 - i for the i-th twin. */
 static void group_vertices(const session_mesh *mesh, int64_t first, const session_border *border, vertex_groups *groups)
 {
     const grid *g = &mesh->cells;
@@ -163,15 +164,16 @@ static void place_of(const vertex_groups *groups, int64_t group, double place[3]
         memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
 }
 
-/* Gets the value that the cell, or its corner at this vertex, gives to the vertex; false where it gives none. */
+/* Gets the value that the cell, or its corner at this vertex, contributes to the vertex; returns false if it
+ * contributes none. */
 static bool gives(const grid_field *field, int64_t cell, int64_t vertex, double *value)
 {
     *value = grid_field_value(field, field->is_cell_centred ? cell : vertex);
     return isfinite(*value);
 }
 
-/* Gives each cell's value to the groups of its vertices, once to each; last has the last cell that gave to a group.
- * Values at corners are given each. The first pass counts, the second stores. */
+/* Adds each cell's value to the groups of its vertices, once per group; last: per group, the last cell that
+ * contributed. Values at corners are each added. The first pass counts, the second stores. */
 static void give_values(vertex_groups *groups, int part, int64_t *last, bool is_stored)
 {
     const grid *g = &groups->meshes[part]->cells;
@@ -210,7 +212,7 @@ static void store_face_values(const session_patch_values *faces, value_groups *v
     for (int64_t i = 0; i < faces->count; i++) values->values[values->starts[faces->groups[i]]++] = faces->values[i];
 }
 
-/* faces: of each part. */
+/* Collects the values of all parts by group. faces: one per part. */
 static bool collect_values(const session_patch_values *faces, vertex_groups *groups)
 {
     int64_t *last = base_alloc((size_t)groups->keys.count * sizeof *last);
@@ -301,9 +303,9 @@ static insitu_status make_groups(const session_recentring *item, int threads, ve
     return average_groups(groups, threads, error);
 }
 
-/* ---- what ranks share ---------------------------------------------------------------------------------------- */
+/* ---- groups of several ranks --------------------------------------------------------------------------------- */
 
-/* Words before the values: the key, then the count, beside which FACE_VALUES tells that they are those of faces. */
+/* Number of words before the values: the key, and the count, in which the bit FACE_VALUES marks values of faces. */
 enum { RECORD_HEAD = 4 };
 #define FACE_VALUES (UINT64_C(1) << 63)
 
@@ -398,14 +400,14 @@ static const uint64_t *next_record(const uint64_t *record)
     return record + RECORD_HEAD + record_count(record);
 }
 
-/* Tells whether the record has values that its group takes. If any rank has values of faces, those of cells do not
+/* Returns whether the record has values that its group uses. If any rank has values of faces, those of cells do not
  * count. */
 static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
 {
     return !values->are_faces[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
-/* Puts the mean for each record's key into reply->words and reply->counts. */
+/* Stores the mean for each record's key in reply->words and reply->counts. */
 static bool merge_records(const session_mail *in, int ranks, int threads, session_mail *reply)
 {
     session_key_table keys = {0};
@@ -484,8 +486,8 @@ static insitu_status merge_shared(const session_team *team, const session_homes 
 
 /* ---- one scalar ---------------------------------------------------------------------------------------------- */
 
-/* A corner whose own value is not finite stays so, and keeps its cell from being drawn, as without means. A cell's own
- * value is checked elsewhere (grid_field.own). */
+/* Copies the means to the vertices. A corner whose own value is not finite keeps it, so that its cell is not drawn, as
+ * without means. A cell's own value is checked elsewhere (grid_field.own). */
 static void spread_means(const vertex_groups *groups, int part, int threads)
 {
     const int64_t *of_vertex = groups->of_vertex + groups->firsts[part];
@@ -504,8 +506,8 @@ static void spread_means(const vertex_groups *groups, int part, int threads)
     }
 }
 
-/* Tells whether any of the meshes has values of cells. Values at corners are left as they are: codes that have them
- * constrain them. */
+/* Returns whether any of the meshes has values of cells. Values at corners are not constrained: codes that have them do
+ * so themselves. */
 static bool is_of_cells(const session_recentring *item)
 {
     for (int i = 0; i < item->joint->count; i++)
@@ -523,7 +525,7 @@ static insitu_status constrain_hanging(const session_recentring *item, const ses
     return status ? status : session_constrain_hanging(hanging, team, groups->values.means, error);
 }
 
-/* Makes room for the values of each part. */
+/* Allocates the values of each part. */
 static void make_room(const vertex_groups *groups, base_error *error)
 {
     for (int i = 0; i < groups->part_count; i++) {

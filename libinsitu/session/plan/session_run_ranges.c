@@ -10,11 +10,11 @@
 
 enum { MOST_BYTES = 1 << 20 }; /* the largest file of ranges that is read */
 
-/* ---- which layers ---------------------------------------------------------------------------------------------- */
+/* ---- layers ---------------------------------------------------------------------------------------------------- */
 
 typedef struct layer_list {
     int count;
-    session_run_range *items; /* NULL: they are counted alone */
+    session_run_range *items; /* NULL: layers are only counted */
 } layer_list;
 
 static void add_layer(layer_list *list, const char *kind, int number, const scene_field *field,
@@ -50,7 +50,7 @@ static int count_layers(const scene_image *image)
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
-/* `what`: "read" or "written". */
+/* Returns an error for the file. what: "read" or "written". */
 static insitu_status fail(const session_image_ranges *ranges, const char *what, const file_failure *failure,
                           base_error *error)
 {
@@ -94,13 +94,13 @@ static bool read_line(session_image_ranges *ranges, const char *text)
     return true;
 }
 
-/* Takes the lines of the text, which is cut into them. */
+/* Reads the lines of the text, which is cut into them. */
 static insitu_status read_lines(session_image_ranges *ranges, const file_content *content, base_error *error)
 {
     char *line = content->text, *const end = content->text + content->size;
     for (int number = 1; line < end; number++) {
         char *stop = memchr(line, '\n', (size_t)(end - line));
-        if (!stop) stop = end; /* where a byte 0 is */
+        if (!stop) stop = end; /* stop at a NUL byte */
         *stop = '\0';
         if (line + strlen(line) != stop || !read_line(ranges, line))
             return base_fail(error, INSITU_ERROR_SCENE,
@@ -112,7 +112,7 @@ static insitu_status read_lines(session_image_ranges *ranges, const file_content
     return INSITU_OK;
 }
 
-/* Reads the file; finds nothing where there is none. */
+/* Reads the file; it is not an error if there is none. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
     c_numbers numbers;
@@ -177,7 +177,7 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
     return NULL;
 }
 
-/* Prepares an entry at the end of the list, which is counted when it is complete. */
+/* Prepares an entry at the end of the list, which is counted after it is complete. */
 static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);
@@ -198,7 +198,7 @@ static bool prepare_ranges(session_run_ranges *all, const scene_image *image, ba
     return false;
 }
 
-/* Sends what rank 0 has read to all. Collective. */
+/* Sends the ranges that rank 0 has read to all ranks. Collective. */
 static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, base_error *error)
 {
     insitu_status status = INSITU_OK;

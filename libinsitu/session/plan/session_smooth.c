@@ -15,11 +15,11 @@
 typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
-    const scene_field *scene_field; /* the field of the first layer that has it */
-    uint64_t joined;                /* session_joint_name() where values are recentred */
+    const scene_field *scene_field; /* field of the first layer that shows it */
+    uint64_t joined;                /* session_joint_name() if values are recentred */
     int component;
     int value_count;
-    mmbvh_interval *values; /* the values of all layers that have it */
+    mmbvh_interval *values; /* isovalues of all layers that show it */
 } smooth_item;
 
 typedef struct smooth_items {
@@ -29,11 +29,11 @@ typedef struct smooth_items {
 
 /* This rank's work on an item. */
 typedef struct smooth_work {
-    session_scalar *scalar; /* NULL: nothing of it is here */
+    session_scalar *scalar; /* NULL: this rank has no part of it */
     session_vertex_sums sums;
 } smooth_work;
 
-/* ---- what is asked for --------------------------------------------------------------------------------------- */
+/* ---- fields with smooth normals ------------------------------------------------------------------------------ */
 
 static smooth_item *find_item(smooth_items *items, const smooth_item *like)
 {
@@ -96,7 +96,7 @@ bool session_is_smooth(const session_plan *plan)
     return false;
 }
 
-/* ---- which vertices ------------------------------------------------------------------------------------------ */
+/* ---- vertices of crossed cells ------------------------------------------------------------------------------- */
 
 /* Adds the keys of the crossed cells' vertices. */
 static bool add_own_keys(const smooth_item *item, const mmbvh_selection *crossed, session_vertex_sums *sums)
@@ -159,8 +159,9 @@ static insitu_status begin_work(const smooth_item *item, const session_meshes *m
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Vertices with sums for other ranks alone need no gradient here. A gradient is kept to a scale that does not matter,
- * near that of the scene, so that no unit of the values makes it too small for a float. */
+/* Stores the gradients. Vertices whose sums only other ranks need get no gradient here. The length of a gradient does
+ * not matter, so it is scaled to near that of the scene, so that no unit of the values makes it too small for a
+ * float. */
 static insitu_status end_work(smooth_work *work, base_error *error)
 {
     session_scalar *scalar = work->scalar;

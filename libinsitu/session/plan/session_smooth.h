@@ -5,14 +5,15 @@
 #include "session_plan.h"
 #include "session_team.h"
 
-/* Compute, for the isosurfaces of the plan that ask for it, the gradients at the vertices of the cells that they cross:
- * over the cells around each on all ranks, to the same bits on any partition. Vertices are one where recentring takes
- * them as one. extent: the global bounds. The homes of the catalogue's meshes must be known. What fails on this
- * rank at the very end is in *error alone, for the next phase to agree on. Collective, else agreed. */
+/* Computes, for the isosurfaces of the plan that have smooth normals, the gradients at the vertices of the cells that
+ * they cross: over the cells around each on all ranks, to the same bits on any partition. Vertices are equal by the
+ * same keys as in recentring. extent: the global bounds. The homes of the catalogue's meshes must be up to date. An
+ * error of this rank at the very end is stored only in *error, for the next phase to agree on. Collective, else
+ * agreed. */
 insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
                              const session_team *team, const session_extent *extent, base_error *error);
 
-/* Tells whether an isosurface of the plan asks for smooth normals. */
+/* Returns whether an isosurface of the plan has smooth normals. */
 bool session_is_smooth(const session_plan *plan);
 
 #endif

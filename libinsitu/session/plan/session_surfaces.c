@@ -14,7 +14,7 @@ typedef struct surface_wish {
     const scene_threshold *threshold;
 } surface_wish;
 
-/* This rank's; NULL: it has no part of the mesh. */
+/* Returns this rank's faces; NULL if it has no part of the mesh. */
 static session_outer *find_own(const session_meshes *meshes, const surface_wish *wish, session_mesh **mesh)
 {
     *mesh = session_find_mesh(meshes, wish->mesh->name);
@@ -64,11 +64,12 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Finds whether faces are not known on some rank. Where a rank has failed before, all return its error. Collective. */
+/* Determines whether faces are stale on some rank. If a rank has failed before, all return its error. Collective. */
 static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
                                 const session_team *team, int *stale, bool *is_any, base_error *error)
 {
-    int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0}; /* this rank has failed; this rank has stale faces */
+    /* entries: this rank has failed; this rank has stale faces */
+    int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
         session_mesh *mesh;
         const session_outer *outer = find_own(meshes, &wishes[i], &mesh);
@@ -94,7 +95,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
     return status;
 }
 
-/* Makes the mesh of outer faces ready to be drawn. All of its cells have a drawn face. */
+/* Prepares the mesh of outer faces for drawing. All of its cells have a drawn face. */
 static insitu_status make_ready(const session_mesh *mesh, session_outer *outer, base_error *error)
 {
     const insitu_status status = session_make_outer_mesh(mesh, outer, error);

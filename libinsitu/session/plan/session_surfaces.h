@@ -5,9 +5,9 @@
 #include "session_plan.h"
 #include "session_team.h"
 
-/* Find the faces, once for the cells of a mesh, and make this rank's meshes of them, ready for their trees. The homes
- * of the catalogue's meshes must be known. What fails on this rank at the very end is in *error alone, for the next
- * phase to agree on. Collective, else agreed. */
+/* Finds the faces, once for the cells of a mesh, and computes this rank's meshes from them, ready for their trees. The
+ * homes of the catalogue's meshes must be up to date. An error of this rank at the very end is stored only in *error,
+ * for the next phase to agree on. Collective, else agreed. */
 insitu_status session_update_surfaces(const session_plan *plan, const session_catalogue *catalogue,
                                       const session_meshes *meshes, const session_team *team, base_error *error);
 

@@ -1,17 +1,18 @@
-/* Trees that are up to date are left alone: new cells build a tree, moved vertices refit its bounds (until its cost has
- * grown by half, then it is built again), new values refit ranges. The first scalar that a mesh is drawn with has the
- * nodes' own ranges, further ones have pairs beside the tree. Where values tell what can be seen and vertices move in
- * every step, bounds are refitted only where something can be seen: a fifth of the nodes for an isosurface.
+/* Trees that are up to date are not changed: new cells build a tree, moved vertices refit its bounds (until its cost
+ * has grown by half, then it is rebuilt), new values refit ranges. The first scalar with which a mesh is drawn has
+ * ranges in the nodes themselves, further ones have pairs beside the tree. If values determine which cells are visible
+ * and vertices move in every step, only the bounds of visible nodes are refitted: a fifth of the nodes for an
+ * isosurface.
  *
- * A full tree is dear to build and cheap to keep; a partial one, over the cells that the images can show, is cheap to
- * build where they show little, but ends with the values. Which serves better depends on how long the cells will stay,
- * which is not known. So partial trees are rented until the rent since the cells last changed reaches the price of the
- * full tree, which is then bought. This never costs more than twice the best choice in hindsight (Karlin, Manasse,
- * Rudolph and Sleator 1988). Prices are as measured in this run.
+ * A full tree is expensive to build and cheap to keep. A partial tree, over the cells that the images can show, is
+ * cheap to build if they show little, but is valid only for the current values. Which is better depends on how long the
+ * cells will stay unchanged, which is unknown. So partial trees are "rented" until the rent since the cells last
+ * changed reaches the price of the full tree, which is then "bought". This never costs more than twice the best choice
+ * in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
  *
- * If the last full tree of a mesh served only one step, the next one is likely to as well, as when the caller sets a
- * new mesh at every step. It is then built along a space-filling curve, in half the time, and is kept if it does serve
- * longer. */
+ * If the last full tree of a mesh was used in only one step, the next one probably will be, too, as when the caller
+ * sets a new mesh at every step. It is then built along a space-filling curve, in half the time, and is kept if it is
+ * used longer after all. */
 #include "session_trees.h"
 
 #include "memory.h"
@@ -21,9 +22,9 @@
 
 static const double worst_cost = 1.5; /* a refitted tree's cost, as a multiple of its cost when it was built */
 
-/* Seconds a cell on one thread, before anything was measured. */
+/* Seconds per cell on one thread, before anything was measured. */
 static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit = 1e-8};
-/* A measurement over fewer cells than this says little about more. */
+/* Least number of cells of a measurement from which costs are extrapolated. */
 enum { MEASURED_CELLS = 10000 };
 
 static double rate_of(double measured, double first, int threads)
@@ -38,7 +39,7 @@ static void measure(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* State of an update beside the meshes. */
+/* Data of an update besides the meshes. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;
@@ -59,7 +60,7 @@ static session_scalar *own_scalar(const session_mesh *mesh)
     return NULL;
 }
 
-/* The scalar of the nodes' own ranges; where there is none, the first that is drawn. */
+/* Returns the scalar whose ranges are in the nodes; if there is none, the first that is drawn. */
 static session_scalar *choose_own_scalar(session_mesh *mesh)
 {
     session_scalar *own = own_scalar(mesh);
@@ -74,7 +75,7 @@ static session_scalar *choose_own_scalar(session_mesh *mesh)
     return own;
 }
 
-/* Half the surface of the mesh's bounds. */
+/* Returns half the surface of the mesh's bounds. */
 static double surface_of(const session_mesh *mesh)
 {
     double d[3];
@@ -82,7 +83,8 @@ static double surface_of(const session_mesh *mesh)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* A tree over a selection mostly serves one step too, but has few cells, so its builder hardly matters. */
+/* Chooses the builder. A tree over a selection is mostly used in one step too, but has few cells, so its builder hardly
+ * matters. */
 static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_selection *selection)
 {
     return !selection && mesh->full_tree_steps == 1 ? MMBVH_MORTON : MMBVH_SAH;
@@ -163,15 +165,15 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
     return status ? status : refit_ranges(u, mesh, error);
 }
 
-/* Tells whether the tree has grown so much beside its mesh that it is better built again. Boxes that were not refitted
- * count as they are. */
+/* Returns whether the tree has grown so much relative to its mesh that it should be rebuilt. Boxes that were not
+ * refitted count unchanged. */
 static bool is_decayed(const session_mesh *mesh)
 {
     const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * surface_of(mesh);
     return tree > worst_cost * built;
 }
 
-/* The part of the tree that the scalars show. Where bounds are refitted there, the ranges are up to date. */
+/* Lists the part of the tree that the scalars show. The ranges must be up to date there. */
 static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
 {
     int count = 0;
@@ -183,7 +185,7 @@ static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
     return count;
 }
 
-/* Refits all bounds, or those of what can be seen. */
+/* Refits all bounds, or only those of visible nodes. */
 static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool all, base_error *error)
 {
     const double start = MPI_Wtime();
@@ -203,8 +205,8 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
-/* Bounds that hold only what could be seen serve as long as nothing else can be. If something else can, and the
- * vertices have come to rest, all bounds are refitted, once. */
+/* Updates the bounds. Bounds that are valid only for visible nodes suffice as long as nothing else can be visible. If
+ * something else can, and the vertices no longer move, all bounds are refitted, once. */
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;
@@ -212,7 +214,7 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
     const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
-    mesh->candidates_key = status ? ~key : key; /* after a failure the bounds are no key's */
+    mesh->candidates_key = status ? ~key : key; /* after a failure the bounds belong to no key */
     return status;
 }
 
@@ -231,7 +233,8 @@ static uint64_t parts_key(const session_meshes *meshes, int *count)
     return key;
 }
 
-/* Ranges of all parts are full: several fields share the tree, and culling by range begins at the parts' roots. */
+/* Fills the boxes of the parts. Their ranges are unbounded: several fields share the tree, and culling by range begins
+ * at the parts' roots. */
 static void fill_boxes(const session_meshes *meshes, float *boxes, int count)
 {
     int part = 0;
@@ -280,7 +283,7 @@ static double full_price(const tree_update *u, const session_mesh *mesh)
     return rate_of(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
 }
 
-/* Tells whether there is a full tree of these cells. */
+/* Returns whether there is a full tree of these cells. */
 static bool has_full_tree(const session_mesh *mesh)
 {
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
@@ -300,14 +303,14 @@ static bool has_new_values(const session_mesh *mesh)
     return false;
 }
 
-/* Nothing has changed that decides on the cells that show. */
+/* Returns whether nothing has changed that determines the visible cells. */
 static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
 {
     if (!mesh->has_tree || !mesh->is_partial || mesh->is_topology_stale || mesh->is_geometry_stale) return false;
     return !has_new_values(mesh) && mesh->candidates_key == key;
 }
 
-/* key: of the candidates. */
+/* Updates a partial tree. key: of the candidates. */
 static insitu_status update_partial(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
     if (is_partial_fresh(mesh, key)) return INSITU_OK;
@@ -318,7 +321,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     const double seconds = MPI_Wtime() - start;
     measure(&u->trees->rates.select, seconds, mesh->given.cell_count);
     u->report->build_ms += 1e3 * seconds;
-    /* The full tree is built where the partial one costs half of its price or more. */
+    /* The full tree is built if the partial one would cost half of its price or more. */
     const bool is_forced = u->choice == SCENE_TREE_PARTIAL;
     const bool is_partial = is_forced || 2 * selection.count <= mesh->drawn_count;
     status = build_tree(u, mesh, is_partial ? &selection : NULL, error);

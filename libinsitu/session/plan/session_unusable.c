@@ -8,7 +8,7 @@
 /* Visits the fields of the plan's isosurfaces and volumes. Views of an image share their layers. */
 typedef struct field_walk {
     const session_plan *plan;
-    int image; /* the next one */
+    int image; /* number of the next image */
     scene_field_walk fields;
 } field_walk;
 

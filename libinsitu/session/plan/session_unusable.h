@@ -7,11 +7,11 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* A hash of this rank's cells with such values, by what the plan's layers show; 0: there are none. While it is the same
- * on every rank, the warnings are. Local. */
+/* Returns a hash of this rank's cells with such values in the plan's layers; 0: there are none. As long as it is the
+ * same on every rank, so are the warnings. Local. */
 uint64_t session_unusable_key(const session_plan *plan, const session_meshes *meshes);
 
-/* Count such cells over all ranks, and warn. Collective. */
+/* Counts such cells over all ranks, and warns. Collective. */
 insitu_status session_warn_of_unusable(const session_plan *plan, const session_catalogue *catalogue,
                                        const session_meshes *meshes, const session_team *team, session_report *report,
                                        base_error *error);

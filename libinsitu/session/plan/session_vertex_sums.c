@@ -1,12 +1,12 @@
-/* A rank knows the vertices that it needs, but may not have all cells around them: it asks the ranks whose boxes hold
- * such a vertex for their share of its sum.
+/* A rank has the vertices for which it needs sums, but may not have all cells around them: it requests, from the ranks
+ * whose boxes contain such a vertex, their share of its sum.
  *
  *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
  *     shared: <--(sums)--, in whole numbers, which add up in any order
  *
- * If a mesh is cut into blocks, few vertices lie in other ranks' boxes; if each rank has cells everywhere, each asks
- * all others. */
+ * If a mesh is cut into blocks, few vertices lie in other ranks' boxes; if each rank has cells everywhere, each sends
+ * requests to all others. */
 #include "session_vertex_sums.h"
 
 #include <math.h>
@@ -21,7 +21,7 @@ enum { KEY_WORDS = 3 };
 
 /* ---- keys of all vertices ------------------------------------------------------------------------------------- */
 
-/* Marks the vertices of cells that are no ghosts with 0, the others with -1. */
+/* Marks the vertices of cells that are not ghosts with 0, the others with -1. */
 static void mark_vertices(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -74,9 +74,9 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
     return session_no_memory(error, vertex_count(sums) * 60, "gradients at vertices");
 }
 
-/* ---- what ranks ask of each other ---------------------------------------------------------------------------- */
+/* ---- requests between ranks ---------------------------------------------------------------------------------- */
 
-/* The letters of an exchange. */
+/* The messages of an exchange. */
 typedef struct sums_mail {
     double (*places)[3];
     session_mail questions, asked, answers, answered;
@@ -94,7 +94,7 @@ static void mail_free(sums_mail *mail)
     base_free(mail->asked_numbers);
 }
 
-/* Finds a vertex for each of this rank's keys. */
+/* Finds the position of a vertex for each of this rank's keys. */
 static bool find_places(const session_vertex_sums *sums, double (**out)[3])
 {
     *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
@@ -114,7 +114,7 @@ static bool find_places(const session_vertex_sums *sums, double (**out)[3])
     return true;
 }
 
-/* Writes to each rank the keys in its box. numbers gets the keys' numbers, in the order of the mail. */
+/* Packs for each rank the keys in its box. *numbers: the keys' numbers, in the order of the message. */
 static bool write_questions(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
                             const double (*places)[3], session_mail *out, int64_t **numbers)
 {
@@ -141,7 +141,7 @@ static bool write_questions(const session_vertex_sums *sums, const session_team 
     return true;
 }
 
-/* Makes room for the keys of the questions behind this rank's own. */
+/* Ensures space for the requested keys behind this rank's own. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
     session_key_table all;
@@ -152,8 +152,8 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
     return true;
 }
 
-/* Adds the keys of the questions, or, where all vertices have keys, looks them up. numbers are theirs, in the order of
- * the mail; -1: this rank has nothing there. */
+/* Adds the requested keys, or, if all vertices have keys, looks them up. *numbers: their numbers, in the order of the
+ * message; -1: this rank has no such vertex. */
 static bool read_questions(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;
@@ -222,7 +222,7 @@ static insitu_status answer(const session_team *team, session_vertex_sums *sums,
 
 /* ---- sums ---------------------------------------------------------------------------------------------------- */
 
-/* A few bits of each key, so that most vertices need no look into the table. */
+/* A filter with a few bits of each key, so that most vertices need no search in the table. */
 typedef struct key_filter {
     uint64_t *bits;
     uint64_t mask;
@@ -240,7 +240,7 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
     return out->bits != NULL;
 }
 
-/* Finds all vertices with one of the keys: this rank's own, which a crack may double, and those asked for. */
+/* Finds all vertices with one of the keys: this rank's own, which a crack may double, and the requested ones. */
 static bool find_entries(const session_vertex_sums *sums, const session_sum_part *part, int threads)
 {
     key_filter filter;
@@ -267,7 +267,7 @@ static session_gradient_basis basis_of(const session_vertex_sums *sums, const se
                                     sums->length,       threads};
 }
 
-/* Lists the cells of each part, and finds this rank's bounds of what they give. */
+/* Lists the cells of each part, and computes this rank's bounds of their contributions. */
 static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
@@ -296,8 +296,8 @@ static bool add_sums(const session_vertex_sums *sums, const session_cell_list *l
     return true;
 }
 
-/* The bounds are those of all ranks. If a rank has failed before, all return its error; what fails behind the reduction
- * is in *error alone. Collective. */
+/* Computes the sums, with the bounds of all ranks. If a rank has failed before, all return its error; an error after
+ * the reduction is stored only in *error. Collective. */
 static insitu_status make_sums(const session_team *team, session_vertex_sums *sums, session_cell_list *lists,
                                base_error *error)
 {

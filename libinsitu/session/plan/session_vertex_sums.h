@@ -9,7 +9,7 @@
 
 /* This rank's part of one mesh. */
 typedef struct session_sum_part {
-    session_mesh *mesh; /* NULL: nothing of it is here */
+    session_mesh *mesh; /* NULL: this rank has no part of it */
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
     int32_t *entries; /* key of each vertex, or -1 */
@@ -20,24 +20,24 @@ typedef struct session_vertex_sums {
     int part_count;
     session_sum_part *parts;
     int field_count;
-    bool by_id;   /* vertices are the same by global ids, else by coordinates */
-    bool are_all; /* every vertex of each part has a key: all ranks have all their cells' sums */
+    bool by_id;   /* vertices are equal by global ids, else by coordinates */
+    bool are_all; /* every vertex of each part has a key: all ranks get all their cells' sums */
     session_key_table keys;
     int64_t own_count; /* number of this rank's keys; the keys after them were asked for by other ranks */
     session_gradient_bounds bounds;
     double length;
-    int64_t *sums; /* session_sum_words() a key */
+    int64_t *sums; /* session_sum_words() per key */
 } session_vertex_sums;
 
-/* Gives every vertex of a cell that is not a ghost a key. The parts' meshes are known. Local. */
+/* Gives a key to every vertex of a cell that is not a ghost. The parts' meshes must be set. Local. */
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
 
-/* Find the sums of this rank's keys, over all ranks. Keys and entries have been made. A rank that has failed before
- * calls with its error in *error. What fails at the very end is in *error alone. Collective, else agreed. */
+/* Computes the sums of this rank's keys, over all ranks. Keys and entries must be set. A rank that has failed before
+ * calls this with its error in *error. An error at the very end is stored only in *error. Collective, else agreed. */
 insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
                                 session_vertex_sums *sums, base_error *error);
 
-/* Frees all but the parts' meshes. */
+/* Frees all members except the parts' meshes. */
 void session_vertex_sums_free(session_vertex_sums *sums);
 
 #endif
