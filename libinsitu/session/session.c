@@ -1,5 +1,5 @@
-/* The public calls, but for the step: a session's life, and what the caller gives it. Parts of its creation that may
- * fail on one rank alone end in agreement, so that a session is created on all ranks or on none. */
+/* The public calls, except for the step: creation and end of a session, and the caller's input. Phases of the creation
+ * that may fail on one rank alone end in agreement, so that a session is created on all ranks or on none. */
 #include "session.h"
 
 #include "comp.h"
@@ -9,14 +9,13 @@
 #include "session_field_input.h"
 #include "session_mesh_input.h"
 
-/* The message of insitu_error(NULL): there is no session to ask after a failed insitu_create(). */
+/* The message that insitu_error(NULL) returns: after a failed insitu_create() there is no session. */
 static _Thread_local base_error thread_error;
 
-/* Returned while a fill runs, when the report of the step is half made. */
+/* Returned while a fill function runs, when the step's report is incomplete. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""};
 
-/* Refuses a call that a fill of the session makes. To note that is all that a session that is only read is changed by.
- */
+/* Refuses a call made from inside a fill function. Casts const away to record the refusal, which is the only change. */
 static bool is_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
@@ -60,7 +59,7 @@ static bool is_mpi_running(void)
 
 static void free_session(insitu_session *session)
 {
-    session_writer_end(&session->writer); /* before the scene that it writes by */
+    session_writer_end(&session->writer); /* must end before the scene that it uses */
     session_meshes_free(&session->meshes);
     session_catalogue_free(&session->catalogue);
     session_trees_free(&session->trees);
@@ -145,7 +144,8 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
-/* A call that succeeds leaves the message of the last one that failed, until a step begins. */
+/* Stores the error of a failed call; a successful call keeps the message of the last failed one, until a step
+ * begins. */
 static insitu_status keep_error(insitu_session *session, const base_error *error)
 {
     if (error->status) session->error = *error;

@@ -1,5 +1,5 @@
-/* The parts of a session. They know of each other only what their headers include, and a function's parameters are the
- * parts that it may touch; only the public calls, the step and its first reduction see the whole session. */
+/* The parts of a session. Each part only uses those whose headers it includes, and a function's parameters are the
+ * parts that it may access; only the public calls, the step and its first reduction access the whole session. */
 #ifndef SESSION_SESSION_H
 #define SESSION_SESSION_H
 
@@ -32,7 +32,7 @@ struct insitu_session {
     session_catalogue catalogue;
     session_space space;
     session_trees trees;
-    session_writer writer; /* rank 0 */
+    session_writer writer; /* on rank 0 */
     session_kept_pictures kept;
     session_run_ranges run_ranges;
     session_cinema cinema;     /* rank 0 */
@@ -42,8 +42,8 @@ struct insitu_session {
     session_events events;
     session_report report;
     bool has_stepped;
-    double last_time; /* the time of the last step */
-    base_error error; /* the error of the last call that failed since the last step began */
+    double last_time; /* time of the last step */
+    base_error error; /* error of the last call that failed since the last step began */
 };
 
 #endif

@@ -1,9 +1,9 @@
 /* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
- * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
- * all tables of names are alike, whether any rank lacks threads, the lowest of the instruction sets, and, from rank 0,
- * the time, whether the scene file was edited, whether pictures could not be written, and whether they are written in
- * the step; whether any field is filled on demand, and the lowest rank that has a warning for all. After it, ranks
- * decide alike without further messages. */
+ * minimum), the lowest rank with an error, whether cells, coordinates or names changed anywhere, whether all tables of
+ * names are equal, whether any rank lacks threads, the lowest of the instruction sets, whether any field has a fill
+ * function, and the lowest rank that has a warning for all. From rank 0 it has the time, whether the scene file was
+ * edited, whether pictures could not be written, and whether they are written in the step. After it, all ranks decide
+ * alike without further messages. */
 #include "session_changes.h"
 
 #include <string.h>
@@ -14,7 +14,7 @@
 
 enum change_word {
     CYCLE_HIGH,
-    CYCLE_LOW, /* negated, as is all that is called low */
+    CYCLE_LOW, /* negated, as everything called low */
     FAILED,    /* ranks - lowest failing rank; 0: none */
     CELLS_CHANGED,
     NAMES_CHANGED,
@@ -28,11 +28,11 @@ enum change_word {
     ISA_LOW, /* and the lowest rank that has it */
     ISA_HIGH,
     TELLING,   /* session_telling_word() */
-    ROOT_TIME, /* the bits of rank 0's */
+    ROOT_TIME, /* bits of rank 0's time */
     CHANGE_WORDS
 };
 
-static const int64_t more_ranks = (int64_t)1 << 32; /* than there are */
+static const int64_t more_ranks = (int64_t)1 << 32; /* larger than any number of ranks */
 
 static int64_t bits_of(double value)
 {
@@ -63,7 +63,7 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     const session_scene_file *file = &session->scene_file;
     const int64_t names = (int64_t)(session_names_hash(meshes) >> 1);
     words[CYCLE_HIGH] = cycle;
-    words[CYCLE_LOW] = ~cycle; /* as a negation, without overflow */
+    words[CYCLE_LOW] = ~cycle; /* negated without overflow */
     words[FAILED] = session_pending_error(meshes) ? team->ranks - team->rank : 0;
     words[CELLS_CHANGED] = meshes->are_cells_changed || !session->space.has_extent;
     words[NAMES_CHANGED] = meshes->are_names_changed || !session->catalogue.is_known;

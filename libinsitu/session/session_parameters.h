@@ -1,4 +1,4 @@
-/* The scene's parameters, as the simulation reads them. */
+/* The scene's parameters, as read by the simulation. */
 #ifndef SESSION_PARAMETERS_H
 #define SESSION_PARAMETERS_H
 
@@ -7,17 +7,17 @@
 
 enum { SESSION_MOST_ASKED = 256 };
 
-/* Names that the code has asked for on this rank. */
+/* Names that the simulation has requested on this rank. */
 typedef struct session_asked {
-    int count; /* beyond SESSION_MOST_ASKED they are not noted, and no parameter counts as forgotten */
+    int count; /* names beyond SESSION_MOST_ASKED are not recorded, and no parameter is then reported as unused */
     uint64_t names[SESSION_MOST_ASKED]; /* hashes */
 } session_asked;
 
-/* Find a parameter, and note that it was asked for. On an error *value stays. Local. */
+/* Finds a parameter, and records that it was requested. On an error *value is unchanged. Local. */
 insitu_status session_read_parameter(const session_scene_file *file, session_asked *asked, const char *name,
                                      double *value, base_error *error);
 
-/* Warn of parameters that were never asked for on this rank. Local. */
+/* Warns of parameters that were never requested on this rank. Local. */
 void session_warn_of_parameters(const scene *scene, const session_asked *asked, session_report *report);
 
 #endif

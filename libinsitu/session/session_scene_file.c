@@ -1,6 +1,7 @@
-/* The scene: rank 0 reads its file, or is given its text, and everyone parses the same text, so that all ranks have the
- * same scene without exchanging its structure. A file edited while the simulation runs is taken at the next step; an
- * edit that does not parse leaves the old scene in place and a warning in the reports until it is mended. */
+/* The scene: rank 0 reads its file, or is given its text, and all ranks parse the same text, so that all have the same
+ * scene without exchanging its structure. A file that is edited while the simulation runs is read again at the next
+ * step; an edit that does not parse leaves the old scene in place, with a warning in the reports until it is
+ * corrected. */
 #include "session_scene_file.h"
 
 #include <string.h>
@@ -44,7 +45,7 @@ static insitu_status read_attachment(const char *path, char **text, int64_t *siz
     return INSITU_OK;
 }
 
-/* Rank 0's bytes to all; *data is allocated on the others. Collective. */
+/* Sends rank 0's bytes to all ranks; *data is allocated on the others. Collective. */
 static insitu_status share_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
 {
     insitu_status status = session_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, team->comm), "MPI_Bcast");
@@ -58,7 +59,7 @@ static insitu_status share_bytes(const session_team *team, char **data, int64_t 
     return session_mpi(error, MPI_Bcast(*data, (int)*size, MPI_CHAR, 0, team->comm), "MPI_Bcast");
 }
 
-/* The files that rank 0's scene names, to all. Collective. */
+/* Sends the files that rank 0's scene names to all ranks. Collective. */
 static insitu_status share_attachments(const session_team *team, scene_attachments *files, base_error *error)
 {
     int count = files->count;
@@ -81,7 +82,8 @@ static insitu_status share_attachments(const session_team *team, scene_attachmen
     return status;
 }
 
-/* Rank 0 parses first, and reads what files the scene names; all others parse what it read. */
+/* Parses the scene. Rank 0 parses first, and reads the files that the scene names; all others parse the text that it
+ * has read. */
 static insitu_status parse_shared(const char *path, const session_team *team, scene_file_text *text, scene *out,
                                   base_error *error)
 {
@@ -108,8 +110,8 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* Copies the caller's text as if it had been read. One that is cut here is longer than a scene may be, and refused as
- * such. */
+/* Copies the caller's text as if it had been read. A text that is cut here is longer than a scene may be, and is
+ * refused for that. */
 static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
@@ -119,8 +121,8 @@ static insitu_status copy_text(const char *given, scene_file_text *text, base_er
     return INSITU_OK;
 }
 
-/* Read, share and parse. Where memory ran out the file counts as unread, and the next step tries again. given: the
- * scene's text; NULL: it is in the file. */
+/* Reads, shares and parses the scene. If memory ran out the file counts as unread, and the next step tries again.
+ * given: the scene's text; NULL: it is in the file. */
 static insitu_status read_scene(session_scene_file *file, const session_team *team, const char *given, scene *out,
                                 base_error *error)
 {
@@ -170,7 +172,7 @@ insitu_status session_load_scene(session_scene_file *file, const session_team *t
 bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
-    /* An editor may have taken the file away for a moment: it is back at a later step. */
+    /* An editor may have removed the file for a moment; it is found at a later step. */
     if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
     return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }

@@ -1,8 +1,8 @@
-/* The step: its phases in their order, each in a file of its own.
+/* The step: its phases in order, each in its own file.
  *
- * A phase takes the parts of the session that it may touch. It is collective, and returns one status on all ranks
- * (session_agree.h), so that all of them leave the step at the same place. The first phase is one small reduction;
- * nothing else is exchanged where no image is due and nothing has failed. */
+ * A phase gets the parts of the session that it may access. It is collective, and returns one status on all ranks
+ * (session_agree.h), so that all of them leave the step after the same phase. The first phase is one small reduction;
+ * nothing else is exchanged if no image is due and nothing has failed. */
 #include "cpu.h"
 #include "memory.h"
 #include "render.h"
@@ -36,7 +36,7 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Drops everything that was made for images of the old scene. */
+/* Drops everything that was created for images of the old scene. */
 static void reload_scene(insitu_session *s)
 {
     session_writer_drain(&s->writer);
@@ -58,8 +58,8 @@ static void reload_scene(insitu_session *s)
     }
 }
 
-/* Takes kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a face
- * between cells of two ranks. */
+/* Selects kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a
+ * face between cells of two ranks. */
 static void use_common_kernels(const session_changes *changes, session_report *report)
 {
     render_isa_limit(changes->isa_level);
@@ -81,7 +81,7 @@ static session_derive_basis derive_basis(insitu_session *s)
     return (session_derive_basis){&s->scene_file.scene, &s->catalogue, &s->meshes, &s->team, &s->space.extent};
 }
 
-/* Makes the derived fields that statistics and conditions of the step want. Collective, agreed. */
+/* Computes the derived fields that statistics and conditions of the step use. Collective, agreed. */
 static insitu_status derive_for_events(insitu_session *s, const session_moment *moment, bool images, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
@@ -89,15 +89,15 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     const session_derive_basis basis = derive_basis(s);
     if (!needed) return INSITU_OK;
     session_mark_sources(scene, needed, &s->meshes);
-    insitu_status status = session_agree(s->team.comm, error); /* the functions that fill fields may be collective */
+    insitu_status status = session_agree(s->team.comm, error); /* fill functions may be collective */
     if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
     if (!error->status) session_copy_wanted(&s->meshes, s->team.threads, error);
     if (!status) status = session_agree(s->team.comm, error);
     return status ? status : session_derive(&basis, needed, error);
 }
 
-/* Finds the statistics that are due, and the images whose conditions hold. An error here keeps neither the others nor
- * images from being found and drawn, and is returned afterwards. Collective. */
+/* Computes the statistics that are due, and the images whose conditions hold. An error here does not prevent the
+ * others, or images, from being computed and drawn; it is returned afterwards. Collective. */
 static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
 {
     const session_moment *moment = basis->moment;
@@ -119,8 +119,8 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
     return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
 }
 
-/* Lists all ranks' meshes and fields, if names are new, names the derived ones, and which of them the scene joins. What
- * fails of that is in *error. Collective. */
+/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds
+ * which meshes the scene joins. An error of the latter is stored in *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -130,8 +130,8 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
     return status;
 }
 
-/* Checks what changed of the meshes' contents, and takes note of all ranks' meshes and fields. Those that are at fault
- * are put aside: *refused is the first reason. Collective. */
+/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
+ * *refused is the first fault. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
                                    base_error *error)
 {
@@ -148,7 +148,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     return status;
 }
 
-/* Makes the plan; and another one without the images of fields that turn out to be wrong as their values are taken.
+/* Makes the plan. If fields turn out to be invalid when their values are read, makes another one without their images.
  * Collective. */
 static insitu_status make_plan(insitu_session *s, const session_plan_basis *basis, base_error *refused,
                                session_plan *plan, base_error *error)
@@ -165,8 +165,8 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
     return status;
 }
 
-/* The phases of a step in which something is due. What the plan does not name is not computed. refused: the error of
- * set calls. Images that need nothing that is at fault are drawn, and it is returned afterwards. */
+/* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: the error
+ * of set calls. Images that need nothing with a fault are drawn, and the error is returned afterwards. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                      base_error *refused, base_error *error)
 {
@@ -208,7 +208,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
-    if (!status) { /* their failure, and what the phases above left, is told by the reduction after them */
+    if (!status) { /* errors of these phases, and of those above, are passed to all ranks by the next reduction */
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
         status = session_check_layers(&plan, &s->catalogue, &s->meshes, team, &s->report, error);
@@ -220,7 +220,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     return error->status;
 }
 
-/* The phases of every step but the first, then those above. */
+/* Performs the phases of every step except the first reduction, then those above. */
 static insitu_status step(insitu_session *s, const session_changes *changes, const session_guard *guard,
                           base_error *error)
 {
@@ -249,7 +249,8 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
     return draw_due_images(s, changes, &moment, &refused, error);
 }
 
-/* Pictures of earlier steps that could not be written are told where this step has nothing else to tell. Collective. */
+/* Returns the error of earlier steps' pictures that could not be written, if this step has no other error.
+ * Collective. */
 static insitu_status tell_unwritten(insitu_session *s, base_error *error)
 {
     base_error told = {.status = INSITU_OK};
@@ -259,7 +260,7 @@ static insitu_status tell_unwritten(insitu_session *s, base_error *error)
     return error->status;
 }
 
-/* On rank 0: gives the writer the news of the step for the databases. An error is told by the next step. */
+/* On rank 0: passes the step's report.json for the databases to the writer. The next step returns an error of this. */
 static void tell_news(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;

@@ -1,4 +1,4 @@
-/* Bytes and counts are added up from what is there at the end of a step, not kept while it runs. */
+/* Bytes and counts are summed up at the end of a step, instead of being tracked while it runs. */
 #include "session_summary.h"
 
 #include "render.h"
