@@ -1,8 +1,8 @@
-/* Reading a scene: the document is checked against the schema and read into the file's own structs, and those become a
- * struct scene, in which every default is filled in and every colour is linear.
+/* Reading of a scene. The document is checked against the schema and read into the structs of the scene file, and these
+ * are converted into a struct scene, in which every default is filled in and every colour is linear.
  *
- * strtod() reads numbers by the locale. A simulation may run under one with a decimal comma; the thread is put into the
- * C locale while a scene is read, and back. */
+ * strtod() reads numbers according to the locale. A simulation may run in a locale with a decimal comma, so that the
+ * thread is switched to the C locale while a scene is read, and switched back afterwards. */
 #include "scene.h"
 
 #include <stdio.h>
@@ -38,15 +38,15 @@ static void convert_background(const scene_file_image *in, float background[4])
     background[3] = alpha;
 }
 
-/* Tells whether the scene does not say how to sample volumes. Any key other than method and max_error says so, even one
- * for samples only. */
+/* Checks whether the scene leaves the sampling of volumes unspecified. Any key other than method and max_error
+ * specifies it, even a key that only applies to samples. */
 static bool is_unsaid(const scene_file_sampling *in)
 {
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
 
-/* A single volume is drawn to an error: samples are cheaper, but leave noise of unknown error. Several volumes are
- * sampled, as their segments would have to be mixed pixel by pixel. */
+/* A single volume is drawn to an error bound by default: samples cost less, but leave noise of unknown size. Several
+ * volumes are sampled by default, because their segments would have to be mixed pixel by pixel. */
 static void choose_method(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
@@ -120,7 +120,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
-/* The variants of an image that differ in their layers, each at its first view. */
+/* Converts the variants of an image that differ in their layers, each at its first view. */
 static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
@@ -137,8 +137,8 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
     return status;
 }
 
-/* Put the views of orbits behind the first ones, beginning with the last image, because only behind it there is room.
- */
+/* Adds the views of orbits behind the first views. The loop begins with the last image, because only behind that image
+ * there is free space. */
 static void add_views(scene *s, int picture_count)
 {
     int end = picture_count;
@@ -248,7 +248,7 @@ static void free_colour_map(scene_colour_map *map)
 
 static void free_image(scene_image *image)
 {
-    if (image->variant.view > 0) return; /* nothing of it is its own */
+    if (image->variant.view > 0) return; /* the variant of view 0 owns these arrays */
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
         scene_free_field(&surface->field);

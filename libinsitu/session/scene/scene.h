@@ -1,5 +1,6 @@
-/* The scene file: what to draw, when, and where to put it. Read from YAML text by a schema; docs/scene.md is drawn
- * from the same schema. Colours in the file are sRGB in [0, 1]; they are linear here. */
+/* The contents of a scene file: the images to draw, when to draw them, and the files to write them to. The file is YAML
+ * text and is read by a schema; docs/scene.md is generated from the same schema. Colours in the file are sRGB in [0,
+ * 1]; colours in these structs are linear. */
 #ifndef SCENE_SCENE_H
 #define SCENE_SCENE_H
 
@@ -13,11 +14,12 @@
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 
-/* The scalar of a field: the magnitude, or component n. Default: component 0 if the field has one, else the magnitude.
- * Only: component 0 of a field that must have no other. */
+/* The scalar that is taken from a field: its magnitude, or its component n. SCENE_COMPONENT_DEFAULT is component 0 if
+ * the field has one component, else the magnitude. SCENE_COMPONENT_ONLY is component 0 of a field that must have no
+ * other component. */
 enum { SCENE_COMPONENT_ONLY = -3, SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 
-/* A field as a layer shows it: on some of the meshes. */
+/* A field that a layer shows, with the meshes on which it is shown. */
 typedef struct scene_field {
     char *name;
     int component;      /* 0 .., or one of the above */
@@ -30,12 +32,12 @@ typedef struct scene_field {
     uint64_t joined;    /* a hash of the meshes that means at vertices are over; the session's (session_joints.h) */
 } scene_field;
 
-/* Tells whether the layer is drawn on a mesh of this name, if that has the field. */
+/* Checks whether the layer is drawn on a mesh of this name, if the mesh has the field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
-/* Tells whether name stands for the mesh. */
+/* Checks whether the name stands for the mesh. */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
-/* What a derived field is. Those after the expression are made of gradients at vertices. */
+/* The kind of a derived field. All kinds after the expression are computed from gradients at vertices. */
 typedef enum scene_derivation {
     SCENE_EXPRESSION,
     SCENE_GRADIENT_OF,
@@ -48,7 +50,7 @@ typedef enum scene_derivation {
 
 enum { SCENE_MAX_DERIVED = 64 };
 
-/* A field that the session makes of others. */
+/* A field that the session derives from other fields. */
 typedef struct scene_derived {
     char *name;
     int line;
@@ -63,28 +65,29 @@ typedef struct scene_derived {
     uint64_t joined;     /* as scene_field.joined, of meshes that gradients are over; the session's */
 } scene_derived;
 
-/* The source of a range that is not fixed. All use the values on all ranks, at each drawn step. */
+/* The source of a range that is not fixed. Each source uses the values on all ranks at each drawn step. */
 typedef enum scene_range_source {
-    SCENE_RANGE_DATA,       /* the least and the greatest value */
-    SCENE_RANGE_RUN,        /* those of all steps drawn so far, kept in a file over restarts (session_run_ranges.h) */
-    SCENE_RANGE_SYMMETRIC,  /* as far below 0 as above: the greater size of the two */
-    SCENE_RANGE_PERCENTILES /* the values that low and high percent of the cells are no greater than */
+    SCENE_RANGE_DATA, /* the minimum and the maximum */
+    /* minimum and maximum over all steps drawn so far, kept in a file across restarts (session_run_ranges.h) */
+    SCENE_RANGE_RUN,
+    SCENE_RANGE_SYMMETRIC,  /* from -m to m, where m is the largest absolute value */
+    SCENE_RANGE_PERCENTILES /* the values that `low` and `high` percent of the cells do not exceed */
 } scene_range_source;
 
 typedef struct scene_range {
-    bool is_fixed; /* low and high are values */
+    bool is_fixed; /* low and high are values of the field */
     double low, high;
-    scene_range_source source; /* where not fixed */
+    scene_range_source source; /* used unless is_fixed */
 } scene_range;
 
-/* The scale that spaces values along a colour map: linear; the logarithm; or, for values of both signs, linear up to a
- * threshold and the logarithm beyond (render_scaled() of render.h, in the same terms). */
+/* The scale by which values are spaced along a colour map: linear; logarithmic; or, for values of both signs, linear up
+ * to a threshold and logarithmic beyond it (see render_scaled() in render.h, which uses the same terms). */
 typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 
-/* A colour map turns a value into a colour, for layers of all kinds. The value's place is (s(value) - s(low)) /
- * (s(high) - s(low)), s being the scale and [low, high] the range. Places below 0 and above 1 have the colours of 0 and
- * 1, or those of outside. A place's colour is taken from the table, linear between entries; in bands it is that of
- * entry floor(place × count). */
+/* A colour map converts a value into a colour, for all kinds of layers. The position of a value is (s(value) - s(low))
+ * / (s(high) - s(low)), s being the scale and [low, high] the range. Positions below 0 and above 1 have the colours of
+ * 0 and 1, or the colours in `outside`. The colour of a position is interpolated linearly between entries of the table;
+ * with bands it is the colour of entry floor(position × count). */
 typedef struct scene_colour_map {
     char *name;     /* name of a built-in map or path of a map file; "" for a list of colours */
     int count;      /* at least 2 colours, or 1 for bands */
@@ -98,15 +101,16 @@ typedef struct scene_colour_map {
     scene_range range;
 } scene_colour_map;
 
-/* A file that the scene names, by the path that it is opened by. */
+/* A file that the scene names, with the path by which it is opened. */
 typedef struct scene_attachment {
-    char *path, *text; /* text: size bytes, not ended */
+    char *path, *text; /* text: size bytes, without a terminating NUL */
     int64_t size;
 } scene_attachment;
 
-/* Files that a scene names. One rank reads them while it parses, and the others get them with the scene. */
+/* Files that a scene names. One rank reads these files while it parses the scene, and sends them to the other ranks
+ * together with the scene. */
 typedef struct scene_attachments {
-    /* Reads a whole file into *text, from base_alloc(); NULL: only files in items can be had. */
+    /* Reads a whole file into *text, allocated with base_alloc(). NULL: only the files in items are available. */
     insitu_status (*read)(const char *path, char **text, int64_t *size, base_error *error);
     int count;
     scene_attachment *items;
@@ -116,7 +120,7 @@ enum { SCENE_MAX_ATTACHMENTS = 64 };
 void scene_attachments_free(scene_attachments *attachments);
 
 typedef struct scene_opacity_point {
-    double at;     /* 0 .. 1 of the range; never falling, two the same make a step */
+    double at;     /* position in the range, 0 .. 1, not decreasing; two equal positions make a step */
     float opacity; /* 0 .. 1, per unit_distance */
 } scene_opacity_point;
 
@@ -148,7 +152,8 @@ typedef struct scene_isosurface {
     scene_field field;
     int value_count; /* 1 .. 64 */
     double *values;
-    float *colours; /* value_count × 3, linear: those given, the last repeated; or a default cycle */
+    /* value_count × 3, linear: the given colours, the last one repeated; or colours of the default cycle */
+    float *colours;
     bool has_colour_by;
     scene_field colour_by;
     scene_colour_map colour_map;
@@ -156,9 +161,9 @@ typedef struct scene_isosurface {
     float opacity;
     scene_material material;
     scene_normal normals;
-    double difference; /* in cell sizes, > 0; 1 by default */
-    uint32_t clips;    /* a set of the image's */
-    int number;        /* in the image's list of layers */
+    double difference; /* distance of the differences in cell sizes, > 0; 1 by default */
+    uint32_t clips;    /* set of the image's clips, one bit each */
+    int number;        /* index in the image's list of layers */
 } scene_isosurface;
 
 typedef struct scene_volume {
@@ -167,12 +172,12 @@ typedef struct scene_volume {
     int opacity_count; /* 1 .. 32 */
     scene_opacity_point *opacity;
     double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
-    uint32_t clips;       /* a set of the image's, the same for all its volumes */
+    uint32_t clips;       /* set of the image's clips, the same for all its volumes */
 } scene_volume;
 
-/* Cells whose values of a field lie from low to high. */
+/* The cells in which the values of a field lie from low to high. */
 typedef struct scene_threshold {
-    bool is_given; /* else all cells */
+    bool is_given; /* else all cells are drawn */
     scene_field field;
     double low, high; /* may be infinite */
 } scene_threshold;
@@ -189,10 +194,10 @@ typedef struct scene_surface {
     scene_colour_map colour_map;
     scene_lines lines;
     float opacity;
-    bool has_material; /* else flat data takes no light */
+    bool has_material; /* without a material, flat data is drawn without lighting */
     scene_material material;
-    uint32_t clips; /* a set of the image's */
-    int number;     /* in the image's list of layers */
+    uint32_t clips; /* set of the image's clips, one bit each */
+    int number;     /* index in the image's list of layers */
 } scene_surface;
 
 typedef struct scene_plane {
@@ -213,11 +218,11 @@ enum { SCENE_MAX_CLIPS = 32 };
 /* Most surfaces of an image (isovalues, planes and outer surfaces together), and most volumes. */
 enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 
-/* Everything outside the half space, box or sphere is cut away; with is_outside, everything inside. */
+/* A half space, box or sphere: everything outside it is cut away, or, with is_outside, everything inside it. */
 typedef struct scene_clip {
     scene_clip_kind kind;
     bool is_outside;
-    scene_plane plane; /* its normal points to what is cut away */
+    scene_plane plane; /* its normal points to the side that is cut away */
     double lower[3], upper[3];
     double centre[3], radius; /* > 0 */
 } scene_clip;
@@ -229,18 +234,19 @@ typedef struct scene_slice {
     scene_colour_map colour_map;
     scene_lines lines;
     float opacity;
-    scene_material material; /* no light by default: colours are those of the map */
-    uint32_t clips;          /* a set of the image's */
-    int number;              /* in the image's list of layers */
+    scene_material material; /* unlit by default: the colours are exactly those of the map */
+    uint32_t clips;          /* set of the image's clips, one bit each */
+    int number;              /* index in the image's list of layers */
 } scene_slice;
 
 typedef struct scene_light {
-    double direction[3]; /* towards the light; camera axes (right, up, backward) unless in_world; unit length */
+    double direction[3]; /* towards the light; in camera axes (right, up, backward) unless in_world; unit length */
     bool in_world;
-    float colour[3]; /* linear, intensity included */
+    float colour[3]; /* linear, multiplied by the intensity */
 } scene_light;
 
-/* Places on circles around the data, numbered circle by circle: view / view_count is the circle. */
+/* Camera positions on circles around the data, numbered circle by circle: view / view_count is the index of the
+ * circle. */
 enum { SCENE_MAX_ELEVATIONS = 32 };
 
 /* The default of step_cells. */
@@ -248,31 +254,32 @@ enum { SCENE_MAX_ELEVATIONS = 32 };
 typedef struct scene_orbit {
     int view_count;                          /* views on each circle; 0: there is no orbit */
     double axis[3];                          /* unit length */
-    double start;                            /* degrees: phi of the first view of a circle */
+    double start;                            /* in degrees: the angle phi of the first view of each circle */
     int circle_count;                        /* 1 .. SCENE_MAX_ELEVATIONS */
-    double elevations[SCENE_MAX_ELEVATIONS]; /* degrees above the plane across the axis */
+    double elevations[SCENE_MAX_ELEVATIONS]; /* in degrees above the plane perpendicular to the axis */
 } scene_orbit;
 
-/* Where a moving camera is at a time, or at a cycle. */
+/* The position of a moving camera at a time or at a cycle. */
 typedef struct scene_camera_point {
     double at;
     double eye[3], focal[3], up[3], angle;
 } scene_camera_point;
 
 typedef struct scene_camera {
-    bool is_automatic; /* eye and focal from the global bounds, looking along -direction */
-    /* Keys that the scene gives; the others follow the data where that is flat (session_camera.h). */
+    bool is_automatic; /* eye and focal are derived from the global bounds, and the camera looks along -direction */
+    /* Keys that the scene gives; if the data is flat, the other ones are chosen from the data (session_camera.h). */
     bool has_direction, has_up, has_fit, has_projection;
-    bool has_bounds; /* automatic: of these, not of the data */
+    bool has_bounds; /* automatic: the bounds below replace those of the data */
     double lower[3], upper[3];
     double eye[3], focal[3];
-    double direction[3]; /* automatic: from the focal point towards the eye */
+    double direction[3]; /* automatic: direction from the focal point to the eye */
     double up[3];
-    double angle;  /* vertical, degrees; 40 by default */
-    double zoom;   /* automatic: 1 fits the bounds; larger is nearer */
-    bool fits_box; /* automatic: the bounds' box fills the frame; else the sphere around it */
+    double angle;  /* vertical angle of view in degrees; 40 by default */
+    double zoom;   /* automatic: 1 fits the bounds into the picture; larger values are closer */
+    bool fits_box; /* automatic: the box of the bounds fills the frame; else the sphere around the box does */
     bool is_orthographic;
-    double height; /* orthographic: of what the picture shows, scene units; 0: as far as a perspective one shows */
+    /* orthographic: height of the visible region in scene units; 0: the same height as with a perspective camera */
+    double height;
     scene_orbit orbit;
     double phi, theta; /* angles of an orbit's view in degrees: around the axis, and above the plane across it */
     bool is_by_cycle;  /* points are at cycles, else at times */
@@ -280,10 +287,10 @@ typedef struct scene_camera {
     scene_camera_point *points; /* rising */
 } scene_camera;
 
-/* The camera as it stands in a step: one that moves is found between its points. */
+/* Returns the camera of a step: the position of a moving camera is interpolated between its points. */
 scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double time);
 
-/* Places in the picture, as insitu_anchor (image_output.h) has them. */
+/* Positions in the picture, the same as insitu_anchor (image_output.h). */
 typedef enum scene_anchor {
     SCENE_TOP_LEFT,
     SCENE_TOP,
@@ -296,31 +303,32 @@ typedef enum scene_anchor {
 } scene_anchor;
 
 typedef struct scene_words {
-    char *text; /* {time}, {cycle} and {name} are replaced */
+    char *text; /* the placeholders {time}, {cycle} and {name} are replaced */
     scene_anchor at;
 } scene_words;
 
-/* Words, bars and lines drawn beside the data. */
-/* Boxes around all data, around each mesh, or around what each rank holds. */
+/* Words, bars and lines that are drawn beside the data. */
+/* Boxes around all data, around each mesh, or around the data of each rank. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
-/* The numbers of colour bars: as short as tells them apart, or all as 0.25, or all as 2.5e-1. */
+/* The format of numbers at colour bars: the shortest that distinguishes neighbours, or all as 0.25, or all as
+ * 2.5e-1. */
 typedef enum scene_notation { SCENE_SHORTEST, SCENE_FIXED, SCENE_SCIENTIFIC } scene_notation;
 
 typedef struct scene_number_form {
     scene_notation notation;
-    bool has_digits; /* else as many as tell neighbours apart */
-    int digits;      /* 0 .. 12, behind the point */
+    bool has_digits; /* else as many digits as distinguish neighbours */
+    int digits;      /* 0 .. 12, behind the decimal point */
 } scene_number_form;
 
 typedef struct scene_decorations {
-    bool is_given; /* else there are none */
+    bool is_given; /* else no decorations are drawn */
     char *title;   /* NULL: none */
     int words_count;
     scene_words *words;
-    bool has_bars; /* one for each layer that colours by a field */
+    bool has_bars; /* a bar for each layer that is coloured by a field */
     scene_anchor bars_at;
-    int tick_count; /* about so many a bar */
+    int tick_count; /* approximate number of ticks per bar */
     int label_count;
     char **labels; /* one label a bar, in order; further bars are called by their fields */
     int unit_count;
@@ -369,15 +377,15 @@ typedef struct scene_database {
 
 typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
 
-/* A statistic of a field lies above one bound and below another. */
+/* The condition that a statistic of a field lies above one bound and below another. */
 typedef struct scene_condition {
-    bool is_given; /* else it always holds */
+    bool is_given; /* else the condition always holds */
     scene_field field;
     scene_statistic of;
     double above, below; /* may be infinite */
 } scene_condition;
 
-/* Statistics that are written as a line of a file. */
+/* Statistics of a field that are written to a file, one line per step. */
 typedef struct scene_statistics {
     scene_field field;
     char *path;       /* relative to the working directory of rank 0 */
@@ -397,7 +405,7 @@ typedef struct scene_variant {
 } scene_variant;
 
 typedef struct scene_image {
-    char *name; /* the same of all variants */
+    char *name; /* the same for all variants */
     int line;
     scene_variant variant;
     bool has_isovalue; /* the sweep sets the isovalue */
@@ -416,11 +424,11 @@ typedef struct scene_image {
     int slice_count;
     scene_slice *slices;
     scene_decorations decorations;
-    int clip_count; /* 0 .. SCENE_MAX_CLIPS, each once */
+    int clip_count; /* 0 .. SCENE_MAX_CLIPS, without duplicates */
     scene_clip *clips;
-    uint32_t clips_of_all; /* a set of them, a bit each: those that cut all layers */
-    bool has_lights;       /* the scene gives some */
-    int light_count;       /* 1 .. 8; a default head light and fill light where none is given */
+    uint32_t clips_of_all; /* set of the clips that cut all layers, one bit each */
+    bool has_lights;       /* the scene gives lights */
+    int light_count;       /* 1 .. 8; a default head light and fill light if the scene gives none */
     scene_light *lights;
     uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */
     int occlusion_samples;        /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
@@ -438,14 +446,14 @@ typedef struct scene_image {
     double max_seconds; /* that samples may take by estimate; 3600 by default */
     int output_count;   /* 0: for memory alone */
     scene_output *outputs;
-    int every;         /* drawn at cycles that are multiples of it; 1 by default */
-    double every_time; /* > 0: instead, when the time passes a multiple of it */
+    int every;         /* the image is drawn at cycles that are multiples of this; 1 by default */
+    double every_time; /* > 0: the image is drawn instead when the time passes a multiple of this */
     scene_condition when;
-    bool once; /* drawn only in the first step in which it is due */
+    bool once; /* the image is drawn only in the first step in which it is due */
 } scene_image;
 
-/* The fields that an image's layers show, one after the other: of each kind of layers in turn, its fields and then what
- * colours it. */
+/* An iteration over the fields that an image's layers show: for each kind of layers in turn, first the fields that are
+ * shown and then those that colour the layers. */
 typedef enum scene_layer_kind { SCENE_ISOSURFACE, SCENE_VOLUME, SCENE_SLICE, SCENE_SURFACE } scene_layer_kind;
 
 typedef enum scene_field_role {
@@ -462,18 +470,18 @@ typedef struct scene_field_walk {
     scene_field_role role; /* role of the last field returned */
 } scene_field_walk;
 
-/* The next field; NULL: there is none. A walk begins with the image alone. */
+/* Returns the next field, or NULL after the last one. An iteration begins with only the image set. */
 scene_field *scene_next_field(scene_field_walk *walk);
-/* The kind's name for messages. */
+/* Returns the name of the kind for messages. */
 const char *scene_layer_word(scene_layer_kind kind);
 
-/* Results that all variants of an image share are found for the first of them. */
+/* Checks whether the image is the first of its variants. Results that all variants share are stored in this one. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {
     return image->variant.layers == 0 && image->variant.view == 0;
 }
 
-/* Tells whether words are written into pictures of the image. */
+/* Checks whether words are drawn into pictures of the image. */
 static inline bool scene_has_words(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
@@ -484,10 +492,11 @@ static inline bool scene_has_words(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* The cells that trees are built over: all cells, those that the images can show, or what costs less. */
+/* The cells that trees are built over: all cells, the cells that the images can show, or whichever of the two costs
+ * less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
-/* By which ranks fragments go to those that blend them, in the order of comp_schedule. */
+/* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */
 typedef enum scene_schedule {
     SCENE_SCHEDULE_AUTO,
     SCENE_SCHEDULE_DIRECT,
@@ -496,13 +505,13 @@ typedef enum scene_schedule {
     SCENE_SCHEDULE_BINARY
 } scene_schedule;
 
-/* Pictures are written by a thread while the simulation goes on, or before the step is over. */
+/* Pictures are written by a thread while the simulation continues, or before the step ends. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
 /* Most images of a scene file (session_events.h has a bit for each), and most pictures that they make in a step. */
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 
-/* A number of the scene for the simulation (insitu_parameter()). */
+/* A number in the scene for the simulation (insitu_parameter()). */
 typedef struct scene_parameter {
     char *name;
     double value;
@@ -510,12 +519,12 @@ typedef struct scene_parameter {
 
 typedef struct scene {
     int derived_count;      /* 0 .. SCENE_MAX_DERIVED */
-    scene_derived *derived; /* each after those that it is made of */
-    int threads;            /* per rank; 0: the cores there are, shared by the ranks of a node */
+    scene_derived *derived; /* sorted: each field after the fields that it is derived from */
+    int threads;            /* threads per rank; 0: the cores of the node, shared among its ranks */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;
-    int image_count; /* 1 .. SCENE_MAX_PICTURES, variants counted */
+    int image_count; /* 1 .. SCENE_MAX_PICTURES, including variants */
     scene_image *images;
     int database_count;
     scene_database *databases;
@@ -523,24 +532,25 @@ typedef struct scene {
     scene_montage *montages;
     int statistics_count; /* 0 .. 64 */
     scene_statistics *statistics;
-    int parameter_count; /* 0 .. 64, of different names */
+    int parameter_count; /* 0 .. 64, with different names */
     scene_parameter *parameters;
 } scene;
 
-/* Parse text (size bytes; file_name for messages, and paths in the scene are relative to its folder). attachments: NULL
- * where the scene may name no file; those that are read are added. On an error *out is zeroed and the message reads
- * "file:line: key: what is wrong, what was expected". */
+/* Parses a text of size bytes. file_name is for messages, and paths in the scene are relative to its folder.
+ * attachments is NULL if the scene may name no file; files that are read are added to it. On an error *out is zeroed
+ * and the message has the form "file:line: key: what is wrong, what was expected". */
 insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene_attachments *attachments,
                           scene *out, base_error *error);
 
 void scene_free(scene *s);
 
-/* The parameter of this name; NULL: the scene has none. */
+/* Returns the parameter of this name, or NULL if the scene has none. */
 const scene_parameter *scene_find_parameter(const scene *s, const char *name);
-/* What a message about a name that is no parameter's says of those that there are: what was meant, and all of them. */
+/* Writes the end of a message about an unknown parameter: the parameter that was probably meant, and a list of all
+ * parameters. */
 void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
 
-/* The values that placeholders stand for. */
+/* The values that placeholders are replaced by. */
 typedef struct scene_moment {
     const char *name; /* name of the image */
     long long cycle;

@@ -1,12 +1,12 @@
 /* Reads the regions that are cut away from an image's layers: half spaces, boxes and spheres. An image has one list of
- * them, without duplicates; each layer has a set of its entries. */
+ * clips, without duplicates; each layer has a set of entries of this list. */
 #include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Puts the clip into the image's list and the set. */
+/* Adds the clip to the image's list, unless it is there already, and to the set. */
 static insitu_status add_clip(const scene_document *d, const char *path, const scene_clip *clip, scene_image *image,
                               uint32_t *set)
 {
@@ -23,7 +23,7 @@ static insitu_status add_clip(const scene_document *d, const char *path, const s
     return INSITU_OK;
 }
 
-/* Zeroes all of it, padding too, so that two clips can be compared. */
+/* Zeroes the whole struct, including padding, so that two clips can be compared with memcmp(). */
 static scene_clip *clear_clip(scene_clip *clip, scene_clip_kind kind, bool is_outside)
 {
     memset(clip, 0, sizeof *clip);

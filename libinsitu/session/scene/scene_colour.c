@@ -1,5 +1,6 @@
-/* The keys that say how values become colours: one description for all layers. A map becomes a table here, reversed and
- * cut into bands where asked for, so that nobody else has to know where it came from. */
+/* Reads the keys that describe how values become colours; all layers use the same description. A map is stored as a
+ * table, which is already reversed and cut into bands if the scene requests that, so that no other code depends on the
+ * source of the map. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,7 +19,7 @@ __attribute__((format(printf, 2, 3))) static void set_path(char path[path_size],
     va_end(arguments);
 }
 
-/* The largest ratio of a logarithmic range's ends, by float32's exponents. */
+/* The largest ratio of the ends of a logarithmic range, limited by the exponents of float32. */
 static const double widest_log_range = 1e30;
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
@@ -102,7 +103,7 @@ static insitu_status take_list(const scene_document *d, const char *path, scene_
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-/* A path in the scene is relative to the scene's folder. */
+/* Returns the path for opening a file: a path in the scene is relative to the scene's folder. */
 static char *path_from_scene(const char *scene_path, const char *name)
 {
     const char *slash = strrchr(scene_path, '/');
@@ -121,7 +122,7 @@ static const scene_attachment *find_attachment(const scene_attachments *all, con
     return NULL;
 }
 
-/* Reads the file as an attachment, which takes the path over. */
+/* Reads the file as an attachment, which takes ownership of the path. */
 static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
 {
     scene_attachments *all = d->attachments;
@@ -216,7 +217,7 @@ static void reverse(scene_colour_map *map)
     }
 }
 
-/* Takes the table's colours at even places, ends included; a single band gets the middle one. */
+/* Takes the table's colours at evenly spaced positions, including both ends; a single band gets the middle colour. */
 static insitu_status cut_into_bands(const scene_document *d, int bands, scene_colour_map *map)
 {
     float *colours = base_alloc((size_t)bands * 3 * sizeof *colours);

@@ -1,6 +1,7 @@
-/* Colour maps in files as ParaView exports them: a JSON list of mappings, or one mapping, each with RGBPoints (value,
- * red, green and blue in turn) and a ColorSpace, or IndexedColors (of bands), and a Name. libyaml reads JSON, which
- * YAML holds. The values are only relative: the first is the low end of a layer's range, and the last the high end. */
+/* Reads colour maps in files as ParaView exports them: a JSON list of mappings, or one mapping. Each mapping has
+ * RGBPoints (value, red, green and blue in turn) and a ColorSpace, or IndexedColors (for bands), and a Name. libyaml
+ * can read JSON, which is a subset of YAML. Only the relative positions of the values matter: the first value is the
+ * low end of a layer's range, and the last value the high end. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -108,7 +109,7 @@ static insitu_status read_space(const colour_file *f, const yaml_node_t *node, c
     return bad_place(f, node, "ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step");
 }
 
-/* Colours of categories: red, green and blue in turn. */
+/* Reads the colours of categories: red, green and blue in turn. */
 static insitu_status read_bands(const colour_file *f, const yaml_node_t *list, scene_colour_points *out)
 {
     const int numbers = list->type == YAML_SEQUENCE_NODE ? item_count(list) : 0;

@@ -1,4 +1,4 @@
-/* The named colours of CSS (CSS Color Module Level 4, section 6.1), sRGB as 0xrrggbb, in the order of their names. */
+/* The named colours of CSS (CSS Color Module Level 4, section 6.1) in sRGB as 0xrrggbb, sorted by name. */
 #ifndef SCENE_SCENE_COLOUR_NAMES_H
 #define SCENE_SCENE_COLOUR_NAMES_H
 

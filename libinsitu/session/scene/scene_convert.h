@@ -1,5 +1,4 @@
-/* Turns the schema's structs into struct scene: defaults are filled in, and what the schema cannot express is checked.
- */
+/* Converts the schema's structs into struct scene: fills in defaults, and checks what the schema cannot express. */
 #ifndef SCENE_SCENE_CONVERT_H
 #define SCENE_SCENE_CONVERT_H
 
@@ -9,43 +8,43 @@
 
 enum { SCENE_PATH_SIZE = 128 };
 
-/* Points that a colour map goes through. */
+/* The points of a colour map, between which it is interpolated. */
 typedef struct scene_colour_points {
     int count;
     colour_point *items;
     colour_space space;
-    bool is_banded; /* each colour is that of a band */
+    bool is_banded; /* each colour belongs to a band */
 } scene_colour_points;
 
-/* Scales v to unit length; false for a zero vector. */
+/* Scales v to unit length; returns false for a zero vector. */
 bool scene_normalize(double v[3]);
-/* Unit vectors count as parallel within a millionth of a radian. */
+/* Checks whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* The numbers whose product is how many pictures an image makes in a step. */
+/* The factors of the number of pictures that an image makes in a step. */
 typedef struct scene_series {
     int fields, isovalues, planes, views; /* each 1 or more */
 } scene_series;
 
-/* Checks the image's sweep. path: of the image. */
+/* Checks the image's sweep and counts its series. path is the path of the image. */
 insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_series *out);
-/* Counted over all images together; too many are an error. */
+/* Counts the pictures of all images together; too many are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Keeps in the layers, which are those of the file, only what the variant shows. */
+/* Removes from the layers, which are those of the file, everything that the variant does not show. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
-/* Reads the series of a camera, whose path is given: its orbit, its places, and how many views it has. */
+/* Read the series of the camera at the path: its orbit, its moving path, and the number of its views. */
 insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
                                  scene_camera *out);
 int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
-/* Turn a camera with an orbit to a view of it. */
+/* Turns a camera with an orbit to one of its views. */
 void scene_place_view(scene_camera *camera, int view);
 
-/* The path of an output that goes into a database. */
+/* Converts the path of an output that belongs to a database. */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
                                    const scene_image *image, scene_output *out);
 /* List the pictures of several images, and number their cells; views are still to be made. */
@@ -53,12 +52,12 @@ insitu_status scene_find_montages(const scene_document *d, scene *s);
 /* List the databases of all images; views are still to be made. */
 insitu_status scene_find_databases(const scene_document *d, scene *s);
 
-/* Each fills one part of an image; path is that of the file's part, for messages. */
+/* Each function converts one part of an image; path is the path of this part in the file, for messages. */
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
                                    scene_camera *out);
 insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,
                                    scene_image *out);
-/* After the lights. */
+/* Must be called after scene_convert_lights(). */
 insitu_status scene_convert_shadows(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out);
 insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,
@@ -70,36 +69,36 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
                                         scene_decorations *out);
 void scene_free_decorations(scene_decorations *decorations);
 void scene_free_field(scene_field *field);
-/* Refuses unknown placeholders, and those that stand for something that the image does not have. key: of the text;
- * path: below the image. */
+/* Rejects unknown placeholders, and those for values that the image does not have. key is the key of the text; path is
+ * the path of the mapping below the image that holds this key. */
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
 
-/* The keys that say how values become colours, of the mapping at path. */
+/* Converts the keys of the mapping at path that describe how values become colours. */
 insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
                                        scene_colour_map *out);
 
-/* The colours of a map in a file that ParaView may have written, as points in rising order (from base_alloc()).
- * file_name: for messages, and name: which of its maps; NULL: its only one. */
+/* Reads the colours of a map in a file of ParaView's format, as increasing points (allocated with base_alloc()).
+ * file_name is for messages; name selects one of the file's maps, or is NULL for its only map. */
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
-/* Copies the texts of a list into an array of their number, to be freed by the caller, after an error too. path NULL:
- * there are none. */
+/* Copies the texts of a list into a new array of the same length, which the caller frees, after an error too. A NULL
+ * path gives an empty array. */
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
 
-/* The meshes that a layer names. layer: its path. */
+/* Converts the names of meshes of a layer; layer is the path of the layer. */
 insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
 
-/* A component by its word: magnitude, x, y, z or a number. NULL: SCENE_COMPONENT_DEFAULT. path: of the mapping with the
- * key `component`. */
+/* Converts the word for a component: magnitude, x, y, z or a number; NULL means SCENE_COMPONENT_DEFAULT. path is the
+ * path of the mapping with the key `component`. */
 insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component);
 
-/* A field as a layer shows it. layer: the path of the layer, which says on what meshes; path: that of the mapping which
- * names the field. */
+/* Converts a field of a layer. layer is the path of the layer, which gives the meshes; path is the path of the mapping
+ * that names the field. */
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
                                   const char *component, scene_field *out);
 
-/* The field that colours a layer, whose path is given. */
+/* Converts the field that colours the layer at the path. */
 insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
                                       scene_field *out, scene_colour_map *map);
 
@@ -111,35 +110,35 @@ insitu_status scene_convert_lines(const scene_document *d, const char *layer, co
 /* NULL: a slight gloss. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds the clips to the image's list and to the set, a bit for each entry of the list. in is NULL where there are none.
- */
+/* Adds the clips to the image's list and to the set, which has a bit for each entry of the list. in is NULL if there
+ * are none. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* Makes the set of a layer: the clips of all layers, and its own. */
+/* Makes the set of a layer: the clips of all layers, and the layer's own clips. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
-/* The plane of the number in the list `planes` of the mapping at path. */
+/* Converts the plane with this index in the list `planes` of the mapping at path. */
 insitu_status scene_convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                   scene_plane *out);
-/* height: of the picture. */
+/* height is the height of the picture. */
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out);
-/* Counts the planes of all entries of its list. */
+/* Counts the planes of all entries of the slice's list. */
 int scene_count_planes(const scene_file_slice *in);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in, int height,
                                   scene_slice *out);
 
-/* in: NULL where there is none; image: its path. */
+/* in is NULL if there is no condition; image is the path of the image. */
 insitu_status scene_convert_condition(const scene_document *d, const char *image, const scene_file_condition *in,
                                       scene_condition *out);
 insitu_status scene_convert_statistics(const scene_document *d, const scene_file *in, scene *out);
 
-/* The derived fields, sorted: each after those that it is made of. */
+/* Converts the derived fields and sorts them: each follows the fields that it is derived from. */
 insitu_status scene_convert_derived(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_derived(scene *s);
 insitu_status scene_convert_parameters(const scene_document *d, scene *out);
 
-/* Refuse two outputs that would be one file. */
+/* Rejects two outputs that would be written to the same file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);
 
 #endif

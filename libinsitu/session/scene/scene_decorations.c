@@ -1,4 +1,4 @@
-/* The part of an image that says what is written and drawn beside the data. */
+/* Reads the part of an image that describes what is written and drawn beside the data. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
-/* Derived fields: fields that the session makes of others. Each is named, and may be made of other derived fields, but
- * not of itself. */
+/* Reads derived fields, which the session derives from other fields. Each has a name, and may depend on other derived
+ * fields, but not on itself. */
 #include <stdio.h>
 #include <string.h>
 
@@ -46,7 +46,7 @@ static insitu_status take_expression(const scene_document *d, const char *path, 
     return status;
 }
 
-/* A field's name, which may have a component behind it; not a whole expression. */
+/* Reads a field's name, which may be followed by a component; a whole expression is an error. */
 static insitu_status add_reference(const scene_document *d, const char *path, const char *text, scene_derived *out)
 {
     scene_expression one;
@@ -66,7 +66,7 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
     return status;
 }
 
-/* The fields at the path: one, or the components of a vector, each a scalar. */
+/* Reads the fields at the path: one field, or the components of a vector, each of which is a scalar. */
 static insitu_status take_references(const scene_document *d, const char *path, scene_derived *out)
 {
     const char *texts[SPACE];
@@ -85,7 +85,8 @@ static insitu_status take_references(const scene_document *d, const char *path, 
     return status;
 }
 
-/* `field` and `magnitude`: a scalar of a field, as an expression of that alone. */
+/* Reads a scalar of a field for the keys `field` and `magnitude`, and stores it as an expression of this field
+ * alone. */
 static insitu_status take_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
 {
     const char *text = NULL;
@@ -106,7 +107,7 @@ static insitu_status take_scalar(const scene_document *d, const char *path, int 
 
 /* ---- one field -------------------------------------------------------------------------------------------------- */
 
-/* Finds the one key that says what the field is: an entry of keys, or -1 for an expression. */
+/* Finds the one key that gives the kind of the field: an index in keys, or -1 for an expression. */
 static insitu_status find_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
 {
     const char *first = in->expression ? "expression" : NULL;
@@ -175,7 +176,7 @@ static int find_derived(const scene *s, const char *name)
     return -1;
 }
 
-/* A search down from a field to those that it is made of. */
+/* A depth-first search from a field to the fields that it is derived from. */
 typedef struct search {
     const scene_document *d;
     scene *s;

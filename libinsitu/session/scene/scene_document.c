@@ -1,7 +1,7 @@
-/* A scene file is read twice: as events, to refuse dangerous input before anything grows (depth, and aliases, by which
- * a few lines can stand for billions of nodes), and as a tree. The tree is compared with the schema here, because only
- * here are a value, its key and its line together for a useful message; the same walk stores right values in the
- * schema's structs. */
+/* A scene file is read twice: first as events, to reject dangerous input before memory is allocated for it (deep
+ * nesting, and aliases, by which a few lines can expand to billions of nodes), and then as a tree. The tree is compared
+ * with the schema in this file, because only here are a value, its key and its line available together for a useful
+ * message; the same traversal stores correct values in the schema's structs. */
 #include "scene_document.h"
 
 #include <errno.h>
@@ -18,7 +18,7 @@
 
 enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, most_words = 64, most_plain = 60 };
 
-/* Memory of the structs; what is behind it is aligned for anything. */
+/* A block of memory for the schema's structs; the memory behind the header is aligned for any type. */
 struct scene_block {
     scene_block *next;
     max_align_t room[];
@@ -40,13 +40,13 @@ static size_t lines_before(const char *text, size_t size, size_t offset)
 
 static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text, size_t size)
 {
-    /* libyaml does not report all of its lack of memory as such. */
+    /* libyaml does not report every lack of memory as such. */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
     size_t line;
     char what[SCENE_SYNTAX_SIZE];
-    if (parser->error == YAML_READER_ERROR) { /* such errors know an offset, but no line */
+    if (parser->error == YAML_READER_ERROR) { /* these errors have an offset, but no line */
         line = lines_before(text, size, parser->problem_offset) + 1;
         snprintf(what, sizeof what, "not valid YAML: %.100s", parser->problem ? parser->problem : "unreadable");
     } else {
@@ -160,7 +160,7 @@ static const char *text_of(const yaml_node_t *scalar)
     return (const char *)scalar->data.scalar.value;
 }
 
-/* The file's own text, short enough for a message. */
+/* Quotes the text of the file, cut to a length that suits a message. */
 static void quote(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {
@@ -192,7 +192,7 @@ bool scene_is_plain_name(const char *name)
     return *name && strlen(name) <= most_plain && !name[strcspn(name, ".[")];
 }
 
-/* The entry of a list whose key `name` has this text; NULL: there is none. */
+/* Returns the entry of a list whose key `name` has this text, or NULL if there is none. */
 static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t *list, const char *name, size_t length)
 {
     for (int i = 0; i < item_count(list); i++) {
@@ -206,7 +206,8 @@ static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t 
     return NULL;
 }
 
-/* The node at a path, NULL where there is none; *line: of it, or of as much of the path as there is. */
+/* Returns the node at a path, or NULL if there is none. *line is the line of the node, or of the last node of the path
+ * that exists. */
 static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
@@ -314,7 +315,7 @@ insitu_status scene_bad(const scene_document *d, const char *parent, const char 
 
 /* ---- tree against schema ---- */
 
-/* Words a question for what was probably meant; nothing if no candidate is near. */
+/* Writes a question that suggests the nearest candidate, or "" if no candidate is near. */
 static void ask_for_meant(const yaml_node_t *word, const char *const *candidates, int count,
                           char question[question_size])
 {
@@ -323,7 +324,7 @@ static void ask_for_meant(const yaml_node_t *word, const char *const *candidates
     if (meant) snprintf(question, question_size, " (did you mean %.64s?)", meant);
 }
 
-/* Lists the words that a value may be, of all its forms. Returns how many there are, at most `most`. */
+/* Lists the words that a value may have, in all its forms. Returns their number, at most `most`. */
 static int list_choices(const cyaml_schema_value_t *value, const scene_key *key, const char **words, int most)
 {
     int count = 0;
@@ -339,8 +340,8 @@ static int list_choices(const cyaml_schema_value_t *value, const scene_key *key,
     return count;
 }
 
-/* Writes the numbers of a text such as "640x480" or "0 0 5" as the list that the value is to be; "" if they are none.
- */
+/* Converts the numbers in a text such as "640x480" or "0 0 5" into the text of the list that the value should be, or ""
+ * if the text is not a list of numbers. */
 static void list_of_numbers(const char *text, const cyaml_schema_value_t *value, char list[list_size])
 {
     static const char between[] = " ,;x*()";
@@ -427,7 +428,7 @@ static insitu_status bad_value(const scene_document *d, const char *path, const 
     return scene_bad(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
-/* Reads a decimal number; 010 is refused, as it could mean 10 or 8. */
+/* Reads a decimal number; 010 is rejected, as it could mean 10 or 8. */
 static bool read_whole_number(const char *text, double *number)
 {
     const char *digits = text + (*text == '-' || *text == '+');
@@ -444,7 +445,7 @@ static bool is_in_range(double number, const scene_key *key)
     return key->is_high_excluded ? number < key->high : number <= key->high;
 }
 
-/* NULL: none of them. */
+/* Returns the choice of this word, or NULL if there is none. */
 static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_value_t *value)
 {
     for (uint32_t i = 0; i < value->enumeration.count; i++) {
@@ -458,7 +459,7 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     if (node->type != YAML_SCALAR_NODE) return false;
     const char *text = text_of(node);
     const size_t length = strlen(text);
-    if (length != node->data.scalar.length) return false; /* a NUL inside */
+    if (length != node->data.scalar.length) return false; /* the text contains a NUL */
     double number;
     switch (value->type) {
     case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
@@ -470,8 +471,8 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     }
 }
 
-/* Make room for `count` values at *to, or, if there is a pointer, where it will point. NULL at *to: the value is not
- * stored, but read from the document. */
+/* Allocates memory for `count` values at *to, or, if the schema has a pointer there, at its target. If *to is NULL, the
+ * value is not stored, but read from the document later. */
 static bool make_room(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
@@ -485,7 +486,7 @@ static bool make_room(scene_document *d, const cyaml_schema_value_t *value, int 
     return true;
 }
 
-/* A scalar that is right. Texts are the document's own. */
+/* Stores a scalar that has passed the checks. Texts are owned by the document. */
 static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                   void *to)
 {
@@ -505,7 +506,7 @@ static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, co
 static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key, void *to);
 
-/* The path of a list's entry: by its name if it has one. */
+/* Writes the path of a list's entry, which uses the entry's name if it has one. */
 static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
                             int index, char out[path_size])
 {
@@ -541,7 +542,7 @@ static insitu_status check_list(scene_document *d, const char *path, const yaml_
     return status;
 }
 
-/* A name, or a list of names. */
+/* Checks a name, or a list of names. */
 static insitu_status check_names(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -563,7 +564,7 @@ static bool takes(const cyaml_schema_value_t *value, const yaml_node_t *node)
     }
 }
 
-/* Checks the node against the first form that it can have. */
+/* Checks the node against the first form whose type matches. */
 static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -576,7 +577,7 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     return bad_value(d, path, node, value, key);
 }
 
-/* A name that the scene gives stands in paths of messages and in calls of simulations. */
+/* Checks a name that the scene gives, as it appears in paths of messages and in calls by simulations. */
 static bool is_own_name(const yaml_node_t *name)
 {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
@@ -587,7 +588,7 @@ static bool is_own_name(const yaml_node_t *name)
     return i > 0;
 }
 
-/* A mapping whose keys are names that the scene gives. */
+/* Checks a mapping whose keys are names that the scene gives. */
 static insitu_status check_named(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -653,7 +654,7 @@ static insitu_status bad_key(scene_document *d, const char *path, const yaml_nod
                      line_of(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
 
-/* Says why a key of earlier scenes is no longer there. NULL: there never was such a key. */
+/* Returns the reason why a key of earlier versions is gone, or NULL if there never was such a key. */
 static const char *why_gone(const char *key)
 {
     static const char *const gone[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},

@@ -1,4 +1,4 @@
-/* The parser descends by the strength of operators:
+/* The parser descends by the precedence of operators:
  *
  *     sum     = product { (+ | -) product }
  *     product = sign { (* | /) sign }
@@ -6,7 +6,7 @@
  *     power   = primary [ ^ sign ]                 so that -x^2 is -(x^2), and x^-1 is allowed
  *     primary = number | ( sum ) | function ( sum [, sum] ) | mag ( field ) | field [. component]
  *
- * and writes instructions as it meets their operators. */
+ * and emits instructions when it reaches their operators. */
 #include "scene_expression.h"
 
 #include <math.h>
@@ -36,8 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *at;
     scene_expression *out;
-    int nested; /* levels of brackets and signs that are open */
-    int used;   /* entries of the stack */
+    int nested; /* number of open brackets and signs */
+    int used;   /* number of used entries of the stack */
     scene_parse_result result;
     char *fault;
 } parser;
@@ -73,7 +73,7 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Bytes of UTF-8 beyond ASCII count as letters. */
+/* Checks for a letter. Bytes of UTF-8 beyond ASCII count as letters. */
 static bool is_letter(char c)
 {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (unsigned char)c >= 0x80;
@@ -92,7 +92,7 @@ static bool take(parser *p, char c)
     return true;
 }
 
-/* The next word for a message: a name, a number or a sign. */
+/* Returns the length of the next word for a message: a name, a number or a sign. */
 static int word_length(const char *at)
 {
     int length = 0;
@@ -137,7 +137,7 @@ static bool add_binary(parser *p, scene_operation operation)
     return add(p, operation, 0, 0);
 }
 
-/* An exponent that is a small whole number needs no logarithm. */
+/* Adds a power; an exponent that is a small whole number needs no logarithm. */
 static bool add_power(parser *p)
 {
     const scene_instruction *last = &p->out->instructions[p->out->count - 1];
@@ -165,7 +165,7 @@ static bool push_input(parser *p, const char *name, int component)
     return push(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
 }
 
-/* Reads a component behind its point. */
+/* Reads a component after its point. */
 static bool parse_component(parser *p, const char *name, int *component)
 {
     const char *word = p->at;
@@ -183,7 +183,7 @@ static bool parse_component(parser *p, const char *name, int *component)
                 length > 20 ? 20 : length, word);
 }
 
-/* Reads a name, in quotes or not, which p->at is the begin of. */
+/* Reads a name, with or without quotes, that begins at p->at. */
 static bool parse_name(parser *p, char name[NAME_SIZE])
 {
     const char quote = *p->at == '"' || *p->at == '\'' ? *p->at : '\0';
@@ -397,7 +397,7 @@ static void apply_function(scene_operation operation, double *restrict a, int co
     }
 }
 
-/* A minimum or maximum of something that is not a number is not a number either. */
+/* The minimum or maximum of NaN and another number is NaN too. */
 static void apply_operator(scene_operation operation, double *restrict a, const double *restrict b, int count)
 {
     switch (operation) {

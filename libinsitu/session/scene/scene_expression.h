@@ -1,5 +1,5 @@
-/* Expressions of fields, as "sqrt(u.x^2 + u.y^2) / a": a text becomes a program for a stack of numbers, which is run
- * for a block of places at a time. */
+/* Expressions of fields, such as "sqrt(u.x^2 + u.y^2) / a". A text is compiled into a program for a stack machine,
+ * which evaluates a block of points at a time. */
 #ifndef SCENE_SCENE_EXPRESSION_H
 #define SCENE_SCENE_EXPRESSION_H
 
@@ -12,7 +12,8 @@ enum {
     SCENE_FAULT_SIZE = 400
 };
 
-/* A function of one or two numbers, an operator, or what puts a number on the stack. */
+/* An operation of the program: a function of one or two numbers, an operator, or an instruction that pushes a
+ * number. */
 typedef enum scene_operation {
     SCENE_OP_PUSH_NUMBER,
     SCENE_OP_PUSH_INPUT,
@@ -41,7 +42,7 @@ typedef struct scene_instruction {
     double number; /* operand of SCENE_OP_PUSH_NUMBER and SCENE_OP_WHOLE_POWER */
 } scene_instruction;
 
-/* A scalar of a field by name. component: as scene_field.component. */
+/* A scalar of a field, given by its name and a component as in scene_field.component. */
 typedef struct scene_reference {
     char *name;
     int component;
@@ -52,19 +53,19 @@ typedef struct scene_expression {
     scene_instruction *instructions; /* operands come before their operator */
     int depth;                       /* most stack entries in use, 1 .. SCENE_STACK */
     int input_count;
-    scene_reference *inputs; /* each once */
+    scene_reference *inputs; /* without duplicates */
 } scene_expression;
 
 typedef enum scene_parse_result { SCENE_PARSED, SCENE_FAULTY, SCENE_NO_MEMORY } scene_parse_result;
 
-/* Parses a text in the locale C, in which numbers have a decimal point. What is wrong with a faulty one is in fault:
- * what was found, and what was expected. *out is to be freed after SCENE_PARSED alone. */
+/* Parses a text in the C locale, in which numbers have a decimal point. If the text is faulty, fault describes what was
+ * found and what was expected. *out must be freed only after SCENE_PARSED. */
 scene_parse_result scene_parse_expression(const char *text, scene_expression *out, char fault[SCENE_FAULT_SIZE]);
 
 void scene_expression_free(scene_expression *expression);
 
-/* Runs the program for count places, at most SCENE_BLOCK. inputs: count values of each input. stack: room for depth ×
- * SCENE_BLOCK numbers; the results are its first ones. */
+/* Runs the program for count points, at most SCENE_BLOCK. inputs holds count values of each input. stack has space for
+ * depth × SCENE_BLOCK numbers; the first count numbers are the results. */
 void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack);
 
 #endif

@@ -1,4 +1,4 @@
-/* Reads the keys that layers of all kinds have: fields and meshes, colours by a field, and materials. */
+/* Reads the keys that all kinds of layers have: fields and meshes, colours by a field, and materials. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

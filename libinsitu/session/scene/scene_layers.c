@@ -1,5 +1,4 @@
-/* The parts of an image that say what is drawn: its layers. Slices and outer surfaces are in scene_slice.c
- * and scene_surface.c. */
+/* Reads the layers of an image. Slices and outer surfaces are read in scene_slice.c and scene_surface.c. */
 #include "scene_convert.h"
 
 #include <stdio.h>
@@ -10,8 +9,8 @@
 
 enum { cycle_length = 16 };
 
-/* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
- * from green. */
+/* Neighbours in the cycle differ in both hue and lightness, and the first colours also differ for viewers who cannot
+ * distinguish red from green. */
 static const float cycle[cycle_length][3] = {
     {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
@@ -36,7 +35,7 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* first: isovalues of earlier layers, so that two layers do not start on one colour. */
+/* first is the number of isovalues of earlier layers, so that two layers do not begin with the same colour. */
 static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                      int first, scene_isosurface *out)
 {
@@ -120,7 +119,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 
 typedef struct layer_counts {
     int isosurfaces, volumes, slices, surfaces;
-    int values; /* isovalues, planes and outer surfaces */
+    int values; /* number of isovalues, planes and outer surfaces */
 } layer_counts;
 
 static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
@@ -145,7 +144,7 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
     return INSITU_OK;
 }
 
-/* Checks the counts of a whole image before anything is made. */
+/* Checks the counts of a whole image before any layer is converted. */
 static insitu_status count_layers(const scene_document *d, const char *path, const scene_file_image *in,
                                   layer_counts *counts)
 {
@@ -164,7 +163,7 @@ static const char *layer_word(const scene_file_layer *layer)
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
-/* The layer was the last to be made of its kind. */
+/* Converts the clips of the layer, which must be the last one that was converted of its kind. */
 static insitu_status convert_clip_of(const scene_document *d, const char *path, const scene_file_layer *in,
                                      scene_image *out)
 {
@@ -182,7 +181,7 @@ static insitu_status convert_clip_of(const scene_document *d, const char *path, 
                      "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
-/* The layer was the last to be made of its kind. */
+/* Numbers the layer, which must be the last one that was converted of its kind. */
 static void number_layer(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;
@@ -190,7 +189,7 @@ static void number_layer(const scene_file_layer *in, int number, scene_image *ou
     if (in->slice) out->slices[out->slice_count - 1].number = number;
 }
 
-/* values: isovalues of the layers before it. */
+/* values is the number of isovalues of the layers before this one. */
 static insitu_status convert_layer(const scene_document *d, const char *path, const scene_file_layer *in, int values,
                                    scene_image *out)
 {
@@ -215,7 +214,7 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
     if (!out->isosurfaces || !out->volumes || !out->slices || !out->surfaces) return scene_no_memory(d);
     for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
         const scene_file_layer *layer = &in->layers[i];
-        char layer_path[SCENE_PATH_SIZE - 16]; /* what comes below a layer is added */
+        char layer_path[SCENE_PATH_SIZE - 16]; /* leaves space for the keys below a layer */
         snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);
         if (!status) status = convert_clip_of(d, layer_path, layer, out);

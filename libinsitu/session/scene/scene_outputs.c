@@ -1,4 +1,4 @@
-/* The files that images are written to, whose names have placeholders. */
+/* Reads the files that images are written to, and expands the placeholders in their names. */
 #include "scene_convert.h"
 
 #include <stdio.h>
@@ -22,14 +22,15 @@ typedef enum placeholder_kind {
 
 typedef struct placeholder {
     placeholder_kind kind;
-    int digits;      /* least digits of a whole number, or digits of another; -1: as few as the number needs */
-    char conversion; /* how a number that is not whole is written: 'f', 'e' or 'g' */
-    size_t size;     /* bytes of the pattern it takes */
+    /* minimum number of digits of a whole number, or digits of another number; -1: as few as the number needs */
+    int digits;
+    char conversion; /* format of a number that is not whole: 'f', 'e' or 'g' */
+    size_t size;     /* number of bytes in the pattern */
 } placeholder;
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
-/* "{WORD:0N}", whose ":" is at text[at]. */
+/* Reads "{WORD:0N}", whose ":" is at text[at]. */
 static placeholder read_whole(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '0') return no_placeholder;
@@ -39,7 +40,7 @@ static placeholder read_whole(const char *text, size_t at, placeholder_kind kind
     return (placeholder){kind, (int)digits, 0, at + 2 + count + 1};
 }
 
-/* "{WORD:.Nf}", or e, or g. */
+/* Reads "{WORD:.Nf}", or the same with e or g. */
 static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '.') return no_placeholder;
@@ -50,7 +51,7 @@ static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
     return (placeholder){kind, (int)digits, conversion, at + 2 + count + 2};
 }
 
-/* The placeholder that stands at text, which begins with '{'. */
+/* Reads the placeholder at the start of the text, which begins with '{'. */
 static placeholder read_placeholder(const char *text)
 {
     static const struct {
@@ -72,7 +73,7 @@ static placeholder read_placeholder(const char *text)
     return no_placeholder;
 }
 
-/* fewest: digits where no format is given. */
+/* fewest is the number of digits if no format is given. */
 static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
@@ -80,7 +81,7 @@ static int write_number(const placeholder *p, double value, int fewest, char *ou
     return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
 }
 
-/* Writes the placeholder's value to out (size bytes; NULL and 0 to measure); returns its length. */
+/* Writes the placeholder's value to out (size bytes; NULL and 0 to measure) and returns its length. */
 static int write_value(const placeholder *p, const scene_moment *moment, char *out, size_t size)
 {
     switch (p->kind) {
@@ -94,7 +95,7 @@ static int write_value(const placeholder *p, const scene_moment *moment, char *o
     }
 }
 
-/* The text into out (size bytes; NULL and 0 to measure); returns its length. */
+/* Writes the expanded text to out (size bytes; NULL and 0 to measure) and returns its length. */
 static size_t expand(const char *pattern, const scene_moment *moment, char *out, size_t size)
 {
     size_t length = 0;
@@ -124,7 +125,8 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
     return text;
 }
 
-/* Names what the image lacks for the placeholder; NULL: it lacks nothing. image is its path. */
+/* Returns the key that the image lacks for the placeholder, or NULL if it lacks none. image is the path of the
+ * image. */
 static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
@@ -242,7 +244,7 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 
 /* ---- no two may be one ----------------------------------------------------------------------------------------- */
 
-/* Names are compared as they come out at one cycle of many digits, so that {cycle} and {cycle:03} count as the same. */
+/* Names are compared as expanded at one cycle of many digits, so that {cycle} and {cycle:03} count as equal. */
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
@@ -252,7 +254,7 @@ scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double tim
     return (scene_moment){image->name, (long long)cycle, time, v->view, v->plane, image->isovalue, image->swept_field};
 }
 
-/* An output's file, and its place among all. */
+/* The file of an output, with its index among all outputs. */
 typedef struct written_file {
     char *path;
     int image, output, number;
@@ -265,7 +267,7 @@ static int compare_files(const void *a, const void *b)
     return order ? order : first->number - second->number;
 }
 
-/* Placeholders by which two pictures of one image differ. */
+/* Returns a placeholder that would distinguish two pictures of one image. */
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";

@@ -1,4 +1,4 @@
-/* Numbers for the simulation, by names of the scene's own. */
+/* Reads the scene's numbers for the simulation, whose names the scene chooses. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* The keys of a scene, of its images and of what they have beside layers: scene_schema_lists.h. */
+/* The keys of a scene, of its images, and of their parts other than layers. The macros are in scene_schema_lists.h. */
 #include "scene.h"
 #include "scene_schema_lists.h"
 

@@ -1,7 +1,8 @@
-/* The scene file's schema: the structs that are read into, and for each key its values and meaning. It is written in
- * terms of libcyaml's header; nothing of that library is called.
+/* The scene file's schema: the structs that the file is read into, and the values and meaning of each key. The schema
+ * uses the types and macros of libcyaml's header; no function of that library is called.
  *
- * Everything optional is a pointer, NULL where the file does not give it; defaults are filled in by scene.c. */
+ * Every optional value is a pointer, which is NULL if the file does not give the value; scene.c fills in the
+ * defaults. */
 #ifndef SCENE_SCENE_SCHEMA_H
 #define SCENE_SCENE_SCHEMA_H
 
@@ -62,7 +63,7 @@ typedef struct scene_file_material {
     double *ambient, *diffuse, *specular, *shininess;
 } scene_file_material;
 
-/* The keys of a colour map. map and range have several forms and are read from the document. */
+/* The keys of a colour map. The keys map and range have several forms and are read from the document. */
 typedef struct scene_file_colour_map {
     bool *reversed;
     int *discrete;
@@ -209,7 +210,7 @@ typedef struct scene_file_decorations {
     double *size;
 } scene_file_decorations;
 
-/* fields is read from the document. */
+/* The key `fields` is read from the document. */
 typedef struct scene_file_sweep {
     bool *isovalues, *planes;
 } scene_file_sweep;
@@ -238,7 +239,7 @@ typedef struct scene_file_statistics {
     scene_file_histogram *histogram;
 } scene_file_statistics;
 
-/* The fields that it is made of are read from the document. */
+/* The key that names the input fields is read from the document. */
 typedef struct scene_file_derived {
     char *name, *expression, *component;
 } scene_file_derived;
@@ -283,7 +284,7 @@ typedef struct scene_file {
 
 struct scene_mapping;
 
-/* Description that stands beside one cyaml field. */
+/* The description of one cyaml field. */
 typedef struct scene_key {
     const char *help;
     const char *by_default; /* as the reference shows it; NULL: the key is required */
@@ -298,7 +299,7 @@ typedef struct scene_key {
         *named; /* for a mapping whose keys are names chosen by the scene: the form of its values; else NULL */
 } scene_key;
 
-/* One of the forms that a value may have. */
+/* One of the forms of a value that may have several types. */
 typedef struct scene_form {
     cyaml_schema_value_t value;
     scene_key key;
@@ -306,18 +307,18 @@ typedef struct scene_form {
 
 typedef struct scene_mapping {
     const char *title;
-    const cyaml_schema_field_t *fields; /* ended by a NULL key */
-    const scene_key *keys;              /* one a field, in the same order */
+    const cyaml_schema_field_t *fields; /* the last entry has a NULL key */
+    const scene_key *keys;              /* one per field, in the same order */
 } scene_mapping;
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* libcyaml has no type for "a name or a list of names", nor for values of several forms, nor for mappings with keys of
- * the scene's own. CYAML_IGNORE stands for them here, and they are read from the document (scene_document_texts(),
- * scene_document_kind(), scene_document_names()). The scene's own keys are of at most SCENE_KEY_BYTES. */
+/* libcyaml has no type for "a name or a list of names", for values of several forms, or for mappings with keys that the
+ * scene chooses. CYAML_IGNORE marks these here, and they are read from the document (scene_document_texts(),
+ * scene_document_kind(), scene_document_names()). Keys that the scene chooses have at most SCENE_KEY_BYTES bytes. */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
-/* The mapping at the top of a file, of a scene_file, and the same as a value. */
+/* The mapping at the top of a file, which is read into a scene_file, and the same mapping as a value. */
 extern const scene_mapping scene_top;
 extern const cyaml_schema_value_t scene_top_value;
 

@@ -1,4 +1,4 @@
-/* The keys of layers and of what is clipped: scene_schema_lists.h. */
+/* The keys of layers and clips. The macros are in scene_schema_lists.h. */
 #include "colour_map.h"
 #include "scene.h"
 #include "scene_schema_lists.h"
@@ -28,7 +28,7 @@ static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"
     "asked for. A field that has a value at each corner of each cell is drawn torn unless this says `vertex`."
 #define RANGE_DEFAULT "`data`"
 
-/* A value of several forms, which is read from the document. */
+/* Declares a value of several forms, which is read from the document. */
 #define FORMS(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
 #define TAKES(list) .forms = (list), .form_count = (int)CYAML_ARRAY_LEN(list)
 
@@ -40,7 +40,7 @@ static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER,
 static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* a mapping that stands for one of several forms is read from the document */
+} no_members; /* the mapping is one of several forms and is read from the document */
 
 #define MAP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \
@@ -79,7 +79,8 @@ static const scene_form range_forms[] = {
     {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, range_words, CYAML_ARRAY_LEN(range_words))}, {0}},
     {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, range_fields)}, {.child = &range_mapping}}};
 
-/* The keys that say how values become colours, of any mapping that has a scene_file_colour_map called colours. */
+/* The keys that describe how values become colours, for any mapping with a member `colours` of type
+ * scene_file_colour_map. */
 #define COLOUR_MAP_KEYS(X, type)                                                                                       \
     X(FORMS("map"), .help = "Colour map: one that is built in, a list of colours, or one of a file.",                  \
       .by_default = "`viridis`", TAKES(map_forms))                                                                     \
@@ -159,7 +160,7 @@ DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
       .by_default = "`inside`")
 EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
 
-/* The keys of a layer of the type. */
+/* The clip key of a layer of this type. */
 #define CLIP_KEY(X, type, more)                                                                                        \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, type, clip, scene_clip_fields),                                        \
       .help = "Cuts parts of this layer away, beside what the image's `clip` cuts of all." more, .by_default = "none", \

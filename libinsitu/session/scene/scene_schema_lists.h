@@ -1,6 +1,6 @@
-/* Macros that make the schema's lists, for its files. Each mapping has one list, which gives each key as a field of
- * libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md all come from
- * these lists, so that none can fall behind the others. */
+/* Macros that the schema's files use to define their lists. Each mapping has one list, which gives each key as a field
+ * of libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md are all derived
+ * from these lists, so that none of them can become outdated. */
 #ifndef SCENE_SCHEMA_LISTS_H
 #define SCENE_SCHEMA_LISTS_H
 
@@ -17,7 +17,7 @@
     static const scene_key name##_keys[] = {LIST(AS_KEY)};                                                             \
     static const scene_mapping name##_mapping = {the_title, name##_fields, name##_keys}
 
-/* The same, for another file. */
+/* Defines a mapping that other files use too. */
 #define EXPORT_MAPPING(name, the_title, LIST)                                                                          \
     const cyaml_schema_field_t scene_##name##_fields[] = {LIST(AS_FIELD) CYAML_FIELD_END};                             \
     static const scene_key name##_keys[] = {LIST(AS_KEY)};                                                             \
@@ -33,7 +33,7 @@
     CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
 #define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
 
-/* Not every file uses all of them. */
+/* Some files use only some of these values. */
 #define SHARED static const __attribute__((unused)) cyaml_schema_value_t
 SHARED number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
 SHARED whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};

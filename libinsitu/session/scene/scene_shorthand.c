@@ -1,5 +1,6 @@
-/* A short form is recognised by its key and its kind of value, wherever the key stands: no key of the schema means two
- * things for which one short form could stand. Nodes are named by their numbers, because adding one may move all. */
+/* A short form is recognised by its key and the kind of its value, wherever the key appears: no key of the schema has
+ * two meanings that could use the same short form. Nodes are identified by their numbers, because adding a node may
+ * move all nodes. */
 #include "scene_shorthand.h"
 
 #include <ctype.h>
@@ -9,10 +10,10 @@
 
 #include "scene_colour_names.h"
 
-/* A document under change. */
+/* A document while its short forms are expanded. */
 typedef struct rewrite {
     yaml_document_t *document;
-    yaml_mark_t mark; /* the place of the value that is replaced */
+    yaml_mark_t mark; /* position of the value that is replaced */
     bool has_memory;
 } rewrite;
 
@@ -126,7 +127,7 @@ static void expand_colour(rewrite *r, int *value)
     if (text && read_colour(text, colour)) *value = make_vector(r, colour);
 }
 
-/* Expands a list of colours, or one colour alone. */
+/* Expands a list of colours, or a single colour. */
 static void expand_colours(rewrite *r, int *value)
 {
     double colour[3];
@@ -185,7 +186,7 @@ static void expand_switch(rewrite *r, int *value)
     if (strcmp(text, "false") == 0) *value = 0;
 }
 
-/* automatic: {automatic: {}}. */
+/* Expands `automatic` to {automatic: {}}. */
 static void expand_camera(rewrite *r, int *value)
 {
     const char *text = text_of(r, *value);
@@ -194,20 +195,20 @@ static void expand_camera(rewrite *r, int *value)
     append_pair(r, *value, "automatic", make_mapping(r));
 }
 
-/* One number: a list of it. */
+/* Expands a single number to a list of this number. */
 static void expand_values(rewrite *r, int *value)
 {
     const char *text = text_of(r, *value);
     if (text && *text && !text[strspn(text, "+-.0123456789eE")]) *value = make_list_of(r, *value);
 }
 
-/* One mapping: a list of it. */
+/* Expands a single mapping to a list of this mapping. */
 static void expand_mappings(rewrite *r, int *value)
 {
     if (node_of(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
 }
 
-/* Adds a plane at right angles to z to a slice that names none. */
+/* Adds a plane perpendicular to z to a slice that gives no planes. */
 static void expand_slice(rewrite *r, int *value)
 {
     static const double z[3] = {0, 0, 1};
@@ -222,7 +223,7 @@ static void expand_slice(rewrite *r, int *value)
     append_pair(r, *value, "planes", make_list_of(r, plane));
 }
 
-/* A mapping from names: a list of mappings with the key `name`. A text is an expression. */
+/* Expands a mapping from names to a list of mappings with the key `name`. A text becomes an expression. */
 static void expand_fields(rewrite *r, int *value)
 {
     if (node_of(r, *value)->type != YAML_MAPPING_NODE) return;
@@ -247,7 +248,7 @@ static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = 
 static const struct {
     const char *key;
     void (*expand)(rewrite *r, int *value);
-    const char *words; /* the short form, where the schema's words do not have it */
+    const char *words; /* the short form, unless the schema's words include it */
 } rules[] = {
     {"colour", expand_colour, NULL},
     {"background", expand_colour, NULL},
@@ -282,18 +283,19 @@ const char *scene_shorthand_words(const char *key, size_t length)
     return NULL;
 }
 
-/* Replaces the first word `from` in the text, whose words _ joins, by the longer or equally long `to`. */
+/* Replaces the first word `from` in the text, whose words are joined by _, by the word `to`, which is at least as
+ * long. */
 static void respell(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
-    const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* colors */
+    const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* also matches the plural, as in colors */
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
-    for (size_t i = 0; to[i]; i++) at[i] = to[i]; /* what is behind has its end already */
+    for (size_t i = 0; to[i]; i++) at[i] = to[i]; /* copies without a NUL: the text behind it is already terminated */
 }
 
-/* American spellings: color is colour, and center is centre. */
+/* Expands American spellings: color becomes colour, and center becomes centre. */
 static void expand_key(rewrite *r, int *key)
 {
     char text[64];
@@ -329,7 +331,7 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) node_of(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* The node of one of the scene's own mappings. 0: there is none. */
+/* Returns the node of a mapping whose keys the scene chooses, or 0 if there is none. */
 static int find_own(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = node_of(r, 1);
@@ -345,7 +347,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 {
     rewrite r = {.document = document, .has_memory = true};
     const int count = (int)(document->nodes.top - document->nodes.start);
-    /* Their keys are names that the scene gives, which have no short forms. */
+    /* The keys of these mappings are names that the scene chooses, which have no short forms. */
     const int parameters = find_own(&r, "parameters"), fields = find_own(&r, "fields");
     for (int number = 1; number <= count && r.has_memory; number++)
         if (number != parameters && number != fields && node_of(&r, number)->type == YAML_MAPPING_NODE)
@@ -362,7 +364,7 @@ static int least(int a, int b)
     return a < b ? a : b;
 }
 
-/* Counts the edits between two words (optimal string alignment). */
+/* Counts the edits between two words (optimal string alignment distance). */
 static int count_edits(const char *a, const char *b)
 {
     int rows[3][LONGEST_WORD + 1];
@@ -387,7 +389,7 @@ static bool is_same_word(const char *a, const char *b)
     return !*a && !*b;
 }
 
-/* Words of other programs, and what they are called here. */
+/* Words of other programs, and the corresponding words of the schema. */
 static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"width", "size"},
                                           {"height", "size"},
@@ -472,7 +474,7 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"frequency", "every"},
                                           {"interval", "every"}};
 
-/* The first of the candidates that a word of another program stands for. */
+/* Returns the first candidate that corresponds to a word of another program, or NULL if there is none. */
 static const char *find_synonym(const char *word, const char *const *candidates, int count)
 {
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)

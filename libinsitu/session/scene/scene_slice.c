@@ -8,7 +8,7 @@
 
 static const scene_material no_light = {.ambient = 1, .shininess = 1};
 
-/* Scales by the largest number first: squares of numbers far from 1 may be infinite or 0. */
+/* Scales by the largest number first, because the squares of very large or very small numbers may be infinite or 0. */
 static bool make_unit(const double in[3], double out[3])
 {
     const double largest = fmax(fabs(in[0]), fmax(fabs(in[1]), fabs(in[2])));
@@ -58,7 +58,7 @@ static insitu_status check_places(const scene_document *d, const char *path, int
     return INSITU_OK;
 }
 
-/* An entry of the list, which may be several planes. */
+/* Adds the planes of an entry of the list, which may describe several planes. */
 static insitu_status add_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                 scene_slice *out)
 {

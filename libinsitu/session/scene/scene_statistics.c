@@ -1,4 +1,4 @@
-/* Statistics of fields: those that are written, and those that images wait for. */
+/* Reads statistics of fields: those that are written to files, and those in conditions of images. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

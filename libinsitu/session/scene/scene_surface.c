@@ -1,4 +1,4 @@
-/* Outer surfaces of meshes, and the fields that colour them. */
+/* Reads the outer surfaces of meshes, and the fields that colour them. */
 #include <math.h>
 #include <stdio.h>
 

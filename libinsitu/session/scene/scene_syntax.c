@@ -1,7 +1,7 @@
-/* libyaml reports where it could not go on, which is often lines behind the mistake, and in words of the grammar. So
- * its report only chooses the lines that are looked at here: from where the structure begins that it could not end, to
- * where it stopped. The mistakes that people make are sought in them, the surest first; what is none of them is told in
- * libyaml's own words. */
+/* libyaml reports the position at which it could not continue, which is often lines behind the mistake, in the terms of
+ * the grammar. Its report is therefore only used to choose the lines to examine: from the begin of the structure that
+ * could not be completed to the position of the report. These lines are searched for common mistakes, the most certain
+ * ones first; any other mistake is reported in libyaml's own words. */
 #include "scene_syntax.h"
 
 #include <ctype.h>
@@ -12,20 +12,20 @@
 
 enum { longest_quote = 40 };
 
-/* A line of the text, without its end. */
+/* A line of the text, without its line end. */
 typedef struct text_line {
     const char *start;
     size_t length;
-    size_t indent; /* blanks and tabs before its first other character; length: it has none */
-    size_t number; /* from 0 */
+    size_t indent; /* number of leading blanks and tabs; the length of the line if there is nothing else */
+    size_t number; /* counted from 0 */
 } text_line;
 
 typedef struct fault {
     const yaml_parser_t *parser;
     const char *text;
     size_t size;
-    size_t first, last; /* the lines to look at, from 0 */
-    bool is_flow;       /* in { } or [ ] */
+    size_t first, last; /* the lines to examine, counted from 0 */
+    bool is_flow;       /* within { } or [ ] */
     size_t *line;
     char *words;
 } fault;
@@ -39,7 +39,7 @@ static text_line line_from(const char *start, const char *end, size_t number)
     return l;
 }
 
-/* The next line; an empty one behind the last. */
+/* Returns the next line; behind the last line, an empty one. */
 static text_line line_behind(text_line l, const char *end)
 {
     const char *stop = memchr(l.start, '\n', (size_t)(end - l.start));
@@ -58,7 +58,7 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Records the words for a line. Returns true, so that a rule can end with it. */
+/* Writes the words of the error and its line. Returns true, so that a rule can end with this call. */
 __attribute__((format(printf, 3, 4))) static bool tell(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
@@ -84,8 +84,8 @@ static bool is_tab(const fault *f, text_line l)
                 quoted_length(l.length - l.indent), l.start + l.indent);
 }
 
-/* Tells whether p is within quotes, or one of them, going on from the character before; *quote: the one that is open.
- */
+/* Checks whether p is within quotes or is a quote itself, continuing from the previous character; *quote is the quote
+ * that is open. */
 static bool is_in_quotes(text_line l, const char *p, char *quote)
 {
     const bool begins = p == l.start || strchr(" \t[{,:", p[-1]);
@@ -123,7 +123,7 @@ static bool is_colour_comment(const fault *f, text_line l)
                 (int)length, colour);
 }
 
-/* The length of a placeholder such as {cycle:04} at the start of a text; 0: there is none. */
+/* Returns the length of a placeholder such as {cycle:04} at the start of a text, or 0 if there is none. */
 static size_t placeholder_length(const char *at, const char *end)
 {
     const char *p = at + 1;
@@ -133,7 +133,7 @@ static size_t placeholder_length(const char *at, const char *end)
     return is_one ? (size_t)(p - at) + 1 : 0;
 }
 
-/* The length of a text of placeholders and other characters up to a blank, comma or bracket. */
+/* Returns the length of a text of placeholders and other characters up to a blank, comma or bracket. */
 static size_t word_length(const char *at, const char *end)
 {
     const char *p = at;
@@ -145,8 +145,8 @@ static size_t word_length(const char *at, const char *end)
     return (size_t)(p - at);
 }
 
-/* The length of a text that begins with a word, and goes on to the end of the line unless a comma or another key does.
- */
+/* Returns the length of a text that begins with a word. The text ends at the end of the line, or after the word if a
+ * comma, # or another key follows. */
 static size_t text_length(const char *at, size_t word, const char *end)
 {
     while (end > at && (end[-1] == ' ' || end[-1] == '\t')) end--;
@@ -155,7 +155,7 @@ static size_t text_length(const char *at, size_t word, const char *end)
     return (size_t)(end - at);
 }
 
-/* A text with a placeholder outside of quotes: path: {name}.png. */
+/* Checks for a text with a placeholder outside of quotes, such as path: {name}.png. */
 static bool is_bare_placeholder(const fault *f, text_line l)
 {
     const char *end = l.start + l.length;
@@ -167,7 +167,7 @@ static bool is_bare_placeholder(const fault *f, text_line l)
         if (!begins && !is_placeholder) continue;
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
-        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* a mapping, maybe */
+        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* may be a mapping */
         return tell(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
                     (int)(f->is_flow ? length : text_length(p, length, end)), p);
     }
@@ -189,10 +189,10 @@ static bool is_unended_quote(const fault *f, text_line l)
                 l.start + column, column < l.length ? l.start[column] : '"');
 }
 
-/* A " of an earlier line that the " of the line at fault has ended. */
+/* Checks for a " in an earlier line that only the " of this line closes. */
 static bool is_unended_before(const fault *f, text_line l)
 {
-    const char *quote = NULL; /* that is open */
+    const char *quote = NULL; /* the open quote */
     text_line opened = l;
     for (text_line other = line_at(f->text, f->size, 0); other.number < l.number;
          other = line_behind(other, f->text + f->size))
@@ -206,7 +206,7 @@ static bool is_unended_before(const fault *f, text_line l)
                 quoted_length((size_t)(opened.start + opened.length - quote)), quote);
 }
 
-/* A line above that ends in a bracket, behind which something else than a value follows. */
+/* Checks for an earlier line that ends with an opening bracket that is never closed. */
 static bool is_left_open(const fault *f)
 {
     bool is_told = false;
@@ -227,7 +227,7 @@ static bool is_unended_bracket(const fault *f, text_line l)
     const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
     const text_line stop = line_at(f->text, f->size, f->last);
     size_t column = f->parser->problem_mark.column;
-    if (column < stop.length && stop.start[column] == ':') /* the key before it is what stands too near */
+    if (column < stop.length && stop.start[column] == ':') /* the key before the colon is indented too little */
         while (column > stop.indent && !strchr(" {[,", stop.start[column - 1])) column--;
     const size_t length = column < stop.length ? stop.length - column : 0;
     if (l.number == stop.number && length > 0)
@@ -236,7 +236,7 @@ static bool is_unended_bracket(const fault *f, text_line l)
     return tell(f, l.number, "the %c of this line is not closed, expected %c", open, close);
 }
 
-/* The last line before `number` that has content; that line itself if there is none. */
+/* Returns the last line before `number` that has content, or the line itself if there is none. */
 static text_line line_before(const fault *f, size_t number)
 {
     text_line found = line_at(f->text, f->size, number);
@@ -250,8 +250,8 @@ static bool is_item(text_line l)
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
 
-/* The line above whose item, or key, stands nearest to where that of the line stands; that of items is 2 further in.
- * Sets *expected to where. */
+/* Returns the earlier line whose item or key is indented most similarly to this line; the items of a list may be
+ * indented 2 further. Sets *expected to the expected indentation. */
 static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;
@@ -269,7 +269,7 @@ static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
     return nearest;
 }
 
-/* The line above, to which nothing can be added: it lacks its colon, or the blank of its item. */
+/* Checks for an earlier line that nothing can be added to, because it lacks a colon, or the blank after its hyphen. */
 static bool is_bad_line_above(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
@@ -306,7 +306,7 @@ static bool is_bad_indent(const fault *f, text_line l)
                 plural(l.indent), quoted_length(key_length), l.start + l.indent, expected, other.number + 1);
 }
 
-/* Something behind a value that has ended: title: "a" b, or a text with a colon: title: a: b. */
+/* Checks for text behind a complete value, as in title: "a" b, or a text with a colon, as in title: a: b. */
 static bool is_bare_text(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";

@@ -1,4 +1,4 @@
-/* The parts of an image that say how it is seen: camera and lights. */
+/* Reads the camera and the lights of an image. */
 #include "scene_convert.h"
 
 #include <math.h>
@@ -79,7 +79,7 @@ static insitu_status convert_automatic(const scene_document *d, const char *path
     return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
 }
 
-/* Where the camera stands, and what is up. */
+/* Converts the position and the up direction of the camera. */
 static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_camera *in,
                                    scene_camera *out)
 {
@@ -125,7 +125,7 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
                                            : scene_bad(d, path, "direction", "has length 0, expected a direction");
 }
 
-/* The fill light keeps the side readable that the key light leaves dark, and is too weak to flatten shapes. */
+/* The fill light keeps the side that the key light does not reach readable, and is too weak to flatten shapes. */
 static void default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};

@@ -102,7 +102,7 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
     }
 }
 
-/* The last key of a path; "" for an entry of a list. */
+/* Returns the last key of a path, or "" for an entry of a list. */
 static const char *last_key(const char *path)
 {
     const char *dot = strrchr(path, '.'), *key = dot ? dot + 1 : path;

@@ -1,20 +1,19 @@
-/* The schema in words, for messages and for docs/scene.md alike. */
+/* Describes the schema in words, both for messages and for docs/scene.md. */
 #ifndef SCENE_SCENE_WORDS_H
 #define SCENE_SCENE_WORDS_H
 
 #include "scene_schema.h"
 
-/* Describes in words the values that a key takes: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1".
- */
+/* Describes the values that a key accepts: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1". */
 enum { SCENE_WORDS_SIZE = 640 };
 void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
 
-/* As above, with what a message says besides: the keys of a list's mappings, and the short form that the path's last
- * key may have. */
+/* Describes the values as above, with additions for messages: the keys of a list's mappings, and the short form that
+ * the last key of the path may have. */
 void scene_expected_words(const char *path, const cyaml_schema_value_t *value, const scene_key *key,
                           char expected[SCENE_WORDS_SIZE]);
 
-/* Tells whether a list is a colour: 3 or 4 numbers from 0 to 1, for which scene_shorthand.c takes names too. */
+/* Checks whether a list is a colour: 3 or 4 numbers from 0 to 1, for which scene_shorthand.c also accepts names. */
 bool scene_is_colour(const cyaml_schema_value_t *list, const scene_key *key);
 
 #endif

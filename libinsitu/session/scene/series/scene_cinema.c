@@ -1,11 +1,12 @@
-/* Outputs that go into Cinema databases. */
+/* Reads outputs that belong to Cinema databases. */
 #include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Finds a control character. A picture is one line of text in the table, so that a torn line can be recognised. */
+/* Finds a control character, which a database must not contain: a picture is one line of text in the table, so that an
+ * incomplete line can be recognised. */
 static const char *find_control(const char *text)
 {
     for (; text && *text; text++)
@@ -44,7 +45,7 @@ static const char *default_file(const scene_image *image, char file[96])
     return file;
 }
 
-/* Folder and file in one path. */
+/* Joins folder and file to one path. */
 static insitu_status join(const scene_document *d, const char *folder, const char *file, scene_output *out)
 {
     const size_t size = strlen(folder) + strlen(file) + 2;
@@ -60,7 +61,8 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
 {
     char file[96];
     const char *folder = in->cinema;
-    while (strncmp(folder, "./", 2) == 0) folder += 2; /* one folder has one table, however the scene writes its name */
+    /* a folder has one table, even if the scene writes its name in several ways */
+    while (strncmp(folder, "./", 2) == 0) folder += 2;
     insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)
@@ -76,7 +78,7 @@ static bool is_in_folder(const scene_output *output, const char *folder)
     return output->folder_bytes == (int)length + 1 && strncmp(output->path, folder, length) == 0;
 }
 
-/* The database of the output's folder; a new one where there is none yet. -1: no memory. */
+/* Returns the database of the output's folder, which is added if there is none yet; -1 if memory ran out. */
 static int find_database(scene *s, const scene_image *image, const scene_output *output)
 {
     for (int i = 0; i < s->database_count; i++)

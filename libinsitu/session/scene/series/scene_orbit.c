@@ -1,4 +1,5 @@
-/* An orbit: circles of views around the data. Each view is an automatic camera of its own direction. */
+/* Reads an orbit, which is a number of circles of views around the data. Each view is an automatic camera with its own
+ * direction. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,9 +7,9 @@
 #include "scene_convert.h"
 #include "vector3.h"
 
-/* Finds the directions across the axis at phi = 0 and 90 degrees. The first is as near as possible to the coordinate
- * axis that follows (x -> y -> z -> x) the one nearest to the axis: for an axis along z, phi is the longitude of
- * spherical coordinates. */
+/* Finds the directions perpendicular to the axis at phi = 0 and 90 degrees. Let a be the coordinate axis nearest to the
+ * axis; the first direction is as near as possible to the coordinate axis that follows a (x -> y -> z -> x). For an
+ * axis along z, phi is the longitude of spherical coordinates. */
 static void find_plane(const double axis[3], double first[3], double second[3])
 {
     int nearest = 0;
@@ -62,7 +63,7 @@ static void convert_elevations(const scene_document *d, const char *path, scene_
     }
 }
 
-/* Refuses the keys that an orbit takes the place of. */
+/* Rejects the keys that an orbit replaces. */
 static insitu_status refuse_others(const scene_document *d, const char *path, const scene_file_camera *in)
 {
     static const char words[] = "given beside orbit, expected one of the two";

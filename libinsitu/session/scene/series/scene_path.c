@@ -1,9 +1,9 @@
-/* A camera that moves: cubics through its points, one for each coordinate.
+/* Interpolates a moving camera by cubic curves through its points, one curve per coordinate.
  *
- * The slope at a point is the weighted harmonic mean of the slopes to its neighbours (Fritsch and Butland's), and 0 at
- * the ends and where the coordinate turns: the curve has one slope at each point, and stays between the values of its
- * two ends, whatever the times are. A spline's slopes would be smoother still, but swing out where a short time follows
- * a long one, through the data. */
+ * The slope at a point is the weighted harmonic mean of the slopes to its neighbours (Fritsch and Butland's method),
+ * and 0 at the ends and at extrema of the coordinate. The curve therefore has a continuous slope, and stays between the
+ * values of two neighbouring points, for any spacing of the times. A spline would be smoother still, but would
+ * overshoot, possibly through the data, if a short interval of time follows a long one. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -13,7 +13,7 @@
 
 /* ---- where it is ----------------------------------------------------------------------------------------------- */
 
-/* The numbers of a point, in one list. */
+/* The number of values in a point, stored in one list. */
 enum { NUMBERS_OF_POINT = 10 };
 
 static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POINT])
@@ -24,13 +24,13 @@ static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POIN
     out[9] = p->angle;
 }
 
-/* Times and values of four points in a row; the first and last may be missing. */
+/* Times and values of four successive points; the first and the last may be missing. */
 typedef struct cubic_points {
     double at[4], value[4];
     bool has_first, has_last;
 } cubic_points;
 
-/* The slope at point i, 1 or 2. */
+/* Returns the slope at point i, which is 1 or 2. */
 static double slope_at(const cubic_points *p, int i)
 {
     const double before = p->at[i] - p->at[i - 1], after = p->at[i + 1] - p->at[i];
@@ -40,8 +40,8 @@ static double slope_at(const cubic_points *p, int i)
     return (w + v) / (w / down + v / up);
 }
 
-/* The value at share, which goes from 0 at the second point to 1 at the third. Rounding does not take it beyond these
- * points' values. */
+/* Returns the value at share, which goes from 0 at the second point to 1 at the third. The result is clamped, so that
+ * rounding does not take it beyond the values of these points. */
 static double cubic_value(const cubic_points *p, double share)
 {
     const double h = p->at[2] - p->at[1], a = p->value[1], b = p->value[2], t = share;
@@ -58,7 +58,7 @@ static void take_point(const scene_camera_point *p, scene_camera *out)
     out->angle = p->angle;
 }
 
-/* Finds the camera between points i and i + 1. */
+/* Interpolates the camera between points i and i + 1. */
 static void take_between(const scene_camera *camera, int i, double at, scene_camera *out)
 {
     double numbers[4][NUMBERS_OF_POINT], found[NUMBERS_OF_POINT];

@@ -1,4 +1,5 @@
-/* The keys that say from where an image is seen, and over what it makes several pictures: scene_schema_lists.h. */
+/* The keys of the camera, and of sweeps, which make several pictures of an image. The macros are in
+ * scene_schema_lists.h. */
 #include "scene.h"
 #include "scene_schema_lists.h"
 

@@ -1,9 +1,9 @@
-/* Directions, as scenes give them. */
+/* Normalises and compares the directions that scenes give. */
 #include <math.h>
 
 #include "scene_convert.h"
 
-/* The vector is scaled first, so that squares of 1e-200 and 1e200 are not lost. */
+/* The vector is scaled first, so that the squares of 1e-200 and 1e200 neither underflow nor overflow. */
 bool scene_normalize(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -14,7 +14,7 @@ bool scene_normalize(double v[3])
     return true;
 }
 
-/* Any closer, the image's right direction would be mostly rounding. */
+/* With a smaller angle, the image's right direction would mostly consist of rounding errors. */
 bool scene_is_parallel(const double a[3], const double b[3])
 {
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
