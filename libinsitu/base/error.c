@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Returns how many bytes the control character at text has, 0 where there is none. Control characters are those of
+/* Returns the number of bytes of the control character at text, or 0 if there is none. Control characters are those of
  * ASCII, and those of Latin 1's second block in UTF-8. */
 static size_t control_bytes(const unsigned char *text)
 {

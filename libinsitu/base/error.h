@@ -1,5 +1,5 @@
-/* A room reports an error as a status and one message. The function that finds the error fills them in, and they are
- * passed up unchanged. */
+/* The rooms of the library report an error as a status and one message. The function that finds the error fills them
+ * in, and its callers return them unchanged. */
 #ifndef BASE_ERROR_H
 #define BASE_ERROR_H
 
@@ -12,12 +12,12 @@ typedef struct base_error {
     char message[1024]; /* "" while status is INSITU_OK */
 } base_error;
 
-/* Make control characters of text visible, ESC as "\\x1b", so that a name in a message cannot act on a terminal or
- * begin a line. text has room for capacity bytes; what does not fit is cut off. */
+/* Makes the control characters of a text visible, ESC as "\\x1b", so that a name in a message cannot control a terminal
+ * or begin a new line. text has space for capacity bytes; anything longer is cut off. */
 void base_escape(char *text, size_t capacity);
 
-/* Record status and a printf-style message, its control characters escaped, and return status. error may be NULL. The
- * first error stays: a later one does not overwrite it. */
+/* Records status and a printf-style message with its control characters escaped, and returns status. error may be NULL.
+ * The first error remains: a later error does not overwrite it. */
 insitu_status base_fail(base_error *error, insitu_status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 

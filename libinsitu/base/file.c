@@ -41,7 +41,7 @@ static bool fail_size(file_failure *failure, size_t limit)
 
 /* ---- opening --------------------------------------------------------------------------------------------------- */
 
-/* Asks what is at the path: a failure unless it is a regular file. */
+/* Gets the status of the path; anything other than a regular file is a failure. */
 static bool look(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
     const int look_flags = flags & O_NOFOLLOW ? AT_SYMLINK_NOFOLLOW : 0;
@@ -49,8 +49,9 @@ static bool look(const char *path, int flags, struct stat *stamp, file_failure *
     return S_ISREG(stamp->st_mode) || fail_kind(failure, stamp->st_mode);
 }
 
-/* Opens a regular file. What it is is asked before, since opening a device may act on it. O_NONBLOCK and the second
- * look are for what takes its place in between. Returns the descriptor, -1 on a failure. */
+/* Opens a regular file and returns its descriptor, or -1 on a failure. The file type is checked before opening, because
+ * opening a device may have effects. O_NONBLOCK and the second check cover the case that another file is put in its
+ * place in between. */
 static int open_regular(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
     if (!look(path, flags, stamp, failure)) return -1;
@@ -82,7 +83,7 @@ bool file_exists(const char *path)
 
 /* ---- reading --------------------------------------------------------------------------------------------------- */
 
-/* Reads until the end. The file may grow meanwhile, up to the limit. */
+/* Reads to the end of the file, which may grow meanwhile up to the limit. */
 static bool read_all(int file, size_t limit, file_content *out, file_failure *failure)
 {
     size_t capacity = (size_t)out->stamp.st_size + 1;
@@ -168,14 +169,14 @@ static bool make_folders(char *path)
     return true;
 }
 
-/* The folder of the path in the same memory, and the name in it. */
+/* A file's folder and its name in this folder. Both strings are in the memory at path. */
 typedef struct file_place {
     char *path;
     const char *name;
-    int folder; /* its descriptor, -1 before it is open */
+    int folder; /* descriptor of the folder, -1 before it is opened */
 } file_place;
 
-/* Refuses what a rename must not replace. */
+/* Rejects anything that a rename must not replace. */
 static bool check_place(const file_place *place, file_failure *failure)
 {
     struct stat found;
@@ -201,12 +202,12 @@ static bool open_place(const char *path, file_place *place, file_failure *failur
 
 enum { TEMPORARY_NAME = 40, TRIES = 8 };
 
-/* Writes to a new file of this name and moves it to its place. */
+/* Writes to a new file of this name and renames it to its final name. */
 static bool try_to_replace(const file_place *place, const char *temporary, const char *bytes, size_t size)
 {
     const int file = openat(place->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
-    /* The lock keeps pictures' writers from taking the file for one that a killed run left. */
+    /* The lock prevents picture writers from mistaking the file for one that was left by a killed run. */
     flock(file, LOCK_EX | LOCK_NB);
     bool is_written = write_all(file, bytes, size);
     int code = errno;
@@ -221,7 +222,8 @@ static bool try_to_replace(const file_place *place, const char *temporary, const
     return false;
 }
 
-/* Tries again where another process has taken the temporary file for one that a killed run left. */
+/* Tries again if another process has deleted the temporary file because it mistook it for one that was left by a killed
+ * run. */
 static bool replace(const file_place *place, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {

@@ -1,10 +1,10 @@
-/* A fragment is a stretch of one pixel's ray: render makes fragments, compositing merges them.
+/* A fragment is an interval of one pixel's ray: render makes fragments, and compositing merges them.
  *
  * A volume fragment covers the samples of one rank between t_in and t_out, both included; a surface fragment has t_in
- * == t_out, the hit. Fragments of one pixel, from any ranks, do not overlap, so sorting by t_in and blending front to
- * back gives the picture. Where cells overlap, fragments may overlap too. Then all volume fragments of the pixel are
- * single samples, or all are short stretches of one cell each, or the pixel has to be drawn again (comp.h). Colours are
- * linear and premultiplied: over(front, back) = (C1 + T1 C2, T1 T2). */
+ * == t_out, the ray parameter of the hit. Fragments of one pixel, from any ranks, do not overlap, so that sorting by
+ * t_in and blending front to back gives the picture. If cells overlap, fragments may overlap too. Then all volume
+ * fragments of the pixel are single samples, or all are short intervals of one cell each, or the pixel has to be drawn
+ * again (comp.h). Colours are linear and premultiplied: over(front, back) = (C1 + T1 C2, T1 T2). */
 #ifndef BASE_FRAGMENT_H
 #define BASE_FRAGMENT_H
 
@@ -17,23 +17,24 @@ typedef struct fragment {
     float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit t_in */
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* 0 opaque .. 1 clear */
-    uint32_t kind;       /* as below */
+    uint32_t kind;       /* one of the kinds below */
 } fragment;
 
-/* Kinds of fragments. Single samples are FRAGMENT_VOLUME + FRAGMENT_LAYER times the volume (0 .. 3). Those within
- * rounding of their cell's begin or end, where the cell before or behind may have the same sample, add FRAGMENT_EARLY
- * or FRAGMENT_LATE. Other stretches of volumes are FRAGMENT_VOLUME; hits are FRAGMENT_SURFACE + surface id (0, 1, ...).
- */
+/* Kinds of fragments. A single sample has FRAGMENT_VOLUME + FRAGMENT_LAYER times the number of the volume (0 .. 3).
+ * FRAGMENT_EARLY or FRAGMENT_LATE is added to a sample within rounding of the begin or end of its cell, because the
+ * cell before or behind may have the same sample. Fragments that join several samples or segments of a volume have kind
+ * FRAGMENT_VOLUME. Hits have FRAGMENT_SURFACE + surface id (0, 1, ...). */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
-/* Tells whether a fragment changes the picture. Its transmittance rounds to 1 where it is faint, and its light is seen
- * all the same: a rank that left it out would draw another picture than one that has folded it with others. */
+/* Checks whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
+ * still visible: a rank that omitted such a fragment would draw a different picture from a rank that had folded it with
+ * others. */
 static inline bool fragment_shows(const fragment *f)
 {
     return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
 }
 
-/* A growing list, memory from memory.h. */
+/* A growing list in memory from memory.h. */
 typedef struct fragment_list {
     fragment *items;
     int64_t count;
@@ -42,13 +43,13 @@ typedef struct fragment_list {
 
 /* A rectangle of an image's pixels. */
 typedef struct pixel_area {
-    int x, y; /* its upper left pixel */
+    int x, y; /* the upper left pixel */
     int width, height;
 } pixel_area;
 
-/* Takes all fragments that a rank has in an area, as soon as they are made: count of them in any order. It may reorder
- * them; they are gone after the call. thread is the number (0, 1 ...) of the thread that calls. False where memory ran
- * out. */
+/* Receives all fragments of a rank in an area as soon as they are complete: count fragments in any order. The function
+ * may reorder them; they are invalid after the call. thread is the number (0, 1 ...) of the calling thread. Returns
+ * false if memory ran out. */
 typedef bool fragment_taker(void *state, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 #endif

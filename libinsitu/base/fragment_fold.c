@@ -11,14 +11,14 @@ static void put_behind(fragment *front, const fragment *behind)
     if (behind->t_out > front->t_out) front->t_out = behind->t_out;
 }
 
-/* Returns at which height above the leaves both are in one node. */
+/* Returns the height above the leaves at which both leaves belong to the same node. */
 static int height_of(int32_t a, int32_t b)
 {
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
 
-/* The stack holds the open nodes, each with the height at which it joins the one before. Heights fall from the second
- * on, so there is at most one for each halving. */
+/* Folds with a stack of open nodes, each with the height at which it joins the node before it. Heights decrease from
+ * the second node on, so that there is at most one node per halving. */
 fragment fragment_fold(const fragment *sorted, int64_t count)
 {
     fragment open[FRAGMENT_HALVINGS + 2];
@@ -43,14 +43,14 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
 
 /* ---- parts of it ---------------------------------------------------------------------------------------------- */
 
-/* The range of t that a rank has all fragments of, and the list it folds them to. */
+/* The range of t within which a rank has all fragments, and the list of folded fragments. */
 typedef struct fold_part {
     float begin, end;
     fragment *out;
     int64_t count;
 } fold_part;
 
-/* The t at which a leaf begins. It is exact: a product by a power of two. */
+/* Returns the t at which a leaf begins. The result is exact, because it is a product by a power of two. */
 static double begin_of(int32_t leaf)
 {
     return (double)leaf / (FRAGMENT_STRETCHES << FRAGMENT_HALVINGS);
@@ -61,7 +61,7 @@ static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
     return (double)part->begin <= begin_of(first_leaf) && begin_of(first_leaf + (1 << height)) <= (double)part->end;
 }
 
-/* Appends the fragments of a node to out, folding each node of which the rank has all. */
+/* Appends the fragments of a node to out, and folds every node of which the rank has all fragments. */
 static void fold_node(fold_part *part, const fragment *sorted, int64_t count, int32_t first_leaf, int height)
 {
     while (count > 1 && height > 0 && !has_all_of(part, first_leaf, height)) {

@@ -1,13 +1,15 @@
-/* Blending a volume's fragments in an order that the ray alone gives: the same bits on any partition.
+/* Blends a volume's fragments in an order that depends only on the ray, so that the bits are the same on any partition.
  *
- * "Over" is associative, but its roundings are not. So the fragments' places decide which are blended first: the ray is
- * cut into stretches of a fixed length in t, these into halves, and so on. A stretch's fragments are folded along the
- * tree of its halves. Surfaces part a stretch, and the parts are folded separately. An empty half changes no bit.
+ * "Over" is associative, but its roundings are not. The positions of the fragments therefore determine the order of
+ * blending: the ray is cut into intervals of a fixed length in t, these into halves, and so on. The fragments of an
+ * interval are folded along the binary tree of its halves. Surfaces divide an interval, and the parts are folded
+ * separately. An empty half does not change any bit.
  *
  *     |       |       |   x   |   x   |  x    |       |   x   |       |      ((x (x)) (x))  (x)
  *
- * So a rank that has all fragments of a half may send what they fold to in their place, and the rank that has the rest
- * goes on from there. Stretches are blended front to back, until next to no light is left at the end of one. */
+ * A rank that has all fragments of a half may therefore send the folded fragment instead of them, and the rank that has
+ * the remaining fragments continues from there. Intervals are blended front to back, until almost no light is left at
+ * the end of one. */
 #ifndef BASE_FRAGMENT_FOLD_H
 #define BASE_FRAGMENT_FOLD_H
 
@@ -16,18 +18,19 @@
 
 #include "fragment.h"
 
-/* Stretches in a unit of t, and halvings of each. t is near 1 where the scene is (render.h), so that a ray has some ten
- * stretches and a leaf is 4e-6 of the scene. Fragments that begin in one leaf are folded front to back. */
+/* The number of intervals per unit of t, and of halvings per interval. t is near 1 in the scene (render.h), so that a
+ * ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that begin in the same leaf are folded front
+ * to back. */
 enum { FRAGMENT_STRETCHES = 8, FRAGMENT_HALVINGS = 15 };
 
-/* A rank may leave out the stretches behind one at whose end its own fragments leave less light than
- * FRAGMENT_DARK_OF_RANK. The pixel leaves out those behind FRAGMENT_DARK, which is larger by more than roundings may
- * add up to. */
+/* A rank may omit the intervals behind one at whose end its own fragments leave less light than FRAGMENT_DARK_OF_RANK.
+ * The pixel omits the intervals behind FRAGMENT_DARK, which is larger by more than the sum of possible rounding
+ * errors. */
 #define FRAGMENT_DARK_OF_RANK 1e-7f
 #define FRAGMENT_DARK 1.01e-7f
 
-/* The leaf that t is in; leaves rise with t. Those of one stretch differ only in the lowest FRAGMENT_HALVINGS bits. All
- * depths beyond a thousand scenes are in one leaf. */
+/* Returns the leaf that contains t; leaves increase with t. The leaves of one interval differ only in the lowest
+ * FRAGMENT_HALVINGS bits. All depths beyond a thousand scenes are in one leaf. */
 static inline int32_t fragment_leaf(float t)
 {
     const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* NaN too */
@@ -39,11 +42,12 @@ static inline int32_t fragment_stretch(float t)
     return fragment_leaf(t) >> FRAGMENT_HALVINGS;
 }
 
-/* Folds fragments of one stretch to one. They are in order, with no surface among them; count >= 1. */
+/* Folds the fragments of one interval to one fragment. They must be in order, without a surface among them; count >=
+ * 1. */
 fragment fragment_fold(const fragment *sorted, int64_t count);
 
-/* Folds on a rank that has all of the pixel's fragments from depth begin to end: only halves that lie between these
- * depths are folded. out may be sorted itself. Returns how many fragments out gets. */
+/* Folds on a rank that has all of the pixel's fragments from depth begin to depth end: only halves that lie between
+ * these depths are folded. out may be the same as sorted. Returns the number of fragments in out. */
 int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out);
 
 #endif

@@ -1,5 +1,5 @@
 /* The order of a pixel's fragments: by depth, at equal depth surfaces before volumes, and then by all other bits, so
- * that fragments that compare equal are the same. */
+ * that fragments that compare equal are identical. */
 #ifndef BASE_FRAGMENT_ORDER_H
 #define BASE_FRAGMENT_ORDER_H
 
@@ -8,7 +8,7 @@
 
 #include "fragment.h"
 
-/* Bits that rise with the value, for all floats; NaN has its place too. */
+/* Returns bits that increase with the value, for all floats including NaN. */
 static inline uint32_t fragment_rising_bits(float value)
 {
     uint32_t bits;
@@ -31,7 +31,7 @@ static inline int fragment_compare_rest(const fragment *a, const fragment *b)
     return order;
 }
 
-/* Negative where a is in front of b. */
+/* Returns a negative number if a is in front of b. */
 static inline int fragment_compare(const fragment *a, const fragment *b)
 {
     if (a->t_in < b->t_in) return -1;

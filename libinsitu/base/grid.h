@@ -1,8 +1,8 @@
-/* A rank's cells and values as the rooms below the session see them: the caller's own arrays behind inline accessors
- * that know each array's element type and stride. Nothing is copied.
+/* A rank's cells and values as the rooms below the session access them: the caller's own arrays behind inline accessors
+ * that handle each array's element type and stride. No data is copied.
  *
- * Whoever makes a grid has validated it (indices in range, types known, coordinates finite); the accessors check
- * nothing. They return all geometry in double: rooms go to float32 only after subtracting an origin. */
+ * The code that makes a grid has validated it (indices in range, types known, coordinates finite); the accessors check
+ * nothing. They return all geometry in double: the rooms convert to float32 only after subtracting an origin. */
 #ifndef BASE_GRID_H
 #define BASE_GRID_H
 
@@ -24,14 +24,14 @@ enum {
     GRID_MAX_CELL_VERTICES = 8 /* most vertices of a cell, except polyhedra and polygons, which have any number */
 };
 
-/* The three indices of a lattice's vertices or cells, by their numbers: the index along an axis of number n is
- * n % outer / stride, where outer is the next larger stride. Strides nest, so that each triple of indices has a number
- * of its own; numbers between them are padding. */
+/* Computes the three indices of a lattice's vertices or cells from their numbers: the index of number n along an axis
+ * is n % outer / stride, where outer is the next larger stride. Strides are nested, so that each triple of indices has
+ * a unique number; the numbers in between are padding. */
 typedef struct grid_numbering {
     int64_t stride[3];
     double inverse_stride[3]; /* 0 along an axis with a single index */
     double outer[3];          /* 0 along the axis of the largest stride */
-    double inverse_outer[3];  /* likewise */
+    double inverse_outer[3];  /* 0 along the axis of the largest stride */
 } grid_numbering;
 
 /* Returns the index of number n along an axis. Each quotient is rounded down from (n + 1/2) / stride, which is at least
@@ -70,7 +70,7 @@ typedef enum grid_odd {
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
 typedef struct grid_array {
     const char *data;
-    int64_t stride; /* bytes; 0: one element stands for all */
+    int64_t stride; /* in bytes; 0: all elements are the same one */
     bool is_wide;
     bool is_integer;       /* or odd: not to be read as float or double */
     unsigned char odd;     /* a grid_odd */
@@ -80,48 +80,49 @@ typedef struct grid_array {
     const grid_axis *axis; /* NULL, or what computes the numbers, coordinates by vertex; there is no data then */
 } grid_array;
 
-/* Cells by three indices instead of connectivity. */
+/* A lattice, whose cells are given by three indices instead of connectivity. */
 typedef struct grid_lattice {
-    int64_t cells[3]; /* along each axis; 0 along one: quads */
+    int64_t cells[3]; /* number of cells along each axis; 0 along one axis: the cells are quads */
     grid_numbering by_vertex, by_cell;
-    int64_t corner[8];                    /* from the number of a cell's first vertex to that of each, in VTK's order */
-    int64_t drawn_first[3], drawn_end[3]; /* the indices of the cells that are no ghost layers */
+    int64_t corner[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
+    int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */
     int64_t cell_count;                   /* without padding */
-    bool has_ghosts;                      /* some numbers of cells are padding, or of ghost layers */
-    grid_axis axes[3];                    /* no places: coordinates are given by vertex */
+    bool has_ghosts;                      /* some numbers of cells are padding or belong to ghost layers */
+    grid_axis axes[3];                    /* without places if the coordinates are given by vertex */
 } grid_lattice;
 
 typedef struct grid {
     int64_t vertex_count;
     int64_t cell_count;
     grid_array coordinates[3];
-    grid_array connectivity; /* vertices; of a polyhedron: faces */
-    grid_array offsets;      /* data NULL: all cells are of cell_type. Always given where there are polyhedra. */
-    const char *cell_types;  /* NULL: all cells are of cell_type */
+    grid_array connectivity; /* vertices; for a polyhedron its faces */
+    grid_array offsets;      /* data is NULL: all cells have cell_type. Always given if there are polyhedra */
+    const char *cell_types;  /* NULL: all cells have cell_type */
     int64_t cell_types_stride;
     int cell_types_bytes; /* 1, 4 or 8 */
     int cell_type;
     const char *ghosts; /* NULL: none */
     int64_t ghosts_stride;
-    const grid_lattice *lattice; /* NULL, or what replaces connectivity, offsets and cell_types */
-    const uint64_t *flat;        /* NULL, or a bit for each cell, set where it has no volume and is not drawn */
-    /* Faces of polyhedra, shared between them; no data: there are no polyhedra. */
+    const grid_lattice *lattice; /* NULL, or replaces connectivity, offsets and cell_types */
+    const uint64_t *flat;        /* NULL, or a bit per cell, set if the cell has no volume and is not drawn */
+    /* Faces of polyhedra, which cells share; without data there are no polyhedra. */
     int64_t face_count;
     grid_array face_offsets;      /* face_count + 1 */
     grid_array face_connectivity; /* the faces' vertices around */
     int ghosts_bytes;             /* 1, 4 or 8: the size of a flag in ghosts */
 } grid;
 
-/* One scalar per vertex or per cell, out of a field of several components. */
+/* One scalar per vertex or per cell from a field of several components. */
 typedef struct grid_field {
-    grid_array values; /* stride from tuple to tuple */
+    grid_array values; /* the stride is that between tuples */
     int64_t component_stride;
     const grid_array *apart; /* NULL, or for a magnitude the components, each an array of its own */
     int component_count;
     int component; /* 0 .. component_count - 1, or -1 for the magnitude */
     bool is_cell_centred;
-    const struct grid_field *own; /* NULL, or the cells' own values from which those at vertices were made: a cell whose
-                                     own is not finite has none */
+    /* NULL, or the cell values from which the values at vertices were computed: a cell whose own value is not finite
+     * has no value */
+    const struct grid_field *own;
 } grid_field;
 
 #define GRID_READ_ODD(type)                                                                                            \
@@ -172,7 +173,7 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
 {
     const char *p = a->data + i * a->stride;
     const int64_t index = a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
-    return (int64_t)((uint64_t)index - (uint64_t)a->base); /* whatever the index is */
+    return (int64_t)((uint64_t)index - (uint64_t)a->base); /* well defined for any index */
 }
 
 /* Returns where the i-th cell or face ends, by an array of offsets. */
@@ -195,7 +196,7 @@ static inline int grid_type_vertices(int cell_type)
     }
 }
 
-/* Tells whether cells of the type are two-dimensional: outer surfaces show them. They have no volume. */
+/* Checks whether cells of the type are two-dimensional. Such cells have no volume, and outer surfaces show them. */
 static inline bool grid_is_shell_type(int cell_type)
 {
     return cell_type == GRID_TRIANGLE || cell_type == GRID_QUAD || cell_type == GRID_POLYGON;
@@ -211,7 +212,7 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
-/* Returns the axis along which cells have successive numbers, or -1. */
+/* Returns the axis along which the numbers of cells are successive, or -1. */
 static inline int grid_lattice_row_axis(const grid_lattice *l)
 {
     for (int axis = 0; axis < 3; axis++)
@@ -227,7 +228,7 @@ static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
     return first;
 }
 
-/* Tells whether the number is that of a cell; else it is padding. */
+/* Checks whether the number belongs to a cell; else it is padding. */
 static inline bool grid_lattice_has(const grid_lattice *l, int64_t cell)
 {
     int64_t number = 0;
@@ -239,7 +240,7 @@ static inline bool grid_lattice_has(const grid_lattice *l, int64_t cell)
     return number == cell;
 }
 
-/* Tells whether the number is that of a cell outside of the ghost layers. */
+/* Checks whether the number belongs to a cell outside of the ghost layers. */
 static inline bool grid_lattice_draws(const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -249,8 +250,8 @@ static inline bool grid_lattice_draws(const grid_lattice *l, int64_t cell)
     return grid_lattice_has(l, cell);
 }
 
-/* The cell's vertex indices, in VTK's order; returns how many. It has none for polyhedra and polygons: see grid_walk.
- */
+/* Stores the cell's vertex indices in VTK's order and returns their number, which is 0 for polyhedra and polygons: use
+ * grid_walk for these. */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));
@@ -264,28 +265,28 @@ static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertic
     return count;
 }
 
-/* Tells whether the grid may have polyhedra. */
+/* Checks whether the grid may have polyhedra. */
 static inline bool grid_has_faces(const grid *g)
 {
     return g->face_offsets.data != 0;
 }
 
-/* A polyhedron's faces: entries [*first, *end) of connectivity. */
+/* Returns a polyhedron's faces, which are the entries [*first, *end) of connectivity. */
 static inline void grid_cell_faces(const grid *g, int64_t cell, int64_t *first, int64_t *end)
 {
     *first = grid_array_index(&g->offsets, cell);
     *end = grid_offset_end(&g->offsets, cell);
 }
 
-/* A face's vertices: entries [*first, *end) of face_connectivity. */
+/* Returns a face's vertices, which are the entries [*first, *end) of face_connectivity. */
 static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *first, int64_t *end)
 {
     *first = grid_array_index(&g->face_offsets, face);
     *end = grid_offset_end(&g->face_offsets, face);
 }
 
-/* A walk over the vertices of a cell of any type. A polyhedron's vertex comes once for each of its faces that has it.
- */
+/* An iteration over the vertices of a cell of any type. A vertex of a polyhedron is returned once for each of its faces
+ * that contains it. */
 typedef struct grid_walk {
     const grid *cells;
     bool is_polyhedron;
@@ -315,7 +316,7 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
     return w;
 }
 
-/* False when there are no more. */
+/* Stores the next vertex; returns false after the last one. */
 static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
 {
     if (!w->is_polyhedron) {
@@ -352,7 +353,7 @@ static inline bool grid_is_ghost(const grid *g, int64_t cell)
     return g->lattice && g->lattice->has_ghosts && !grid_lattice_draws(g->lattice, cell);
 }
 
-/* Tells whether some cells may be ghosts. */
+/* Checks whether some cells may be ghosts. */
 static inline bool grid_has_ghosts(const grid *g)
 {
     return g->ghosts || (g->lattice && g->lattice->has_ghosts);
@@ -368,13 +369,13 @@ static inline bool grid_is_shell(const grid *g, int64_t cell)
     return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
 }
 
-/* Tells whether the cell is neither a ghost nor flat. Trees hold such cells. */
+/* Checks whether the cell is neither a ghost nor flat. Trees contain these cells. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
 }
 
-/* Tells whether the cell is drawn or is a shell. Pictures may show such cells. */
+/* Checks whether the cell is drawn or is a shell. Pictures may show these cells. */
 static inline bool grid_is_seen(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));
@@ -403,13 +404,14 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
     return sqrt(sum);
 }
 
-/* Tells whether the cell's own value is finite, where the values at vertices were made from cells' values. */
+/* Checks whether the cell's own value is finite, if the values at vertices were computed from cell values; else returns
+ * true. */
 static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
 {
     return !f->own || isfinite(grid_field_value(f->own, cell));
 }
 
-/* Reads the values at the cell's vertices, or the cell's own value count times. Returns false where one is NaN or
+/* Reads the values at the cell's vertices, or the cell's own value count times. Returns false if a value is NaN or
  * infinite: such a cell is not drawn. */
 static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count,
                                     double *values)

@@ -7,22 +7,23 @@
 
 #include "insitu/image_output.h"
 
-/* The samples of an image's pixels by depth, as in insitu_deep, on rank 0. All zero elsewhere. */
+/* The samples of an image's pixels sorted by depth, as in insitu_deep; only on rank 0, and all zero on other ranks. */
 typedef struct deep_image {
-    insitu_deep_sample *samples; /* some may no longer belong to a pixel */
+    insitu_deep_sample *samples; /* may include samples that no longer belong to a pixel */
     int64_t count, capacity;
-    int64_t *first;   /* a pixel's first sample */
-    uint32_t *counts; /* a pixel's number of samples; 0: it has none */
+    int64_t *first;   /* index of the first sample of each pixel */
+    uint32_t *counts; /* number of samples of each pixel; may be 0 */
 } deep_image;
 
 typedef struct image {
     int width;
     int height;
-    float *rgba;      /* row-major, height × width × 4, top row first, premultiplied, linear light */
-    float *depth;     /* row-major, height × width: fragment.t_in of the nearest
-                         surface hit; +infinity where there is none. NULL: not wanted */
-    deep_image *deep; /* NULL on every rank: not wanted */
-    bool is_folded;   /* made of fragments that ranks have folded (fragment_fold.h) */
+    float *rgba; /* row-major, height × width × 4, top row first, premultiplied, linear light */
+    /* row-major, height × width: fragment.t_in of the nearest surface hit, +infinity if there is none. NULL: not
+     * requested */
+    float *depth;
+    deep_image *deep; /* NULL on every rank: not requested */
+    bool is_folded;   /* made from fragments that ranks have folded (fragment_fold.h) */
 } image;
 
 #endif

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* In front of every block stands one cache line that holds its size, so that frees can be counted. */
+/* Each block is preceded by one cache line that holds its size, so that freed bytes can be counted. */
 enum { header_bytes = 64 };
 
 static atomic_llong held_bytes;
@@ -27,7 +27,7 @@ static int must_fail(void)
     return atomic_fetch_sub(&fail_countdown, 1) == 1;
 }
 
-/* An empty block has an address within its own memory too, so that a search for leaks finds who holds it. */
+/* Even an empty block has an address within its own memory, so that leak checkers find its owner. */
 static void *make_block(size_t bytes, size_t counted)
 {
     if (must_fail()) return NULL;

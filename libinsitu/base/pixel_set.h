@@ -1,4 +1,4 @@
-/* Some of an image's pixels, a bit each: pixel p is bit p & 7 of byte p >> 3. */
+/* A set of an image's pixels with one bit per pixel: pixel p is bit p & 7 of byte p >> 3. */
 #ifndef BASE_PIXEL_SET_H
 #define BASE_PIXEL_SET_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Bits beyond the image's last pixel are 0. */
+/* Returns the number of bytes. Bits beyond the image's last pixel must be 0. */
 static inline size_t pixel_set_bytes(int64_t pixel_count)
 {
     return (size_t)((pixel_count + 7) >> 3);

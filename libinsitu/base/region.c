@@ -1,11 +1,13 @@
-/* Floating-point traps and flushing to zero are settings of a thread, and a worker may have those of the simulation
- * (session_guard.h). A worker so gets the default ones at the begin of each region, and its own back at the end, some
- * 50 ns each. A thread that OpenMP starts for a region begins with those of the thread that opened it.
+/* Floating-point traps and flushing to zero are settings of a thread, and a worker may have the settings of the
+ * simulation (session_guard.h). A worker therefore gets the default settings at the begin of each region, and its own
+ * settings back at the end; each change takes about 50 ns. A thread that OpenMP starts for a region begins with the
+ * settings of the thread that opened the region.
  *
- * If all cores are busy when a region begins, the scheduler may wake a worker on the core of the thread that opened it,
- * and leaves it there for tens of milliseconds: two runnable threads on one core and one, of another process, on the
- * other are balanced to it. The team then has the speed of one thread, or less. So a worker that finds itself there
- * moves to another core that it may run on, and is free to be moved again at once. */
+ * If all cores are busy when a region begins, the scheduler may wake a worker on the core of the thread that opened the
+ * region, and leave it there for tens of milliseconds: two runnable threads on one core, and one thread of another
+ * process on the other core, count as balanced. The team then has the speed of one thread or less. A worker on that
+ * core therefore moves to another core on which it may run, and immediately afterwards allows the scheduler to move it
+ * again. */
 #define _GNU_SOURCE 1
 #include "region.h"
 
@@ -16,7 +18,7 @@
 #include <stdbool.h>
 
 static _Thread_local fenv_t environment;
-/* The core of the thread that opened the last region; another session's does no harm. */
+/* The core of the thread that opened the most recent region. A value from another session does no harm. */
 static atomic_int first_core = -1;
 static atomic_llong regions;
 

@@ -1,4 +1,4 @@
-/* What every thread does at the begin and at the end of a parallel region. A region is written as
+/* Functions that every thread calls at the begin and at the end of a parallel region. A region is written as
  *
  *     #pragma omp parallel num_threads(threads)
  *         {
@@ -8,24 +8,25 @@
  *             region_leave();
  *         }
  *
- * with reductions of floating-point numbers on the loop, so that they end before region_leave(). Regions are dear where
- * another process uses a core: at each one's end, and at each barrier, the team waits until the thread that has lost
- * its core has it back, some 4 ms. So there are few, none without work, and their loops are shared out dynamically. */
+ * with reductions of floating-point numbers on the loop, so that they end before region_leave(). Regions are expensive
+ * if another process uses a core: at the end of each region, and at each barrier, the team waits about 4 ms until the
+ * thread that has lost its core gets it back. The code therefore has few regions, none without work, and schedules
+ * their loops dynamically. */
 #ifndef BASE_REGION_H
 #define BASE_REGION_H
 
 #include <stdint.h>
 
-/* Items (vertices, cells, pixels) that a thread takes at a time where each is little work: some 10 µs. */
+/* The number of items (vertices, cells, pixels) per chunk if an item takes little work; a chunk takes about 10 µs. */
 enum { REGION_ITEMS = 8192 };
 
 /* Gives a worker the default floating-point environment, and moves it off the core of the region's first thread. */
 void region_enter(void);
 
-/* Gives a worker its own environment back. */
+/* Restores a worker's own floating-point environment. */
 void region_leave(void);
 
-/* The number of regions of this process so far that had more than one thread. */
+/* Returns the number of regions with more than one thread in this process so far. */
 int64_t region_count(void);
 
 #endif

@@ -1,13 +1,14 @@
-/* One vector of floats, one of ints, one of masks, and the operations that kernels need: the same source is compiled
- * once per instruction set. SIMD_AVX512 (16 wide), SIMD_AVX2 (8), SIMD_SSE42 (4), or none of them: plain C on the
- * compiler's generic vectors (4), which is the reference and runs anywhere.
+/* Types for one vector of floats, one of ints and one of masks, with the operations that kernels need. The same source
+ * is compiled once per instruction set: SIMD_AVX512 (16 lanes), SIMD_AVX2 (8), SIMD_SSE42 (4), or none of them, which
+ * means plain C with the compiler's generic vectors (4); that is the reference and runs anywhere.
  *
- * Arithmetic (+ - * /) and comparison are the compiler's own on vector types; every one of them is IEEE exact and
- * fused nowhere (-ffp-contract=off), so all instruction sets give the same bits. The exceptions are vf_muladd(), fused
- * where the hardware can, and vf_diff_of_products(), whose two forms both err by at most 1.5 units in the last place.
+ * Arithmetic (+ - * /) and comparison are the compiler's own operations on vector types. All of them are exact in the
+ * sense of IEEE and never fused (-ffp-contract=off), so that all instruction sets give the same bits. The exceptions
+ * are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), both of whose forms have an
+ * error of at most 1.5 units in the last place.
  *
- * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, integer lanes of 0 and -1
- * elsewhere: always go through vm_*. */
+ * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, and integer lanes of 0 and -1
+ * otherwise: always use the vm_* functions. */
 #ifndef BASE_SIMD_H
 #define BASE_SIMD_H
 
@@ -37,7 +38,7 @@ typedef __mmask16 vm;
 typedef vi vm;
 #endif
 
-/* (vf){0} + x would not do: no compiler may leave out that addition, which makes -0 to 0. */
+/* (vf){0} + x would be wrong: compilers may not remove this addition, which turns -0 into 0. */
 SIMD_INLINE vf vf_set(float x)
 {
 #if defined(SIMD_AVX512)
@@ -72,7 +73,7 @@ SIMD_INLINE vf vf_from_bits(vi v)
     return (vf)v;
 }
 
-/* Towards zero. */
+/* Rounds towards zero. */
 SIMD_INLINE vi vi_from_vf(vf v)
 {
     return __builtin_convertvector(v, vi);
@@ -288,7 +289,7 @@ SIMD_INLINE vf vf_select(vm m, vf a, vf b)
 SIMD_INLINE vf vf_min(vf a, vf b)
 {
     return vf_select(vf_lt(a, b), a, b);
-} /* b where either is NaN, as x86 does */
+} /* b if either value is NaN, as on x86 */
 SIMD_INLINE vf vf_max(vf a, vf b)
 {
     return vf_select(vf_lt(b, a), a, b);
@@ -339,7 +340,7 @@ SIMD_INLINE void vm_set_lane(vm *m, int lane)
 #endif
 }
 
-/* v[index], lane by lane; each index is below SIMD_WIDTH. */
+/* Returns v[index] per lane; each index must be below SIMD_WIDTH. */
 SIMD_INLINE vf vf_permute(vf v, vi index)
 {
 #if defined(SIMD_AVX512)
@@ -355,7 +356,7 @@ SIMD_INLINE vf vf_permute(vf v, vi index)
 #endif
 }
 
-/* The first's or the second's: an index of the second is counted from SIMD_WIDTH on. */
+/* Returns elements of first or second per lane: an index of SIMD_WIDTH or more selects from second. */
 SIMD_INLINE vf vf_permute_pair(vf first, vf second, vi index)
 {
 #if defined(SIMD_AVX512)
@@ -368,7 +369,7 @@ SIMD_INLINE vf vf_permute_pair(vf first, vf second, vi index)
 #endif
 }
 
-/* base[index] and base[index + 1]. */
+/* Gathers base[index] and base[index + 1]. */
 SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *second)
 {
 #if defined(SIMD_AVX512)
@@ -384,15 +385,15 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* Stores indices for scalar loads. Compilers would take them from the vector's lanes instead, by two instructions each.
- */
+/* Stores indices for scalar loads. Without this function compilers extract each index from the vector, which takes two
+ * instructions per lane. */
 SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
 {
     memcpy(out, &a, sizeof a);
     __asm__("" : "+m"(*(int32_t(*)[SIMD_WIDTH])out));
 }
 
-/* Transposes the four by four numbers in each four lanes of four vectors. */
+/* Transposes the 4 × 4 matrix that each group of four lanes of the four vectors forms. */
 SIMD_INLINE void vf_transpose(vf v[4])
 {
 #if defined(SIMD_AVX512)
@@ -424,7 +425,7 @@ SIMD_INLINE void vf_transpose(vf v[4])
 #endif
 }
 
-/* Loads four numbers from base + index[0] on into the first four lanes, four from base + index[4] on into the next, and
+/* Loads four numbers from base + index[0] into the first four lanes, four from base + index[4] into the next four, and
  * so on. */
 SIMD_INLINE vf vf_load_quarters(const float *base, const int32_t *index)
 {
@@ -441,18 +442,18 @@ SIMD_INLINE vf vf_load_quarters(const float *base, const int32_t *index)
 #endif
 }
 
-/* base[index + n] to out[n], for n from 0 to 3. Rows of four are loaded whole and transposed, which takes fewer
- * instructions than gathering their columns. */
+/* Gathers base[index + n] into out[n], for n from 0 to 3. Rows of four are loaded whole and transposed, which takes
+ * fewer instructions than gathering their columns. */
 SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDTH], vf out[4])
 {
     for (int n = 0; n < 4; n++) out[n] = vf_load_quarters(base, index + n);
     vf_transpose(out);
 }
 
-/* Doubles, a lane for each of a half of a vf's; a whole is two of these. */
+/* A vector of doubles for half of the lanes of a vf; two of them correspond to one vf. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 
-/* Gathers the half's doubles at base + index, which count float32. */
+/* Gathers doubles at base + index, in units of float32, for one half of the lanes. */
 SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
 {
 #if defined(SIMD_AVX512)
@@ -522,7 +523,7 @@ SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
 
 #endif
 
-/* The lanes of m one after the other, to where there is room for all; returns how many. */
+/* Stores the lanes of v that are set in m successively and returns their number. There must be space for all lanes. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 {
 #if defined(SIMD_AVX512)
@@ -535,7 +536,7 @@ SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 #endif
 }
 
-/* Stores SIMD_WIDTH rows of four, a lane of each vector. */
+/* Stores SIMD_WIDTH rows of four numbers, one from each vector. */
 SIMD_INLINE void vf_store_rows(float *to, const vf v[4])
 {
     vf rows[4] = {v[0], v[1], v[2], v[3]};
@@ -553,8 +554,9 @@ SIMD_INLINE void vf_store_rows(float *to, const vf v[4])
     }
 }
 
-/* a b - c d to 1.5 units in the last place, zero only where the exact value is, and of the right sign: by Kahan's two
- * fused steps where the hardware has them, else in double, where the products of floats are exact. */
+/* Computes a b - c d with an error of at most 1.5 units in the last place. The result has the correct sign, and is zero
+ * only if the exact value is zero. The function uses Kahan's two fused steps if the hardware supports them, else
+ * double, in which products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
 {
 #if defined(SIMD_AVX512)
@@ -573,7 +575,7 @@ SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
 #endif
 }
 
-/* a b + c: one rounding where multiply and add are fused, else two. */
+/* Computes a b + c with one rounding if multiply and add are fused, else with two. */
 SIMD_INLINE vf vf_muladd(vf a, vf b, vf c)
 {
 #if defined(SIMD_AVX512)
@@ -585,7 +587,7 @@ SIMD_INLINE vf vf_muladd(vf a, vf b, vf c)
 #endif
 }
 
-/* Lanes whose sign bit is set, that of -0 too. */
+/* Returns the lanes whose sign bit is set, including that of -0. */
 SIMD_INLINE vm vm_sign(vi a)
 {
 #if defined(SIMD_AVX512)
@@ -595,8 +597,8 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
-/* vf_min() and vf_max() for single numbers: b where either is NaN. fminf() has another rule there and takes more than
- * one instruction. */
+/* Same as vf_min() and vf_max() for single numbers: the result is b if either is NaN. fminf() has another rule for NaN
+ * and takes more than one instruction. */
 SIMD_INLINE float simd_min(float a, float b)
 {
     return a < b ? a : b;

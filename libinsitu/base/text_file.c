@@ -16,7 +16,7 @@ void c_numbers_end(c_numbers *numbers)
     freelocale(numbers->own);
 }
 
-/* What write() writes, with numbers of C's locale: *text is to be freed by free(). */
+/* Calls write() into memory, with numbers in the C locale. *text must be freed with free(). */
 static bool print(text_writer *write, const void *what, char **text, size_t *size)
 {
     c_numbers numbers;

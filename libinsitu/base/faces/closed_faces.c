@@ -113,7 +113,7 @@ void closed_edges_empty(closed_faces *c)
     for (int i = 0; i < 2 * c->table_size; i++) c->edges[i].low = -1;
 }
 
-/* Turns the faces that can be reached from the first one across edges. */
+/* Orients the faces that can be reached across edges from the first face consistently with it. */
 static void turn_piece(closed_faces *c, int first)
 {
     int height = 0;
@@ -195,7 +195,7 @@ bool closed_face_is_patch(const closed_faces *c, int face, const double (*positi
 
 /* ---- turning outward ------------------------------------------------------------------------------------------ */
 
-/* Six times the volume of the tet with the centre, by the order a, b, c. */
+/* Returns six times the volume of the tet with the centre, whose sign follows from the order a, b, c. */
 static double tet_volume(const double (*p)[3], const int *v, const double *centre)
 {
     double d[3][3];
@@ -205,8 +205,8 @@ static double tet_volume(const double (*p)[3], const int *v, const double *centr
            d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
-/* Does the line from p towards lesser x cross the triangle? Level with a corner counts as above it, and where the
- * shadow is a line it does not cross. */
+/* Checks whether the ray from p in the negative x direction crosses the triangle. A corner at the same height as p
+ * counts as above it. If the projection of the triangle is a line, the ray does not cross it. */
 static bool crosses_below(const double *const t[3], const double *p)
 {
     bool inside = false;
@@ -227,7 +227,8 @@ static bool crosses_below(const double *const t[3], const double *p)
     return t[0][0] - (n[1] * (p[1] - t[0][1]) + n[2] * (p[2] - t[0][2])) / n[0] < p[0];
 }
 
-/* Is the piece inside an odd number of others? Its smallest vertex has nothing of its own at lesser x. */
+/* Checks whether the piece lies inside an odd number of other pieces. The test starts at the piece's smallest vertex,
+ * because the piece itself has no points at smaller x. */
 static bool is_cavity(const closed_faces *c, const double (*positions)[3], int piece)
 {
     int smallest = c->vertex_count;
@@ -253,7 +254,8 @@ void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], co
     }
     for (int piece = 0; piece < c->piece_count; piece++) {
         const bool is_turned = c->piece_count > 1 && is_cavity(c, positions, piece);
-        c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_turned ? -1 : 1; /* from now on its turn */
+        /* from here on, the sign by which the piece is turned */
+        c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_turned ? -1 : 1;
     }
     for (int face = 0; face < c->face_count; face++) c->turn[face] *= (int)c->piece_volume[c->piece[face]];
     for (int i = 0; i < c->triangle_count; i++)

@@ -1,9 +1,10 @@
-/* The faces of one polyhedron: its vertices numbered, its faces turned alike, cut into triangles and turned outward.
+/* The faces of one polyhedron. Its vertices are numbered, and its faces are oriented consistently, cut into triangles
+ * and oriented outward.
  *
- * Nothing depends on how the caller's mesh lists faces: they may begin at any vertex and run either way. Faces that
- * share an edge are turned to run along it in opposite directions, one connected piece of the surface after the other
- * (a cell with a cavity has more than one); the sum of a piece's volumes then says which way is out, and a piece
- * inside an odd number of others is turned over. */
+ * The result does not depend on how the caller's mesh lists the faces: they may begin at any vertex and run in either
+ * direction. Faces that share an edge are oriented so that they run along it in opposite directions, one connected
+ * piece of the surface after the other (a cell with a cavity has more than one piece). The sign of the sum of a piece's
+ * volumes then gives its outward direction, and a piece inside an odd number of other pieces is reversed. */
 #ifndef BASE_CLOSED_FACES_H
 #define BASE_CLOSED_FACES_H
 
@@ -12,30 +13,31 @@
 #include "grid.h"
 
 typedef struct closed_triangle {
-    int vertex[3]; /* rising */
+    int vertex[3]; /* in increasing order */
     int face;
-    int turn;      /* 1 where the three run as the face's vertices do, else -1 */
-    double volume; /* six times that of the tet with the centre, positive where the triangle is seen from inside */
+    int turn;      /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
+    double volume; /* six times the volume of the tet with the centre; positive if the triangle is seen from inside */
 } closed_triangle;
 
-/* An edge of the faces: the sides that run along it. */
+/* An edge of the faces, with the sides that run along it. */
 typedef struct closed_edge {
-    int low, high; /* vertices; low -1: no edge */
-    int side[2];   /* entries; -1: none */
+    int low, high; /* vertices; low is -1 in an unused entry */
+    int side[2];   /* entries at which the sides begin; -1: none */
 } closed_edge;
 
-/* An entry is a vertex of a face; a side runs from an entry to the face's next. */
+/* An entry is a vertex of a face; a side connects an entry with the next entry of the face. */
 typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
-    int *first;        /* face_count + 1: a face's first entry */
-    int *entry;        /* its vertex, by number */
-    int *face_of;      /* an entry's face */
-    int64_t *vertices; /* the grid's index of each number */
-    int *turn;         /* 1 or -1 for each face; from closed_faces_turn_outward() on, 1 if it runs around outward */
-    int *piece;        /* the connected piece of each face */
+    int *first;        /* face_count + 1 elements: the first entry of each face */
+    int *entry;        /* number of each entry's vertex */
+    int *face_of;      /* face of each entry */
+    int64_t *vertices; /* index in the grid of each numbered vertex */
+    /* 1 or -1 per face; after closed_faces_turn_outward(), 1 if the face's vertices run around the outward normal */
+    int *turn;
+    int *piece; /* index of the connected piece of each face */
     closed_triangle *triangles;
-    closed_edge *edges; /* 2 * table_size, by hash */
-    /* For the functions below. */
+    closed_edge *edges; /* hash table of 2 * table_size entries */
+    /* Work space of the functions below. */
     double (*corners)[3];
     int (*cuts)[3];
     void *polygon;
@@ -44,31 +46,33 @@ typedef struct closed_faces {
     double *piece_volume;
 } closed_faces;
 
-/* Counts faces and entries. False where they are too many for int. */
+/* Counts faces and entries. Returns false if their number exceeds int. */
 bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
 
-/* Lays the arrays out in a room of 64-byte alignment and returns how much they take; NULL: only returns it. */
+/* Places the arrays in memory of 64-byte alignment and returns the number of bytes that they take. If room is NULL,
+ * only the size is returned. */
 size_t closed_faces_lay_out(closed_faces *c, char *room);
 
-/* Reads the faces, and numbers vertices as they are met. A vertex that follows itself in a face counts once: a quad is
- * one however often its corners are said, and a face all of whose entries are one vertex has none. */
+/* Reads the faces, and numbers the vertices in the order in which they appear. Repeated successive vertices of a face
+ * count once: a quad remains a quad even if corners are repeated, and a face whose entries are all the same vertex has
+ * no entries left. */
 void closed_faces_read(closed_faces *c, const grid *g, int64_t cell);
 
-/* Turns each piece's faces as its first is listed. */
+/* Orients the faces of each piece consistently with the first face in the list. */
 void closed_faces_turn(closed_faces *c);
 
-/* Cuts the faces into triangles (polygon.h). Positions by number. A triangle with two corners in one vertex bounds
- * nothing and is left out. */
+/* Cuts the faces into triangles (polygon.h). positions are indexed by vertex number. A triangle that has the same
+ * vertex at two corners has no area and is left out. */
 void closed_faces_cut(closed_faces *c, const double (*positions)[3]);
 
-/* Finds the triangles' volumes, and turns pieces outward. */
+/* Computes the volumes of the triangles, and orients the pieces outward. */
 void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], const double centre[3]);
 
-/* Tells whether the face is met on a bilinear patch: it has four vertices, and none of them points inwards. Else it is
- * its triangles. */
+/* Checks whether the face is intersected as a bilinear patch: it has four vertices, and none of its corners is concave.
+ * Any other face is intersected as its triangles. */
 bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3]);
 
-/* Empties the table of edges, and finds an edge's place in it; a new one has no sides. */
+/* Clear the hash table of edges, and find the index of an edge in it. A new edge has no sides. */
 void closed_edges_empty(closed_faces *c);
 int closed_edges_find(closed_faces *c, int a, int b);
 

@@ -5,22 +5,23 @@
 
 #include "vector3.h"
 
-/* The share of the polygon's area by which a triangle of the fan may be turned over, and still count as rounding of
- * corners in a line: some rounding of coordinates in float32. */
+/* Tolerance for a reversed triangle in the fan, as a share of the polygon's area. A reversed triangle within the
+ * tolerance is attributed to rounding of nearly collinear corners: the tolerance is a few roundings of float32
+ * coordinates. */
 static const double fan_slack = 0x1p-20;
 
-/* The area, of a polygon about 1 wide, below which three corners are in a line. Projected places are off by few 2^-53;
- * an area by some ten of them. */
+/* The area below which three corners of a polygon of width about 1 count as collinear. Projected positions have errors
+ * of a few 2^-53; areas have errors of about ten times as much. */
 static const double line_slack = 0x1p-46;
 
-/* Corners by their rank in the order of cutting. */
+/* The corners, numbered by their rank in the order of cutting. */
 typedef struct polygon_work {
     int count;
-    int step; /* 1 where the order runs as the list does, else -1 */
+    int step; /* 1 if the order runs in the direction of the list, else -1 */
     int *order;
-    double (*places)[3]; /* from the least corner, about 1 wide */
-    double (*flat)[2];   /* seen along the normal, around which the order runs counterclockwise */
-    int *next, *before;  /* linked among the corners that are left */
+    double (*places)[3]; /* positions relative to the smallest corner, scaled to a width of about 1 */
+    double (*flat)[2];   /* projection along the normal, in which the order runs counterclockwise */
+    int *next, *before;  /* doubly linked list of the remaining corners */
     char *is_ear;
     int (*triangles)[3];
     int triangle_count;
@@ -79,7 +80,8 @@ static void find_order(polygon_work *w, const double (*p)[3])
     w->step = best[1];
 }
 
-/* Scales by a power of two, which rounds nothing. False where all corners are in one place. */
+/* Computes the scaled positions. The scale is a power of two, so that scaling is exact. Returns false if all corners
+ * have the same position. */
 static bool find_places(polygon_work *w, const double (*p)[3])
 {
     double widest = 0;
@@ -98,7 +100,7 @@ static bool find_places(polygon_work *w, const double (*p)[3])
 
 /* ---- fans ----------------------------------------------------------------------------------------------------- */
 
-/* The normal's length is twice the area. */
+/* Checks whether a fan cuts the polygon. The length of the normal is twice the area. */
 static bool is_fan(const polygon_work *w, double normal[3])
 {
     double area[3];
@@ -115,7 +117,7 @@ static bool is_fan(const polygon_work *w, double normal[3])
     return true;
 }
 
-/* Tells whether exactly one of four corners points inwards. */
+/* Checks whether exactly one of four corners is concave. */
 static bool is_concave_quad(const polygon_work *w)
 {
     double areas[4][3], normal[3] = {0, 0, 0}, sides[4][3];
@@ -163,7 +165,7 @@ static void flatten(polygon_work *w, const double normal[3])
     }
 }
 
-/* Twice the area of a triangle, positive where it runs counterclockwise. */
+/* Returns twice the area of a triangle, which is positive if the triangle runs counterclockwise. */
 static double area_of(const polygon_work *w, int a, int b, int c)
 {
     const double *p = w->flat[a], *q = w->flat[b], *r = w->flat[c];
@@ -176,7 +178,8 @@ static bool are_together(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Tells whether the polygon, where it passes the tip's place once more, comes from or goes into the tip's corner. */
+/* Checks whether the polygon, if it passes the position of the tip again, enters or leaves the corner at the tip
+ * there. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->before[again], w->next[again]};
@@ -202,7 +205,7 @@ static bool is_ear(const polygon_work *w, int tip)
     return true;
 }
 
-/* The first ear behind the first corner, which comes last; -1: there is none. */
+/* Returns the first ear after the first corner, which is checked last, or -1 if there is none. */
 static int find_ear(const polygon_work *w, int first)
 {
     int i = first;
@@ -213,7 +216,7 @@ static int find_ear(const polygon_work *w, int first)
     return -1;
 }
 
-/* Finds all ears anew: a corner may be one now because what blocked it is cut off. */
+/* Recomputes all ears: a corner may have become an ear because the corner that blocked it has been cut off. */
 static int find_ear_anew(polygon_work *w, int first)
 {
     int i = first;
@@ -222,7 +225,7 @@ static int find_ear_anew(polygon_work *w, int first)
     return find_ear(w, first);
 }
 
-/* A corner in a line with its neighbours. */
+/* Returns a corner that is collinear with its neighbours. */
 static int find_straight(const polygon_work *w, int first)
 {
     int i = first;

@@ -1,27 +1,29 @@
-/* Polygons cut into triangles, convex or not, flat or not.
+/* Cuts polygons into triangles. Polygons may be concave, and need not be planar.
  *
- * How one is cut depends on its corners' places alone, so that both sides of a face agree wherever its list begins and
- * whichever way it runs. It is looked at along its normal, the sum of its triangles' areas as vectors. Corners are
- * taken from the least place on (by x, then y, then z), towards the lesser of its neighbours, or rather so that the
- * list of places is the least. If all triangles of the fan from there have the polygon's orientation, the fan it is;
- * convex polygons are cut in this way. Else ears are cut off, always the first one behind the least corner: a triangle
- * of a corner and its two neighbours that has the polygon's orientation and holds no other corner, on its sides
- * neither. Where a polygon crosses itself no ear may be left; a fan then takes the rest. */
+ * The triangles depend only on the positions of the corners, so that both sides of a face get the same triangles
+ * wherever its list begins and in whichever direction it runs. The polygon is projected along its normal, which is the
+ * sum of its triangles' areas as vectors. The corners are ordered from the smallest position (by x, then y, then z) in
+ * the direction in which the list of positions is lexicographically smaller, which usually means towards the smaller
+ * neighbour. If all triangles of the fan from the first corner have the polygon's orientation, the fan is used; convex
+ * polygons are cut in this way. Otherwise ears are cut off, always the first ear after the first corner. An ear is a
+ * triangle of a corner and its two neighbours that has the polygon's orientation and contains no other corner, not even
+ * on its sides. If a polygon crosses itself, there may be no ear left; then the remaining corners are cut into a
+ * fan. */
 #ifndef BASE_POLYGON_H
 #define BASE_POLYGON_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Returns how many bytes of room, 8-byte aligned, a polygon of so many corners takes. */
+/* Returns the number of bytes of 8-byte aligned memory that a polygon of count corners needs. */
 size_t polygon_room(int count);
 
-/* Cuts count corners, at least 3, into count - 2 triangles of corners' numbers, each of which runs as the polygon does.
- * Triangles at corners in one place or in a line may have no area. */
+/* Cuts a polygon of count corners, at least 3, into count - 2 triangles of corner numbers, each of which runs in the
+ * direction of the polygon. Triangles of coincident or collinear corners may have no area. */
 void polygon_cut(const double (*corners)[3], int count, void *room, int (*triangles)[3]);
 
-/* Tells whether four corners around make a quad one of which points inwards. Quads that cross themselves are none; all
- * but concave quads are cut into a fan. */
+/* Checks whether four corners form a quad with exactly one concave corner. A quad that crosses itself has none; all
+ * quads except concave ones are cut into a fan. */
 bool polygon_is_concave_quad(const double (*corners)[3]);
 
 #endif
