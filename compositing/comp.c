@@ -1,9 +1,9 @@
-/* The three phases of compositing: fragments go to the owners of their pixels, are merged there, and pixels go to rank
- * 0. Before these phases all ranks agree that everyone has the memory for them, and on who owns what; afterwards on
- * whether they succeeded: a rank that runs out of memory on the way takes part to the end without it, so that nobody
- * waits, and then reports the error. Memory is given back as soon as its phase is over: at the peak a rank holds its
- * own fragments, and the bytes that those of others came in. One rank alone merges its list where it lies (or has none:
- * comp_tiles.h). */
+/* The three phases of compositing: fragments are sent to the owners of their pixels, owners merge them, and finished
+ * pixels are sent to rank 0. Before these phases all ranks agree that every rank has the memory for them, and which
+ * rank owns which block; after the phases they agree whether all succeeded. A rank that runs out of memory in between
+ * takes part to the end without it, so that no rank waits, and then reports the error. Memory is released as soon as
+ * its phase ends: at the peak a rank holds its own fragments and the received bytes of those of other ranks. A single
+ * rank merges its list in place (or has none: comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
@@ -16,7 +16,7 @@
 #include "comp_owned.h"
 #include "memory.h"
 
-/* A picture that is being composited, on this rank. */
+/* The state of this rank while a picture is composited. */
 typedef struct composition {
     const comp_group *group;
     image *out;
@@ -27,7 +27,7 @@ typedef struct composition {
     comp_grid grid;
     comp_strips strips;
     comp_owners owners;
-    uint64_t *loads; /* the loads of all ranks, in fragments */
+    uint64_t *loads; /* load of each rank, in fragments */
 } composition;
 
 static composition composition_of(const comp_group *group, const float background[4], image *out,
@@ -49,10 +49,10 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Bytes that a fragment takes on its way: in most pictures 10 for a hit, 11 for a stretch of volume. */
+/* Average number of bytes per fragment in a message: in most pictures 10 for a hit, 11 for an interval of a volume. */
 static const double usual_bytes = 11;
 
-/* Gives the same on all ranks. fragments is the most that any of them has. */
+/* Chooses the route; the result is the same on all ranks. fragments is the largest number on any rank. */
 static void choose_route(composition *c, int64_t fragments)
 {
     enum { USUAL_RADIX = 8 };
@@ -74,7 +74,7 @@ static void choose_owners(composition *c)
         c->owners.places[b] = claims[b].vote ? comp_vote_rank(claims[b].vote) : -1;
 }
 
-/* Claims each block by how many fragments this rank has there. */
+/* Claims each block in proportion to the number of this rank's fragments there. */
 static void claim(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
@@ -84,7 +84,7 @@ static void claim(composition *c)
     for (uint32_t b = 0; b < c->grid.blocks; b++) claims[b].vote = comp_vote(b, c->room.rank, claims[b].fragments);
 }
 
-/* Allocates what the three phases need. */
+/* Allocates the memory for the three phases. */
 static insitu_status prepare(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
@@ -102,7 +102,7 @@ static insitu_status prepare(composition *c, fragment_list *items, base_error *e
     return status;
 }
 
-/* Merges the pixels of this rank: on rank 0 into the picture, elsewhere to *finished. */
+/* Merges the pixels of this rank: on rank 0 into the picture, on other ranks into *finished. */
 static insitu_status merge_owned(composition *c, const comp_messages *held, comp_messages *finished,
                                  insitu_status status, base_error *error)
 {
@@ -145,7 +145,7 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     return status;
 }
 
-/* Gives the fragments back where it fails. */
+/* Begins compositing. If it fails, the fragments are freed. */
 static insitu_status begin(composition *c, fragment_list *items, int threads, base_error *error)
 {
     int ranks = 1;
@@ -163,14 +163,14 @@ static insitu_status begin(composition *c, fragment_list *items, int threads, ba
     return INSITU_OK;
 }
 
-/* Gathers the samples of deep pixels, or drops them where something failed. The lists are freed. */
+/* Gathers the samples of deep pixels, or drops them if an error occurred. The lists are freed. */
 static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
 {
     comp_deep_list *const lists = c->merged.deep;
     if (!status) {
         status =
             comp_deep_gather(c->group->comm, lists, c->grid.threads, c->out->deep, &c->statistics->sent_bytes, error);
-        c->statistics->has_failed = status != INSITU_OK; /* *error says why, to be reported */
+        c->statistics->has_failed = status != INSITU_OK; /* *error has the reason, to be reported */
     } else if (lists) {
         comp_deep_free(lists, c->grid.threads);
     }
@@ -178,7 +178,7 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     return status;
 }
 
-/* *has_overlaps becomes the same on all ranks: nonzero where any found overlaps. */
+/* Composites. *has_overlaps becomes the same on all ranks: nonzero if any rank found overlaps. */
 static insitu_status composite(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;
@@ -217,7 +217,7 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Tells all ranks the pixels in which owners found overlaps. */
+/* Distributes to all ranks the set of pixels in which owners found overlaps. */
 static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)
 {
     const int bytes = (int)pixel_set_bytes(pixel_count(c));

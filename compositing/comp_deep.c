@@ -1,6 +1,6 @@
-/* Samples are cut by the rule of merging (comp_merge_cut()), so flat and deep pictures follow one rule. From each
- * owner, rank 0 first receives which pixels have how many samples, and then the samples, right into their final place.
- */
+/* Fragments are cut into samples by comp_merge_cut(), so that flat and deep pictures follow the same rule. Rank 0 first
+ * receives from each owner the number of samples of each pixel, and then the samples, directly into their final
+ * position. */
 #include "comp_deep.h"
 
 #include <string.h>
@@ -13,7 +13,7 @@ enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
 
 /* ---- on the owner --------------------------------------------------------------------------------------------- */
 
-/* Makes room for one more item; false: no memory. */
+/* Ensures space for one more item; returns false if memory ran out. */
 static bool make_room(void **items, int64_t count, int64_t *capacity, size_t size)
 {
     if (count < *capacity) return true;
@@ -25,7 +25,7 @@ static bool make_room(void **items, int64_t count, int64_t *capacity, size_t siz
     return true;
 }
 
-/* Takes a stretch, unless it shows nothing. */
+/* Adds an interval, unless it is invisible. */
 static void take_stretch(void *of_list, const fragment *f)
 {
     comp_deep_list *list = of_list;
@@ -90,7 +90,7 @@ static int send_lists(MPI_Comm comm, const comp_deep_list *lists, int count)
     return code;
 }
 
-/* Receives messages of any length until there are count items. */
+/* Receives messages of any length until count items have arrived. */
 static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t count, size_t size)
 {
     char *bytes = items;
@@ -106,7 +106,7 @@ static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t 
     return code;
 }
 
-/* Says where the samples of these pixels will be. */
+/* Stores the positions of the samples of these pixels. */
 static void place_pixels(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
 {
     for (int64_t i = 0; i < count; i++) {
@@ -131,7 +131,7 @@ static void take_own(deep_image *out, const comp_deep_list *lists, int count)
 typedef struct deep_inbox {
     int ranks;
     int64_t (*counts)[2];
-    comp_deep_pixel *pixels; /* room for the most that another rank has */
+    comp_deep_pixel *pixels; /* space for the largest number that another rank has */
 } deep_inbox;
 
 static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
@@ -148,7 +148,7 @@ static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
     return code;
 }
 
-/* On rank 0: allocates room for all that the ranks send. */
+/* Allocates space on rank 0 for everything that the ranks send. */
 static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *error)
 {
     int64_t pixels = 0, samples = out->count;

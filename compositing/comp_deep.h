@@ -1,7 +1,7 @@
-/* Deep images keep the samples of every pixel, one behind the other, beside the flat picture.
+/* Deep images contain the samples of every pixel sorted by depth, in addition to the flat picture.
  *
- * The owner of a pixel makes samples of its fragments, sorted and cut until none overlaps another, and sends them to
- * rank 0. Blended front to back they give the picture without its background. */
+ * The owner of a pixel converts its fragments to samples, which are sorted and cut so that they do not overlap, and
+ * sends them to rank 0. Blending them front to back gives the picture without its background. */
 #ifndef COMP_COMP_DEEP_H
 #define COMP_COMP_DEEP_H
 
@@ -12,26 +12,26 @@
 #include "image.h"
 
 typedef struct comp_deep_pixel {
-    uint32_t pixel, count; /* count: the number of samples */
+    uint32_t pixel, count; /* count is the number of samples */
 } comp_deep_pixel;
 
-/* A thread's samples on one owner, pixel after pixel. All zero: empty. */
+/* The samples of a thread on one owner, pixel after pixel. A zeroed struct is empty. */
 typedef struct comp_deep_list {
     comp_deep_pixel *pixels;
     insitu_deep_sample *samples;
     int64_t pixel_count, pixel_capacity, sample_count, sample_capacity;
-    bool lacks_memory; /* something was left out */
+    bool lacks_memory; /* some samples are missing */
 } comp_deep_list;
 
-/* Adds one pixel's fragments as comp_merge_pixel() left them, or where is_folded comp_merge_folded_pixel(). z and
- * z_back are t. Where memory runs out it sets lacks_memory. Local. */
+/* Adds one pixel's fragments as sorted by comp_merge_pixel(), or by comp_merge_folded_pixel() if is_folded. z and
+ * z_back are set to t. If memory runs out, lacks_memory is set. Local. */
 void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);
 
-/* NULL items are fine. */
+/* The items may be NULL. */
 void comp_deep_free(comp_deep_list *lists, int count);
 
-/* Sends every rank's lists to rank 0's out, where they replace the samples that these pixels had. The lists are freed.
- * Collective; returns the same on all ranks. *sent_bytes grows by the bytes sent to rank 0. */
+/* Sends every rank's lists to out on rank 0, where they replace the earlier samples of these pixels. The lists are
+ * freed. Collective; returns the same on all ranks. *sent_bytes is increased by the number of bytes sent to rank 0. */
 insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,
                                int64_t *sent_bytes, base_error *error);
 

@@ -5,19 +5,19 @@
 #include "memory.h"
 #include "region.h"
 
-/* Number of rows that a thread takes at a time. It also marks pixels of the row after them, which is another thread's
- * first. */
+/* Number of rows per chunk of a thread. A thread also marks pixels of the row after its chunk, which is the first row
+ * of another thread. */
 enum { ROWS = 32 };
 
-/* Tells for each channel, a byte each, whether two rows of pixels differ. sRGB codes are nearly the square root of the
- * light, and |root a - root b| > c wherever (a - b)^2 > 2 c^2 (a + b), which needs no root. */
+/* Stores for each channel, in one byte each, whether two rows of pixels differ. sRGB codes are nearly the square root
+ * of the light, and |root a - root b| > c if (a - b)^2 > 2 c^2 (a + b), which needs no square root. */
 static void compare(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;
     for (int64_t i = 0; i < 4 * pixels; i++) out[i] = (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
 }
 
-/* Marks a pixel, which has a byte. In rows that two threads may mark, both do so atomically. */
+/* Marks a pixel in its byte. If two threads may mark the row, both do so atomically. */
 static void mark(unsigned char *pixel, bool is_shared)
 {
     if (is_shared) {
@@ -40,8 +40,8 @@ static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned cha
     }
 }
 
-/* Compares the row's pixels with their neighbours to the right and below: straight, left and right. differ has 4 bytes
- * a pixel. */
+/* Compares the row's pixels with their neighbours to the right and below (directly, to the left and to the right).
+ * differ has 4 bytes per pixel. */
 static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;

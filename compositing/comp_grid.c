@@ -1,11 +1,12 @@
-/* A rank packs and sends what others own, and a finished pixel goes to rank 0 from wherever it is. So the owner of a
- * block is best a rank that has much of it: what is its own it need not send. Were it always the rank that has most,
- * one with a little more everywhere would own all. So the owner is drawn by lot, each rank's chance in proportion to
- * the fourth power of its number of fragments. A rank of three quarters has 0.99 of the chances against one of a
- * quarter; among ranks that have much the same, each owns its share.
+/* A rank packs and sends the fragments of blocks that others own, and a finished pixel is sent to rank 0 from any
+ * owner. The best owner of a block is therefore a rank that has many fragments in it, because these need not be sent.
+ * If the owner were always the rank with the most fragments, a rank with slightly more fragments everywhere would own
+ * all blocks. The owner is therefore drawn at random, with a probability in proportion to the fourth power of the
+ * rank's number of fragments. A rank with three quarters of the fragments has a probability of 0.99 against one with a
+ * quarter; among ranks with similar numbers, each owns about the same share.
  *
- * The lot falls on the greatest 4 ln n - ln -ln u, u a random number of the block and the rank (Gumbel's trick): it
- * takes one maximum over all ranks. */
+ * The drawn rank is the one with the largest 4 ln n - ln -ln u, where u is a random number that depends on the block
+ * and the rank (the Gumbel trick): the draw needs one maximum over all ranks. */
 #include "comp_grid.h"
 
 #include <math.h>
@@ -28,7 +29,7 @@ static void merge_blocks(comp_grid *g)
         g->shift_y++;
 }
 
-/* Undoes merge_blocks(), or divides strips. */
+/* Reverses merge_blocks(), or divides strips. */
 static void divide_blocks(comp_grid *g)
 {
     if (g->shift_x > g->shift_y)
@@ -39,8 +40,8 @@ static void divide_blocks(comp_grid *g)
         g->row_shift--;
 }
 
-/* Blocks are nearly square, and the smallest that are few enough; but for many ranks the largest that are many enough.
- * A block of one row of a strip is not divided. */
+/* Returns the grid. Blocks are nearly square. They are as small as possible with few enough blocks; but for many ranks
+ * as large as possible with enough blocks. A block of one row of a strip is not divided. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
 {
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
@@ -64,13 +65,13 @@ int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
     const uint32_t drawn = hash(hash(block + 1) + (uint32_t)rank);
-    const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* between 0 and 1, which it may reach by rounding */
+    const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* between 0 and 1, and may round to 1 */
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
     const int steps = (int)(16 * (chance + 3)); /* 0 .. 1800 */
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 
-/* Counts what each rank owns; returns what it would own if all owners had the same, rounded up. */
+/* Computes the number of fragments that each rank owns; returns the equal share per owner, rounded up. */
 static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
     uint64_t owners = 0, all = 0;
@@ -85,15 +86,15 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
     return owners ? (all + owners - 1) / owners : 0;
 }
 
-/* The blocks are gone through in their order, and the owners who take some as well, so that most blocks stay near by.
- * A rank gives a block if it is then nearer to its share. One takes it for the same reason; where there is none, one
- * that is farther beyond its share then, by an eighth of the block, and so on; at last any that has less than its
- * share. Such a rank exists while another has more. As nobody gives its last block, each owner is met among the blocks.
- */
+/* The state of a pass over the blocks in their order. The candidates who take blocks are found in the same order, so
+ * that most blocks stay near their neighbours. A rank gives a block away if it is closer to its share afterwards. A
+ * rank takes a block for the same reason; if there is no such rank, a rank takes it that exceeds its share afterwards
+ * by an eighth of the block more, and so on; finally any rank that has less than its share. Such a rank exists as long
+ * as another has more. As no rank gives its last block away, each owner appears among the blocks. */
 typedef struct takers {
     const comp_claim *claims;
     uint32_t blocks, next;
-    uint64_t beyond; /* eighths of a block */
+    uint64_t beyond; /* in eighths of a block */
     const uint64_t *loads;
     uint64_t share;
 } takers;

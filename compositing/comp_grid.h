@@ -1,6 +1,6 @@
-/* The picture in strips of 16 × 32 pixels, row by row, and in blocks of strips. A strip is what is packed and merged at
- * once; of a block one rank owns all. Many ranks need many blocks to share a picture evenly: for them strips have fewer
- * rows. Plain arithmetic without MPI and memory. */
+/* Divides the picture into strips of 16 × 32 pixels, row by row, and into blocks of strips. A strip is packed and
+ * merged at once; a block has one owner. Many ranks need many blocks to share a picture evenly: strips then have fewer
+ * rows. These functions are plain arithmetic without MPI and memory. */
 #ifndef COMP_COMP_GRID_H
 #define COMP_COMP_GRID_H
 
@@ -18,26 +18,26 @@ enum {
 typedef struct comp_grid {
     uint32_t width, height;
     uint32_t row_shift;        /* a strip has 2^row_shift rows */
-    uint32_t across, strips;   /* strips beside each other, and all */
-    uint32_t shift_x, shift_y; /* a block is 2^shift_x × 2^shift_y strips */
+    uint32_t across, strips;   /* strips per row, and in total */
+    uint32_t shift_x, shift_y; /* a block has 2^shift_x × 2^shift_y strips */
     uint32_t blocks_across, blocks;
     uint64_t inverse; /* 2^64 / width, rounded up, 0 for width 1: the high word of its product with a pixel is
                          that divided by width */
     int threads;
 } comp_grid;
 
-/* The grid of a picture that so many ranks share. width × height is at least 1 and at most UINT32_MAX. threads become
- * 1. */
+/* Returns the grid of a picture that this number of ranks share. width × height must be at least 1 and at most
+ * UINT32_MAX. threads is set to 1. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks);
 
-/* The most blocks that a picture has for so many ranks. */
+/* Returns the maximum number of blocks of a picture for this number of ranks. */
 static inline uint32_t comp_most_blocks(int ranks)
 {
     const uint32_t few = COMP_FEW_BLOCKS, counted = (uint32_t)(ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS);
     return 2 * counted * COMP_RANK_BLOCKS > few ? 2 * counted * COMP_RANK_BLOCKS : few;
 }
 
-/* The pixels of a block that is not cut by the picture's border. */
+/* Returns the number of pixels of a block that the picture's border does not cut. */
 static inline uint32_t comp_grid_block_pixels(const comp_grid *grid)
 {
     return (uint32_t)COMP_LANES << (grid->shift_x + grid->shift_y + grid->row_shift);
@@ -61,14 +61,14 @@ static inline uint32_t comp_grid_strip(const comp_grid *grid, uint32_t pixel)
     return (y >> grid->row_shift) * grid->across + x / COMP_LANES;
 }
 
-/* The pixel's number in its strip, row by row. */
+/* Returns the pixel's index in its strip, row by row. */
 static inline uint32_t comp_grid_at(const comp_grid *grid, uint32_t pixel)
 {
     const uint32_t y = comp_grid_y(grid, pixel), x = pixel - y * grid->width;
     return (y & ((1u << grid->row_shift) - 1)) * COMP_LANES + x % COMP_LANES;
 }
 
-/* The strip's part of the picture. */
+/* The area of a strip in the picture. */
 typedef struct comp_area {
     uint32_t x, y, width, height;
 } comp_area;
@@ -80,7 +80,7 @@ static inline comp_area comp_grid_area(const comp_grid *grid, uint32_t strip)
     return (comp_area){x, y, right < COMP_LANES ? right : COMP_LANES, below < rows ? below : rows};
 }
 
-/* The pixel of the picture that has this number in the strip. */
+/* Returns the pixel of the picture that has this index in the strip. */
 static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, uint32_t at)
 {
     const uint32_t x = strip % grid->across * COMP_LANES, y = strip / grid->across << grid->row_shift;
@@ -89,28 +89,28 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
 
 /* ---- who owns a block ---------------------------------------------------------------------------------------- */
 
-/* What ranks claim of a block. The claim of all is the greatest vote, and the sum of the fragments. */
+/* A rank's claim to a block. The combined claim of all ranks has the largest vote and the sum of the fragments. */
 typedef struct comp_claim {
-    int32_t vote;       /* the owner is the rank of the greatest; 0: it has no fragments */
-    uint32_t fragments; /* UINT32_MAX: that many or more */
+    int32_t vote;       /* the rank with the largest vote is the owner; 0: the block has no fragments */
+    uint32_t fragments; /* UINT32_MAX: this many or more */
 } comp_claim;
 
-/* A rank's vote to own a block in which it has so many fragments. */
+/* Returns a rank's vote to own a block in which it has this number of fragments. */
 int32_t comp_vote(uint32_t block, int rank, int64_t fragments);
 
-/* The rank whose vote it is. */
+/* Returns the rank that cast the vote. */
 static inline int comp_vote_rank(int32_t vote)
 {
     return vote & 0xfffff;
 }
 
-/* The same vote for another rank. */
+/* Returns the same vote with another rank. */
 static inline int32_t comp_vote_of(int32_t vote, int rank)
 {
     return (int32_t)(((uint32_t)vote & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
 
-/* Makes a claim that of both. */
+/* Combines the claim with the sum. */
 static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
 {
     const uint32_t fragments = sum->fragments + claim->fragments;
@@ -118,10 +118,11 @@ static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
     sum->vote = sum->vote > claim->vote ? sum->vote : claim->vote;
 }
 
-/* Moves blocks from ranks that own more fragments than their share to others that own any, until none has more than the
- * mean of these ranks and those of one block, the fullest. claims are those of all ranks; the same on all ranks, before
- * and after. loads has room for each rank, and gets the fragments that it owns. Ranks that own nothing stay so: where
- * one has nearly all fragments, most need not travel. */
+/* Moves blocks from ranks that own more fragments than their share to other ranks that own some, until no rank exceeds
+ * the mean of these ranks by more than the fragments of one block, the fullest one. claims are those of all ranks, and
+ * are the same on all ranks before and after. loads has space for one number per rank and receives the number of
+ * fragments that the rank owns. Ranks that own nothing continue to own nothing: if one rank has nearly all fragments,
+ * most of them need not be sent. */
 void comp_claims_level(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks);
 
 #endif

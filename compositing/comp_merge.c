@@ -1,22 +1,22 @@
-/* The whole rule of merging: how one pixel's fragments, from any ranks and in any order, become one colour.
+/* Defines how fragments are merged: how one pixel's fragments, from any ranks and in any order, become one colour.
  *
- * The order is total, down to the last bit of a fragment: fragments that compare equal are the same. So the blend,
- * whose rounding depends on the order, depends on the set of fragments alone. Depth alone decides wherever depths
- * differ; where a surface and a volume begin at the same depth the surface is in front, being the nearer end of a
- * stretch.
+ * The order is total, down to the last bit of a fragment: fragments that compare equal are identical. The result of
+ * blending, whose rounding depends on the order, therefore depends only on the set of fragments. If depths differ, only
+ * depth determines the order; if a surface and a volume begin at the same depth, the surface is in front, because it is
+ * the nearer end of an interval.
  *
- * Samples of one place have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, less than the
- * sum of what each would alone, and share it in proportion. This is computed in double, so that the shares are no less
- * exact than the samples.
+ * Samples at the same position have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, less
+ * than the sum of their separate absorptions, and each contributes in proportion to its own. This is computed in
+ * double, so that the contributions are as exact as the samples.
  *
- * Stretches that overlap are mixed where they do. The ray is cut wherever one begins or ends; between cuts each counts
- * as a homogeneous medium, and their optical depths and light add up:
+ * Intervals that overlap are mixed in the common part. The ray is cut at every begin and end of an interval; between
+ * cuts each interval counts as a homogeneous medium, and their optical depths and light are added:
  *
  *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... in the cut
  *            |-- b -------------|    colour = (1 - T) times the mean of theirs, weighed by these
  *     |  a   |  a and b |   b   |
  *
- * The renderer makes them short enough for that (render/volume/kernel_segments.h). */
+ * The renderer makes them short enough for this (render/volume/kernel_segments.h). */
 #include "comp_merge.h"
 
 #include "comp.h"
@@ -49,7 +49,8 @@ static void sift_down(fragment *items, int64_t root, int64_t count)
     items[root] = moving;
 }
 
-/* A heap sort: no memory, no recursion, and no bad case when a partition leaves thousands in a pixel. */
+/* Sorts by heap sort, which needs no memory and no recursion, and has no bad case if a partition produces thousands of
+ * fragments in a pixel. */
 static void sort(fragment *items, int64_t count)
 {
     if (count <= insertion_limit) {
@@ -77,7 +78,7 @@ static bool is_sample(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_in == f->t_out;
 }
 
-/* Counts the samples at the place of the first; 1 where the first is no sample. */
+/* Counts the samples at the position of the first; returns 1 if the first is not a sample. */
 static int64_t samples_at(const fragment *sorted, int64_t count)
 {
     int64_t n = 1;
@@ -85,12 +86,12 @@ static int64_t samples_at(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* A pass through the sorted samples of one place, to find which count. Where a volume has one sample at its cell's end
- * and another at its cell's begin, the cells are neighbours, and rounding has put their common face in two places: one
- * of the two is left out. */
+/* The state of a pass through the sorted samples at one position, which determines the samples that count. If a volume
+ * has one sample at its cell's end and another at its cell's begin, the cells are neighbours, and rounding has given
+ * their common face two positions: one of the two samples is left out. */
 typedef struct sample_pass {
     uint32_t layer;
-    int64_t begun; /* samples at their cells' begin for which none has been left out yet */
+    int64_t begun; /* number of samples at their cells' begin that have not been matched yet */
     int64_t counted;
 } sample_pass;
 
@@ -107,7 +108,7 @@ static bool does_count(sample_pass *pass, const fragment *sample)
     return true;
 }
 
-/* Tells whether two of the samples belong to one volume. */
+/* Checks whether two of the samples belong to the same volume. */
 static bool are_of_overlaps(const fragment *samples, int64_t count)
 {
     sample_pass pass = {0};
@@ -116,12 +117,12 @@ static bool are_of_overlaps(const fragment *samples, int64_t count)
     return false;
 }
 
-/* Two cells that meet in a face find its depth to within this, relative to the depth or to 1 if that is more. It is
- * RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not include. */
+/* Two cells with a common face compute its depth within this tolerance, relative to the depth or to 1 if 1 is larger.
+ * The value is RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not include. */
 static const float face_error = 4e-6f;
 
-/* Advances *next to the first fragment that begins within rounding of t or behind; returns how far the volumes in front
- * of it reach. */
+/* Advances *next to the first fragment that begins within rounding of t or behind it; returns the largest end of the
+ * volumes in front of it. */
 static float reach_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -165,7 +166,7 @@ static fragment mix_samples(const fragment *samples, int64_t count)
     return mixed;
 }
 
-/* Colour and transmittance so far. */
+/* The colour and transmittance that have been accumulated. */
 typedef struct blend {
     double colour[3], transmittance;
 } blend;
@@ -181,10 +182,10 @@ static bool has_length(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_out > f->t_in;
 }
 
-/* The optical depth that stands for a medium that lets nothing through. */
+/* The optical depth that represents an opaque medium. */
 static const double opaque_depth = 1e6;
 
-/* Blends the stretches between the depths from and to; all of them span that range. */
+/* Blends the intervals between the depths from and to; all of them must span that range. */
 static void blend_mixed(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
@@ -209,7 +210,7 @@ static void exchange(fragment *items, int64_t a, int64_t b)
     items[b] = kept;
 }
 
-/* Moves the stretches that go on behind the depth to the front, in their order; returns how many there are. */
+/* Moves the intervals that extend behind the depth to the front, in their order; returns their number. */
 static int64_t keep_open(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
@@ -226,13 +227,13 @@ static float next_end(const fragment *items, int64_t count)
     return to;
 }
 
-/* Does something begin before the first of these ends? */
+/* Checks whether a fragment begins before the first one ends. */
 static bool is_overlapped(const fragment *sorted, int64_t count)
 {
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
-/* Receives the stretches that are blended, unless take is NULL. */
+/* Receives the intervals that are blended, unless take is NULL. */
 typedef struct stretch_sink {
     comp_stretch_taker *take;
     void *state;
@@ -248,7 +249,7 @@ static void hand_over(const stretch_sink *sink, const blend *b, const fragment *
     sink->take(sink->state, &stretch);
 }
 
-/* As blend_mixed(), and hands the mixture to the sink. */
+/* Same as blend_mixed(), and also passes the mixture to the sink. */
 static void blend_cut(blend *b, const fragment *items, int64_t count, float from, float to, const stretch_sink *sink)
 {
     blend own = {{0, 0, 0}, 1};
@@ -259,9 +260,9 @@ static void blend_cut(blend *b, const fragment *items, int64_t count, float from
     blend_mixed(b, items, count, from, to);
 }
 
-/* Blends the fragments from the first to where none is open; returns how many they are. Open stretches are kept at the
- * front, so that a cut costs only the stretches mixed in it: a thousand short ones in a row beside a long one make a
- * thousand cuts of two. In the end the fragments are in order again. */
+/* Blends fragments from the first one until no interval is open; returns their number. Open intervals are kept at the
+ * front, so that a cut costs only the intervals that are mixed in it: a thousand short intervals in a row beside a long
+ * one make a thousand cuts of two. At the end the fragments are in their original order. */
 static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretch_sink *sink)
 {
     float at = sorted[0].t_in;
@@ -286,7 +287,7 @@ static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretc
     return end;
 }
 
-/* As below, for a pixel of one fragment, the most frequent case. */
+/* Same as blend_sorted(), for a pixel of one fragment, which is the most frequent case. */
 static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
@@ -294,7 +295,7 @@ static void blend_single(const fragment *f, const float background[4], float out
     *out_depth = nearest_surface(f, 1);
 }
 
-/* Not inlined, so that single fragments pay for none of it. */
+/* Not inlined, so that single fragments have no additional cost. */
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {
@@ -320,7 +321,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     *out_depth = nearest_surface(items, count);
 }
 
-/* Counts the fragments, from the first on, that a fold makes into one: those of volumes in one stretch. */
+/* Counts the leading fragments that a fold combines into one: those of volumes in the same interval. */
 static int64_t folded_together(const fragment *sorted, int64_t count)
 {
     const int32_t stretch = fragment_stretch(sorted[0].t_in);
@@ -330,8 +331,8 @@ static int64_t folded_together(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Tells whether no light is left for next. In a later stretch than before's, FRAGMENT_DARK is as good as none, for
- * ranks may have left out fragments there. */
+/* Checks whether no light is left for next. If next is in a later interval than before, FRAGMENT_DARK counts as no
+ * light, because ranks may have omitted fragments there. */
 static bool is_dark(float transmittance, const fragment *before, const fragment *next)
 {
     return transmittance == 0 ||
@@ -392,7 +393,7 @@ void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_stretch_t
     }
 }
 
-/* Fragments behind darkness do not count: only some partitions make them. */
+/* Fragments in darkness do not count, because only some partitions produce them. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;

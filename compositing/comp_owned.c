@@ -1,9 +1,9 @@
-/* Most pixels have one fragment, or hits of opaque surfaces, of which the nearest counts. So a strip's fragments are
- * joined in a sheet, 16 pixels at once, and blended so. What is left over, because it has to be blended with another in
- * its pixel, is listed, and goes pixel by pixel through comp_merge_pixel().
+/* Most pixels have one fragment, or hits of opaque surfaces, of which only the nearest is visible. A strip's fragments
+ * are therefore joined in a sheet, 16 pixels at a time, and blended there. The remaining fragments, which have to be
+ * blended with another one in their pixel, are listed and merged pixel by pixel by comp_merge_pixel().
  *
- * What an opaque surface hides is dropped, although volumes may come later that are in front of it: no merge looks
- * behind an opaque surface. */
+ * Fragments behind an opaque surface are dropped, although volumes in front of the surface may arrive later: merging
+ * never uses a fragment behind an opaque surface. */
 #include "comp_owned.h"
 
 #include <string.h>
@@ -12,16 +12,17 @@
 #include "memory.h"
 #include "region.h"
 
-/* A thread's memory, whose lists are kept from strip to strip. */
+/* The work space of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
     comp_sheet all, other, pixels;
-    fragment_list left, listed;                                  /* left: .pixel is the number in the strip */
-    uint16_t mixed[COMP_ROWS];                                   /* pixels that have something left */
-    uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS]; /* where such a pixel's fragments are in the list */
+    fragment_list left, listed; /* left: .pixel is the index in the strip */
+    uint16_t mixed[COMP_ROWS];  /* pixels that have fragments in left */
+    /* position of the fragments of such a pixel in the list */
+    uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;
 
-/* Makes room for so many; what the list held is kept. */
+/* Ensures space for this number of fragments; the contents of the list are kept. */
 static bool reserve(fragment_list *list, int64_t count)
 {
     if (count <= list->capacity) return true;
@@ -34,7 +35,7 @@ static bool reserve(fragment_list *list, int64_t count)
 
 /* ---- joined -------------------------------------------------------------------------------------------------- */
 
-/* Counts a pixel as one whose fragments are listed: that in the sheet first. */
+/* Marks a pixel as one whose fragments are listed, and counts its fragment in the sheet first. */
 static void mix(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
@@ -54,7 +55,7 @@ static bool leave(merge_scratch *m, const fragment *item, uint32_t at)
     return true;
 }
 
-/* Joins one that is in a pixel where there is another. */
+/* Joins a fragment in a pixel that already has another. */
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->all, at, item->pixel);
@@ -112,7 +113,7 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 
 /* ---- listed -------------------------------------------------------------------------------------------------- */
 
-/* The next pixel that is mixed, from a number on; COMP_STRIP_PIXELS: there is none. */
+/* Returns the next mixed pixel, starting with index from, or COMP_STRIP_PIXELS if there is none. */
 static uint32_t next_mixed(const merge_scratch *m, uint32_t from)
 {
     for (uint32_t r = from / COMP_LANES; r < COMP_ROWS; r++) {
@@ -122,7 +123,8 @@ static uint32_t next_mixed(const merge_scratch *m, uint32_t from)
     return COMP_STRIP_PIXELS;
 }
 
-/* Lists what is left with what it has to be blended with; that of pixel k then begins at ends[k]. */
+/* Lists the remaining fragments together with those that they are blended with; the fragments of pixel k then begin at
+ * ends[k]. */
 static bool list_pixels(merge_scratch *m)
 {
     uint32_t sum = 0;
@@ -137,7 +139,7 @@ static bool list_pixels(merge_scratch *m)
     return true;
 }
 
-/* Deep pictures want all pixels. */
+/* Marks all pixels as mixed, for deep pictures, which need the fragments of all pixels. */
 static void mix_all(merge_scratch *m)
 {
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
@@ -163,7 +165,8 @@ static void blend_listed(const comp_grid *grid, const comp_merged *merged, merge
 
 /* ---- strips -------------------------------------------------------------------------------------------------- */
 
-/* Strips without pixels are sent too, a few bytes: rank 0 learns so that they are background. */
+/* Writes the pixels of a strip. Strips without pixels are sent too, in a few bytes, so that rank 0 fills them with the
+ * background. */
 static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 {
     const int count = comp_sheet_count(&m->pixels);
@@ -186,7 +189,7 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
     return true;
 }
 
-/* Where nobody has anything. */
+/* Stores the background in a strip without fragments. */
 static void clear_strip(const comp_grid *grid, uint32_t strip, const comp_merged *merged, merge_scratch *m)
 {
     comp_sheet_begin(&m->pixels, strip);

@@ -1,4 +1,4 @@
-/* Makes one pixel's fragments into a finished pixel. */
+/* Merges one pixel's fragments into a finished pixel. */
 #ifndef COMP_COMP_PIXELS_H
 #define COMP_COMP_PIXELS_H
 
@@ -12,22 +12,22 @@ typedef struct comp_pixel {
     float rgba[4];
 } comp_pixel;
 
-/* An error unless the image has pixels, and no more than fragments can name. */
+/* Checks that the image has pixels, and not more than fragments can number. */
 insitu_status comp_check_size(const image *out, base_error *error);
 
-/* Adds the pixel to a set that other threads add to at the same time. */
+/* Adds the pixel to a set while other threads may add pixels too. */
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 
-/* What merging is given and gives beside pixels. */
+/* The input and output of merging besides pixels. */
 typedef struct comp_merged {
     const float *background; /* 4 */
-    bool is_folded;          /* by comp_merge_folded_pixel() */
-    image *out;              /* rank 0's picture; NULL elsewhere */
-    unsigned char *overlaps; /* pixel_set.h: pixels whose fragments overlap are added. NULL: not wanted */
-    comp_deep_list *deep;    /* one for each thread: samples are added. NULL: not wanted */
+    bool is_folded;          /* pixels are merged by comp_merge_folded_pixel() */
+    image *out;              /* picture of rank 0; NULL on other ranks */
+    unsigned char *overlaps; /* pixel_set.h: receives the pixels whose fragments overlap. NULL: not requested */
+    comp_deep_list *deep;    /* one per thread: receives the samples. NULL: not requested */
 } comp_merged;
 
-/* Merges one pixel of the image; its fragments are reordered. Local, and any number of threads at once. */
+/* Merges one pixel of the image; its fragments are reordered. Local; any number of threads may call it at once. */
 comp_pixel comp_pixels_blend(const comp_merged *merged, fragment *items, int64_t count, uint32_t pixel);
 
 #endif

@@ -1,6 +1,6 @@
 #include "comp_route.h"
 
-/* The largest divisor of the number up to most. */
+/* Returns the largest divisor of the number that is at most `most`. */
 static int largest_divisor(int number, int most)
 {
     for (int k = most; k > 1; k--)
@@ -15,7 +15,8 @@ static bool has_radices(int number, int most)
     return number == 1;
 }
 
-/* The largest product of radices up to the number. It is more than half of it, since the largest power of two is. */
+/* Returns the largest product of radices that does not exceed the number. It exceeds half of the number, because the
+ * largest power of two does. */
 static int largest_product(int number, int most)
 {
     while (!has_radices(number, most)) number--;

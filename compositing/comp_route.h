@@ -1,17 +1,17 @@
-/* The ranks by which a fragment goes to the owner of its pixel, in plain arithmetic without MPI and memory, so that
- * tests can try any number of ranks.
+/* Computes the ranks through which a fragment is sent to the owner of its pixel. The functions are plain arithmetic
+ * without MPI and memory, so that tests can use any number of ranks.
  *
- * Ranks are numbered by place: one rank of a node after the other, then the next node's. The first places are owners;
- * their number is a product of radices. A place is written with one digit a radix, the least one first: in round i,
- * places that differ only in digit i are partners, and each hands over the fragments for owners with the partner's
- * digit. After the last round all fragments are at their owners:
+ * Ranks are numbered by place: the ranks of one node in succession, then those of the next node. The first places are
+ * owners; their number is a product of radices. A place is written with one digit per radix, the least significant
+ * first. In round i, places that differ only in digit i are partners, and each sends its partners the fragments for
+ * owners with the partner's digit. After the last round all fragments are at their owners:
  *
  *     direct send   one round, of all ranks
  *     by nodes      a round within each node, then one among the ranks that have the same number on their nodes
  *     radix-k       a round within each node, then rounds of at most k
  *     binary swap   rounds of two, whatever the nodes
  *
- * Ranks beyond the owners give all they have to a partner before the first round; an owner has at most one such
+ * Ranks beyond the owners send all their fragments to a partner before the first round; an owner has at most one such
  * partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
@@ -32,10 +32,10 @@ typedef enum comp_schedule {
     COMP_SCHEDULE_COUNT
 } comp_schedule;
 
-/* How ranks lie on nodes: the same number on each, either one node after the other or in turn. ranks is 1 where neither
- * is so. */
+/* The distribution of ranks over nodes: every node has the same number, either in succession or cyclically. ranks is 1
+ * if neither is the case. */
 typedef struct comp_nodes {
-    int ranks; /* the ranks of each node */
+    int ranks; /* number of ranks per node */
     bool is_cyclic;
 } comp_nodes;
 
@@ -45,17 +45,18 @@ typedef struct comp_route {
     comp_nodes nodes;
     int round_count;
     int radix[COMP_MOST_ROUNDS];
-    int longest_dense; /* at most COMP_LONGEST_DENSE, which comp_route_of() gives */
+    int longest_dense; /* at most COMP_LONGEST_DENSE, the value that comp_route_of() sets */
 } comp_route;
 
-/* The route of a schedule other than COMP_AUTOMATIC. radix is the most ranks that exchange in a round of COMP_RADIX. */
+/* Returns the route of a schedule other than COMP_AUTOMATIC. radix is the maximum number of ranks that exchange in a
+ * round of COMP_RADIX. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* A rank's place, and back. */
+/* Convert a rank to its place, and a place to its rank. */
 int comp_route_place(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
-/* The distance between partners of the round: the product of the radices before. */
+/* Returns the distance between partners of the round, which is the product of the previous radices. */
 int comp_route_stride(const comp_route *route, int round);
 
 static inline int comp_route_digit(const comp_route *route, int round, int stride, int place)
@@ -63,22 +64,24 @@ static inline int comp_route_digit(const comp_route *route, int round, int strid
     return place / stride % route->radix[round];
 }
 
-/* The place of the partner with the digit. */
+/* Returns the place of the partner with the digit. */
 static inline int comp_route_partner(const comp_route *route, int round, int stride, int place, int digit)
 {
     return place + (digit - comp_route_digit(route, round, stride, place)) * stride;
 }
 
-/* Tells whether every partner of the round sends to every other, or only those that have something do. */
+/* Checks whether the round is dense, which means that every partner sends to every other. In a sparse round only
+ * partners that have fragments send. */
 static inline bool comp_route_is_dense(const comp_route *route, int round)
 {
     return route->radix[round] <= route->longest_dense;
 }
 
-/* Makes the claims' owners places. Ranks beyond the route's owners own nothing: their partners own it for them. */
+/* Converts the owners in the claims from ranks to places. Ranks beyond the route's owners own nothing: their partners
+ * own their blocks. */
 void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
-/* "direct", "nodes", "radix", "binary". */
+/* Returns "direct", "nodes", "radix" or "binary". */
 const char *comp_schedule_name(comp_schedule schedule);
 
 #endif

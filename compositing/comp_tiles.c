@@ -1,9 +1,10 @@
-/* A single rank owns all pixels, and the thread that traces a tile has all of its fragments in cache. So nothing is
- * collected: the tile's pixels are blended at once and stored, background where there is nothing, and the fragments are
- * forgotten. The image is written once, there is no list of fragments, and nothing waits for the last tile.
+/* A single rank owns all pixels, and the thread that traces a tile has all fragments of the tile in cache. Fragments
+ * are therefore not collected: the pixels of the tile are blended and stored immediately, with the background in empty
+ * pixels, and the fragments are discarded. The image is written once, there is no list of fragments, and no thread
+ * waits for the last tile.
  *
- * A pixel's fragments need not follow each other. They are counted, and numbered pixel by pixel. A pixel of one
- * fragment, as most are, is blended in place; the fragments of others are copied to a pile first. */
+ * A pixel's fragments need not be consecutive. They are counted and numbered pixel by pixel. A pixel of one fragment,
+ * the most frequent case, is blended in place; the fragments of other pixels are copied to a pile first. */
 #include "comp_tiles.h"
 
 #include <assert.h>
@@ -17,10 +18,10 @@
 #include "comp_pixels.h"
 #include "memory.h"
 
-/* The renderer's tiles have this size; larger ones work too, but slower. */
+/* The size of the renderer's tiles; larger tiles are possible but slower. */
 enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
-/* A block that grows and forgets what it held. */
+/* A block of memory that grows without keeping its contents. */
 typedef struct room {
     void *data;
     size_t bytes;
@@ -32,7 +33,7 @@ struct comp_tile_scratch {
     room pile;   /* copies of one pixel's fragments, to be sorted */
     int64_t fragments;
     double seconds;
-    char apart[64]; /* padding: threads write to no common cache line */
+    char apart[64]; /* padding, so that threads do not write to a common cache line */
 };
 
 static void *make_room(room *r, int64_t count, size_t size)
@@ -105,8 +106,8 @@ static void clear(const comp_tiles *tiles, const pixel_area *area)
         }
 }
 
-/* Fills a tile in which there is nothing. The stores bypass the caches, which then neither read the overwritten lines
- * nor drop lines that later tiles need. */
+/* Fills a tile without fragments. The stores bypass the caches, which then neither read the overwritten lines nor evict
+ * lines that later tiles need. */
 static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
 {
 #if defined(__SSE2__)
@@ -127,8 +128,8 @@ static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
     clear(tiles, area);
 }
 
-/* The pixel's number in the area, row by row. The division gives the right integer: half a pixel keeps it far from the
- * next one. */
+/* Returns the pixel's index in the area, row by row. The division gives the correct integer, because adding half a
+ * pixel keeps the quotient far from the next integer. */
 static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)tiles->out->width;
@@ -138,7 +139,8 @@ static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32
     return row * (uint32_t)area->width + (from - row * width);
 }
 
-/* The fragments of the k-th pixel have the numbers order[starts[k]] .. order[starts[k + 1]]. */
+/* Sorts the indices of fragments by pixel: the fragments of the k-th pixel are order[starts[k]] .. order[starts[k +
+ * 1]]. */
 static void number(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
                    int64_t *starts, int64_t *order)
 {
@@ -150,7 +152,7 @@ static void number(const comp_tiles *tiles, const pixel_area *area, const fragme
     starts[pixels] = count;
 }
 
-/* Copies one pixel's fragments to the pile; NULL where memory ran out. */
+/* Copies one pixel's fragments to the pile; returns NULL if memory ran out. */
 static fragment *collect(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];
@@ -169,8 +171,8 @@ static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64
         comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }
 
-/* Stores a tile whose pixels have one fragment each. Returns false where a pixel has two; then all must be stored
- * again. */
+/* Stores a tile whose pixels have one fragment each. Returns false if a pixel has two; then the whole tile must be
+ * stored again. */
 static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;

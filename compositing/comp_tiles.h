@@ -1,4 +1,4 @@
-/* One rank alone: pixels are blended as their fragments are made, a tile at a time. */
+/* Blends pixels on a single rank, tile by tile, as soon as their fragments are made. */
 #ifndef COMP_COMP_TILES_H
 #define COMP_COMP_TILES_H
 
@@ -9,23 +9,23 @@ typedef struct comp_tile_scratch comp_tile_scratch;
 typedef struct comp_tiles {
     const float *background;
     image *out;
-    unsigned char *overlaps; /* pixel_set.h; NULL: not wanted */
+    unsigned char *overlaps; /* pixel_set.h; NULL: not requested */
     double inverse_width;
     int threads;
-    comp_tile_scratch *scratch; /* each thread's */
+    comp_tile_scratch *scratch; /* one per thread */
 } comp_tiles;
 
-/* Begins tiles for at most so many threads. out is as in comp_composite(). If finds_overlaps, pixels whose fragments
- * overlap are recorded. Local; after an error there is nothing to end. */
+/* Begins tiles for at most this number of threads. out is the same as for comp_composite(). If finds_overlaps, pixels
+ * whose fragments overlap are recorded. Local; after an error there is nothing to end. */
 insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
                                image *out, base_error *error);
 
-/* A fragment_taker (fragment.h), tiles its state: the tile's pixels in out become bit for bit what comp_composite()
- * would make of these fragments. Tiles lie in out, and do not overlap. */
+/* A fragment_taker (fragment.h) with tiles as its state: the tile's pixels in out become bitwise equal to the result of
+ * comp_composite() for these fragments. Tiles must lie within out and not overlap. */
 bool comp_tiles_take(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
-/* Ends the tiles. statistics gets the number of fragments taken and the time of the slowest thread; overlaps, which may
- * be NULL, gets the pixels that were found. */
+/* Ends the tiles. statistics receives the number of fragments taken and the time of the slowest thread; overlaps, which
+ * may be NULL, receives the pixels whose fragments overlap. */
 void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics);
 
 #endif
