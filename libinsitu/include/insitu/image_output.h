@@ -1,6 +1,6 @@
-/* The face between the library and whatever writes its pictures. libinsitu itself knows no image format: on rank 0,
- * when the first picture is due, it loads libinsitu_image (adaptors/image, on OpenImageIO) and calls
- * insitu_image_write(). So other ranks never load an image library. */
+/* The interface between the library and the module that writes its pictures. libinsitu itself supports no image format:
+ * on rank 0, when the first picture is due, it loads libinsitu_image (adaptors/image, based on OpenImageIO) and calls
+ * insitu_image_write(). Other ranks therefore never load an image library. */
 #ifndef INSITU_IMAGE_OUTPUT_H
 #define INSITU_IMAGE_OUTPUT_H
 
@@ -15,14 +15,15 @@ extern "C" {
 #endif
 
 typedef enum insitu_image_format {
-    INSITU_PNG8 = 0,    /* sRGB, 8 bits a channel, straight alpha; no alpha channel where all is opaque */
-    INSITU_PNG16 = 1,   /* the same with 16 bits */
-    INSITU_EXR = 2,     /* linear premultiplied float RGBA, the channel Z where depth is given, and channels */
-    INSITU_DEEP_EXR = 3 /* deep: any number of samples a pixel, each float R, G, B, A, Z and ZBack */
+    INSITU_PNG8 = 0,    /* sRGB, 8 bits per channel, straight alpha; no alpha channel if all pixels are opaque */
+    INSITU_PNG16 = 1,   /* same as INSITU_PNG8 with 16 bits per channel */
+    INSITU_EXR = 2,     /* linear premultiplied float RGBA, the channel Z if depth is given, and channels */
+    INSITU_DEEP_EXR = 3 /* deep: any number of samples per pixel, each with float R, G, B, A, Z and ZBack */
 } insitu_image_format;
 
-/* Where in the picture a decoration stands. Decorations of one place are stacked, and none covers another: what is too
- * large is wrapped or made smaller, and what has no room at all is left out, which insitu_image_check_words() says. */
+/* The position of a decoration in the picture. Decorations at the same position are stacked, and none covers another. A
+ * decoration that is too large is wrapped or made smaller; one for which there is no space is left out, which
+ * insitu_image_check_words() reports. */
 typedef enum insitu_anchor {
     INSITU_TOP_LEFT,
     INSITU_TOP,
@@ -37,34 +38,36 @@ typedef enum insitu_anchor {
 typedef struct insitu_words {
     const char *text; /* UTF-8, one line */
     insitu_anchor at;
-    float size; /* height, as a multiple of the other decorations' words: 1, for a title 1.4 */
+    float size; /* height relative to the words of the other decorations: 1, or 1.4 for a title */
 } insitu_words;
 
 typedef struct insitu_tick {
-    double place; /* along the bar: 0 is the low end, 1 the high end */
+    double place; /* position along the bar: 0 is the low end, 1 the high end */
     char text[32];
 } insitu_tick;
 
-/* The colours of a field, with words. */
+/* A colour bar: the colours of a field, with a label and ticks. */
 typedef struct insitu_colour_bar {
     const char *label;
     const float *colours; /* row-major, colour_count × 3, linear, from the low end on, evenly spaced */
-    int colour_count;     /* >= 2; >= 1 where is_banded */
-    bool is_banded;       /* each colour fills a band, all of equal width; else colours are linear between entries */
-    const float *below;   /* 3, linear: colour of values below the low end; NULL: that of the low end */
-    const float *above;   /* the same for values above the high end */
-    insitu_anchor at;     /* INSITU_LEFT or INSITU_RIGHT */
+    int colour_count;     /* at least 2, or at least 1 if is_banded */
+    /* each colour fills a band, and all bands have equal width; else colours are interpolated linearly */
+    bool is_banded;
+    const float *below; /* 3 values, linear: the colour of values below the low end; NULL: the colour of the low end */
+    const float *above; /* same as below, for values above the high end */
+    insitu_anchor at;   /* INSITU_LEFT or INSITU_RIGHT */
     int tick_count;
     const insitu_tick *ticks;
 } insitu_colour_bar;
 
-/* A line of the picture in pixels: (0, 0) is its upper left corner, (width, height) its lower right one. */
+/* A line in the picture in pixels: (0, 0) is the upper left corner of the picture, (width, height) the lower right
+ * one. */
 typedef struct insitu_stroke {
     double from[2], to[2];
-    bool is_behind; /* surfaces and volumes of the picture hide it */
+    bool is_behind; /* surfaces and volumes in the picture hide the line */
 } insitu_stroke;
 
-/* Words beside a point of the picture, left out where they would lie over others. */
+/* Words beside a point of the picture; they are left out if they would overlap others. */
 typedef struct insitu_label {
     double at[2];   /* pixels, as of a stroke */
     double away[2]; /* unit vector from the point to the words */
@@ -72,14 +75,15 @@ typedef struct insitu_label {
     char text[32];
 } insitu_label;
 
-/* A bar whose words tell its length in the scene. */
+/* A scale bar, whose words give its length in the scene. */
 typedef struct insitu_scale_bar {
-    double length; /* pixels; 0: there is none */
+    double length; /* in pixels; 0: there is no bar */
     insitu_anchor at;
     char text[300];
 } insitu_scale_bar;
 
-/* Decorations to draw over a picture, and the background that is put behind it first. All of it is borrowed. */
+/* Decorations that are drawn over a picture, and the background that is put behind it first. All pointers are
+ * borrowed. */
 typedef struct insitu_decorations {
     float background[4]; /* linear, premultiplied */
     float colour[3];     /* colour of words and lines, linear */
@@ -94,46 +98,47 @@ typedef struct insitu_decorations {
     const insitu_label *labels;
     insitu_scale_bar scale_bar;
     bool has_axes;
-    double axes[3][3]; /* the scene's axes, seen from the camera: right, up, towards the eye; unit lengths */
+    double axes[3][3]; /* the scene's axes in camera coordinates: right, up, towards the eye; unit lengths */
 } insitu_decorations;
 
-/* One more number for each pixel of an image, for EXR. */
+/* An additional channel of an image, for EXR. */
 typedef struct insitu_channel {
     const char *name;
     const float *values; /* points to the first pixel's value */
     int stride;          /* floats from pixel to pixel, row-major, top row first */
 } insitu_channel;
 
-/* A stretch of a pixel's ray, or a surface, where z_back is z. */
+/* An interval of a pixel's ray, or a surface, for which z_back equals z. */
 typedef struct insitu_deep_sample {
     float rgba[4];   /* linear, premultiplied */
-    float z, z_back; /* depths as insitu_image has them */
+    float z, z_back; /* depths in the units of insitu_image */
 } insitu_deep_sample;
 
-/* The samples of each pixel of an image, by rising depth, without overlaps. They do not hold the background. */
+/* The samples of each pixel of an image, by increasing depth and without overlaps. The background is not included. */
 typedef struct insitu_deep {
     const insitu_deep_sample *samples;
-    const int64_t *first;   /* row-major, height × width: index in samples of each pixel's first */
-    const uint32_t *counts; /* row-major, height × width: number of each pixel's samples */
+    const int64_t *first;   /* row-major, height × width: index in samples of the pixel's first sample */
+    const uint32_t *counts; /* row-major, height × width: number of the pixel's samples */
 } insitu_deep;
 
 typedef struct insitu_image {
     int width, height;
-    const float *rgba;  /* row-major, height × width × 4, top row first, linear, premultiplied */
-    const float *depth; /* NULL, or row-major, height × width: distance from the eye to the nearest surface along the
-                           camera's axis (not along the pixel's ray), in scene units. The surface may have any opacity,
-                           and volumes may lie in front of it. +infinity where there is none. */
-    const insitu_decorations *decorations; /* NULL: none, and rgba has its background */
+    const float *rgba; /* row-major, height × width × 4, top row first, linear, premultiplied */
+    /* NULL, or row-major, height × width: distance from the eye to the nearest surface along the camera's axis (not
+     * along the pixel's ray), in scene units. The surface may have any opacity, and volumes may be in front of it.
+     * +infinity if there is no surface. */
+    const float *depth;
+    const insitu_decorations *decorations; /* NULL: none, and rgba includes the background */
     int channel_count;
-    const insitu_channel *channels; /* borrowed; passed over where the format has none */
+    const insitu_channel *channels; /* borrowed; ignored if the format has no additional channels */
     const insitu_deep *deep;        /* NULL, or the samples for a deep format, which uses only them and the size */
 } insitu_image;
 
-/* Write to a temporary file beside path and rename it, so that path is never half a picture. Missing folders are made.
- * The temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written; the first
- * picture that a process writes to a folder removes the temporary files that killed runs of the same user left there.
- * It is an error if path is a pipe, a device or a directory. On an error, message (size bytes) says what went wrong,
- * with the path; otherwise it is empty. Local. */
+/* Writes to a temporary file beside path and renames it, so that path is never an incomplete picture. Missing folders
+ * are made. The temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written;
+ * the first picture that a process writes to a folder removes the temporary files that killed runs of the same user
+ * left there. It is an error if path is a pipe, a device or a directory. On an error, message (size bytes) describes
+ * the reason, with the path; otherwise it is empty. Local. */
 typedef insitu_status insitu_image_write_function(const insitu_image *image, insitu_image_format format,
                                                   const char *path, char *message, size_t size);
 
@@ -155,13 +160,13 @@ INSITU_API insitu_image_place_function insitu_image_place;
 
 /* Reasons why a picture's words are not drawn as they are given. Each text is empty, or one line. */
 typedef struct insitu_word_faults {
-    char font[1024];    /* no font was found, so words are left out; or OPENIMAGEIO_FONTS names none that can be read */
-    char letters[1024]; /* the font lacks characters, which are drawn as boxes; or words are not UTF-8 */
-    char room[1024];    /* decorations that have no room in the picture are left out */
+    char font[1024];    /* no font was found, so that words are left out; or OPENIMAGEIO_FONTS names no readable font */
+    char letters[1024]; /* the font lacks characters, which are drawn as boxes; or the words are not UTF-8 */
+    char room[1024];    /* decorations for which the picture has no space are left out */
 } insitu_word_faults;
 
-/* Lay the image's decorations out as insitu_image_write() does, without drawing them. Of the image only the size and
- * the decorations are read. Local. Thread-safe. */
+/* Computes the layout of the image's decorations as insitu_image_write() does, without drawing them. Only the size and
+ * the decorations of the image are read. Local. Thread-safe. */
 typedef insitu_status insitu_image_check_words_function(const insitu_image *image, insitu_word_faults *out);
 
 INSITU_API insitu_image_check_words_function insitu_image_check_words;

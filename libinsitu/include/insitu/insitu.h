@@ -16,8 +16,8 @@
 #ifndef INSITU_INSITU_H
 #define INSITU_INSITU_H
 
-/* Only MPI's C bindings are used: the old C++ ones would need one more library to link. These macros have no effect
- * where mpi.h was included before. */
+/* Only MPI's C bindings are used, because the old C++ bindings would require linking one more library. These macros
+ * have no effect if mpi.h was included before. */
 #ifndef OMPI_SKIP_MPICXX
 #define OMPI_SKIP_MPICXX 1
 #endif
@@ -71,9 +71,9 @@ typedef struct insitu_array {
 /* Cell types by VTK's ids, vertices in VTK's order, unless the mesh's vertex_order says otherwise. */
 typedef enum insitu_cell_type {
     INSITU_TET = 10,        /* 4 vertices */
-    INSITU_HEX = 12,        /* 8 vertices: the lower quad around, then the upper quad above it */
-    INSITU_WEDGE = 13,      /* 6 vertices: one triangle, then the other; either winding */
-    INSITU_PYRAMID = 14,    /* 5 vertices: the quad around, then the apex */
+    INSITU_HEX = 12,        /* 8 vertices: the lower quad in cyclic order, then the upper quad above it */
+    INSITU_WEDGE = 13,      /* 6 vertices: one triangle, then the other; in either orientation */
+    INSITU_PYRAMID = 14,    /* 5 vertices: the quad in cyclic order, then the apex */
     INSITU_POLYHEDRON = 42, /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
     /* Shells: cells of two dimensions, alone or among others. Layers of outer surfaces show them; a shell that lies on
      * the face of another cell is shown instead of that face. An isosurface on a mesh of shells alone is its contour
@@ -86,25 +86,27 @@ typedef enum insitu_cell_type {
     INSITU_QUAD = 9      /* 4 vertices around it; may be warped; a concave quad is two triangles */
 } insitu_cell_type;
 
-/* The order of a cell's vertices in connectivity. Cell types that an order does not name are in VTK's order. Mirrored
- * cells are drawn right in any order. */
+/* The order of a cell's vertices in connectivity. Cell types that an order does not mention are in VTK's order.
+ * Mirrored cells are drawn correctly in any order. */
 typedef enum insitu_vertex_order {
-    INSITU_ORDER_VTK = 0,           /* as said at insitu_cell_type; also in CGNS, Exodus II, Gmsh, libMesh, MFEM */
+    INSITU_ORDER_VTK = 0,           /* as described at insitu_cell_type; also in CGNS, Exodus II, Gmsh, libMesh, MFEM */
     INSITU_ORDER_LEXICOGRAPHIC = 1, /* quads, hexes and bases of pyramids by x first, then y, then z: a quad is VTK's 0
                                        1 3 2. deal.II, dolfinx, DUNE and p4est have it. */
-    INSITU_ORDER_DMPLEX = 2         /* hexes are VTK's 0 3 2 1 4 5 6 7 and wedges VTK's 0 2 1 3 4 5: their two ends run
-                                       opposite ways. PETSc's DMPlex has it. */
+    /* hexes are VTK's 0 3 2 1 4 5 6 7 and wedges VTK's 0 2 1 3 4 5: their two ends have opposite orientations. PETSc's
+     * DMPlex uses it. */
+    INSITU_ORDER_DMPLEX = 2
 } insitu_vertex_order;
 
-/* The parts of a mesh or a field that differ from the last time it was set. The safe default is everything. Changes
- * that the description shows count even if they are not named here: other counts or another cell_type make another mesh
- * (ALL); arrays at other addresses, of other types or strides are read again, as TOPOLOGY (but fields stay), GEOMETRY
- * (vertex_ids too) or VALUES. Only the caller knows whether the same arrays hold new contents, and must name that. */
+/* The parts of a mesh or a field that have changed since it was last set. The safe default is everything. Changes that
+ * are visible in the description count even if they are not named here: other counts or another cell_type make another
+ * mesh (ALL); arrays at other addresses, of other types or strides are read again, as TOPOLOGY (but fields are kept),
+ * GEOMETRY (vertex_ids too) or VALUES. Only the caller can tell whether the same arrays have new contents, and must
+ * name such changes. */
 enum {
     INSITU_CHANGED_NOTHING = 0,
     INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types and faces, ghost flags; the tree is built again */
     INSITU_CHANGED_GEOMETRY = 2, /* coordinates; the tree's bounds are refitted */
-    INSITU_CHANGED_VALUES = 4,   /* a field's values; the tree's ranges are refitted where values did change */
+    INSITU_CHANGED_VALUES = 4,   /* a field's values; the tree's ranges are refitted if values did change */
     INSITU_CHANGED_ALL = 7
 };
 
@@ -113,13 +115,14 @@ enum {
  * cells is 0. The coordinates are either uniform (spacing), rectilinear (axes) or given for each vertex in the mesh's
  * coordinates, which are not given otherwise. docs/structured.md has examples. */
 typedef struct insitu_lattice {
-    int64_t cells[3]; /* along i, j and k, at least 1 each; one of them 0: quads. All 0 on a rank without cells. */
+    /* number of cells along i, j and k, at least 1 each; one of them 0: quads. All 0 on a rank without cells. */
+    int64_t cells[3];
     /* How far, in vertices, the vertices' arrays are from one vertex to the next along i, j and k, at least 1 each: the
      * vertex i, j, k has the number i * vertex_strides[0] + j * vertex_strides[1] + k * vertex_strides[2]. Each larger
      * stride spans all that the smaller ones reach, so that no two vertices have one number. All 0: packed with i
      * fastest, as in Fortran's x(i, j, k) and C's x[k][j][i]. */
     int64_t vertex_strides[3];
-    int64_t cell_strides[3]; /* likewise, in cells, of the cells' arrays */
+    int64_t cell_strides[3]; /* same as vertex_strides, in cells, for the cells' arrays */
     /* Ghost layers: the cells with indices from interior_first to interior_end - 1 are drawn, those outside of it count
      * as ghosts. All 0: all cells are drawn. */
     int64_t interior_first[3], interior_end[3];
@@ -189,7 +192,7 @@ typedef struct insitu_mesh {
     /* Each face may have a list of vertices of its own instead of face_offsets and face_connectivity, which are not
      * given then. The lists are copied into one array, once for each topology, and held as long as polyhedra are drawn
      * from them: 4 bytes a face and 4 for each of its vertices, counted in bytes_copied. */
-    insitu_array face_sizes; /* int32 or int64, face_count: how many vertices each face has */
+    insitu_array face_sizes; /* int32 or int64, face_count: number of vertices of each face */
     insitu_array face_lists; /* face_count pointers, each to face_sizes vertex indices, packed, of the type given here:
                                 int32 or int64. stride_bytes is from pointer to pointer; 0: packed */
     /* A polyhedron whose faces make a tet, hex, wedge or pyramid is drawn as that type, whichever way its faces run,
@@ -294,7 +297,7 @@ struct insitu_field;
  * other than INSITU_OK. The step returns it on all ranks; the other fills are still called. */
 typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
 
-/* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
+/* One rank's part of a field. It is borrowed in the same way as a mesh. Call insitu_field_defaults() first. */
 typedef struct insitu_field {
     const char *name;               /* copied; the name by which scenes ask for it */
     insitu_centring centring;       /* vertex by default */
@@ -318,10 +321,10 @@ typedef struct insitu_field {
      * as by index. 0: one cell after the other, as many tuples as a cell has vertices. Cells with offsets have
      * connectivity_count corners, in the places of connectivity's entries, and 0 here. */
     int64_t corner_row;
-    /* Optional, instead of values, which are not given then: the function that makes the values when a step needs them.
-     * Each call is taken to give new values, unless it sets changed to INSITU_CHANGED_NOTHING. */
+    /* Optional, instead of values, which are not given then: the function that provides the values when a step needs
+     * them. Each call counts as a change of the values, unless it sets changed to INSITU_CHANGED_NOTHING. */
     insitu_fill *fill;
-    void *fill_data; /* handed to fill as it is */
+    void *fill_data; /* passed to fill unchanged */
     /* Optional, for cell fields: the values on the boundary. The table is copied, its arrays are borrowed. */
     int patch_count;
     const insitu_patch *patches;
@@ -331,19 +334,20 @@ typedef struct insitu_field {
     const insitu_array *components;
 } insitu_field;
 
-/* Report of the last step on this rank, unless said otherwise. Times are wall-clock milliseconds. */
+/* The report of the last step on this rank, unless stated otherwise. Times are wall-clock milliseconds. */
 typedef struct insitu_report {
     int64_t cycle;
     double time;
-    int images;             /* drawn in this step; 0 when none was due */
-    double total_ms;        /* the whole insitu_step() */
-    double prepare_ms;      /* agreeing, validating, bounds, recentring */
-    double build_ms;        /* trees built */
-    double refit_ms;        /* trees refitted */
-    double surface_ms;      /* isosurfaces traced */
-    double volume_ms;       /* volumes traced */
-    double composite_ms;    /* fragments exchanged, merged and gathered, waiting included; of a rank alone, its slowest
-                               thread's time */
+    int images;        /* number of images drawn in this step; 0 if none was due */
+    double total_ms;   /* time of the whole insitu_step() */
+    double prepare_ms; /* agreement among ranks, validation, bounds, recentring */
+    double build_ms;   /* construction of trees */
+    double refit_ms;   /* refitting of trees */
+    double surface_ms; /* tracing of isosurfaces */
+    double volume_ms;  /* tracing of volumes */
+    /* exchange, merging and gathering of fragments, including waiting; on a single rank, the time of its slowest
+     * thread */
+    double composite_ms;
     double write_ms;        /* on rank 0: pictures written in the step, or given to the thread that writes them, with
                                the wait for room there; loading the image library, if a scene that was edited has the
                                first pictures */
@@ -352,10 +356,11 @@ typedef struct insitu_report {
     int pictures_waiting;   /* on rank 0: pictures that the writing thread had not yet written when the step ended */
     int turns;              /* in which pixels were drawn where cells or several volumes overlap; in each, all ranks
                                wait for each other. The same on every rank */
-    int64_t cells;          /* handed over, ghosts included */
-    int64_t cells_ghost;    /* not drawn: flagged as ghosts */
+    int64_t cells;          /* number of cells, including ghosts */
+    int64_t cells_ghost;    /* not drawn, because they are flagged as ghosts */
     int64_t cells_unusable; /* not drawn: the cell's own field value or that of a vertex is not finite */
-    int64_t cells_inverted; /* left-handed, by the sign of the corner volumes' sum; drawn right all the same */
+    /* left-handed, by the sign of the sum of the corner volumes; drawn correctly nevertheless */
+    int64_t cells_inverted;
     int64_t cells_flat;  /* without volume, not drawn: the absolute corner volumes sum to no more than rounding, 1.4e-14
                             of the cell's box; a polyhedron is flat if all its vertices are in a plane */
     int64_t cells_shell; /* triangles, quads and polygons, which layers of outer surfaces show */
@@ -380,39 +385,41 @@ typedef struct insitu_report {
                              scene file is broken. All are the same on every rank. */
 } insitu_report;
 
-/* An open session: its scene, the meshes and fields handed over, and what is kept from step to step. */
+/* An open session: its scene, its meshes and fields, and the state that is kept from step to step. */
 typedef struct insitu_session insitu_session;
 
-/* A picture in memory, as the last step drew it: with its background, without decorations. */
+/* A picture in memory as the last step drew it: with its background, without decorations. */
 typedef struct insitu_picture {
-    const char *image; /* its name in the scene */
+    const char *image; /* name of the image in the scene */
     int width;         /* pixels */
     int height;
-    const float *rgba;  /* height x width x 4, row-major, the top row first: linear light, premultiplied by opacity */
-    const float *depth; /* height x width: distance along the camera's axis from the eye to the nearest surface, opaque
-                           or transparent, as in EXR files; infinite where there is none, as in volumes alone */
+    const float *rgba; /* height x width x 4, row-major, the top row first: linear light, premultiplied by opacity */
+    /* height x width: distance along the camera's axis from the eye to the nearest surface, opaque or transparent, as
+     * in EXR files; infinite if there is no surface, as with volumes only */
+    const float *depth;
 } insitu_picture;
 
-/* Fill in defaults: nothing given, everything changed. Local. */
+/* Sets the defaults: nothing is given, and everything has changed. Local. */
 INSITU_API void insitu_mesh_defaults(insitu_mesh *mesh);
 INSITU_API void insitu_field_defaults(insitu_field *field);
 
-/* Set mesh->coordinates for interleaved x y z (row-major, vertices × 3), packed. type is INSITU_FLOAT32 or
+/* Sets mesh->coordinates for interleaved x y z (row-major, vertices × 3), packed. type is INSITU_FLOAT32 or
  * INSITU_FLOAT64. Local. */
 INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type type);
 
-/* Open a session. Collective over comm, which is duplicated; its error handler stays. scene_file, a regular file, is
- * read on rank 0 only, and read again when it changes on disk. On an error *out is NULL on every rank, and
- * insitu_error(NULL) is the message. MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
+/* Opens a session. Collective over comm, which is duplicated; its error handler is not changed. scene_file, a regular
+ * file, is read on rank 0 only, and read again when it changes on disk. On an error *out is NULL on every rank, and
+ * insitu_error(NULL) returns the message. MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
-/* Open a session by a scene given as text: YAML as in a scene file, zero-terminated. Collective, and as insitu_create()
- * in all else. Rank 0's text counts, the other ranks may give NULL. The text need not outlive the call. Messages call
- * it "scene text:line". Files that it names are relative to rank 0's working directory. */
+/* Opens a session with a scene given as text: YAML as in a scene file, zero-terminated. Collective, and in all other
+ * respects the same as insitu_create(). Only rank 0's text is used; the other ranks may pass NULL. The text need not
+ * remain valid after the call. Messages refer to it as "scene text:line". The paths of files in it are relative to rank
+ * 0's working directory. */
 INSITU_API insitu_status insitu_create_from_text(MPI_Comm comm, const char *scene_text, insitu_session **out);
 
-/* insitu_create(), or insitu_create_from_text() where is_text is not 0, for a Fortran communicator. The Fortran module
- * calls it (docs/fortran.md). Collective. */
+/* Same as insitu_create(), or insitu_create_from_text() if is_text is not 0, for a Fortran communicator. The Fortran
+ * module calls it (docs/fortran.md). Collective. */
 INSITU_API insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_text, insitu_session **out);
 
 /* Hand over this rank's part of the mesh called name, as borrowed arrays. Local. Ranks that have no part of the mesh
@@ -445,7 +452,8 @@ INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *m
  * these threads the caller's floating-point traps and rounding modes are off meanwhile, here and in insitu_create(). */
 INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
 
-/* The report of the last step. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */
+/* Returns the report of the last step. Local. Valid until the next step; all zero before the first; NULL for a NULL
+ * session. */
 INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
 
 /* Read a parameter of the scene (`parameters: {inflow: 2.5}`) into *value. Local, without communication: all ranks have
@@ -456,31 +464,31 @@ INSITU_API const insitu_report *insitu_last_report(const insitu_session *session
  * the scene that rank 0 has never asked for is a warning in the report. */
 INSITU_API insitu_status insitu_parameter(insitu_session *session, const char *name, double *value);
 
-/* Turn on (keep is not 0) or off that rank 0 keeps each step's pictures in memory, beside the files that the scene asks
- * for: 20 bytes a pixel of every image drawn in a step. Images without outputs are drawn then alone. Off at first.
- * Collective; rank 0's keep counts. */
+/* Sets whether rank 0 keeps each step's pictures in memory (keep is not 0), in addition to the files of the scene: 20
+ * bytes per pixel of every image drawn in a step. Images without outputs are only drawn while this is on. Off at first.
+ * Collective; only rank 0's keep is used. */
 INSITU_API insitu_status insitu_keep_pictures(insitu_session *session, int keep);
 
-/* The pictures that the last step drew, *count of them, in the order of the scene. The pictures of one image come by
- * the fields and isovalues of its sweep and then the views of its orbit; all have the image's name. An image that could
- * not be drawn is left out; one whose file could not be written is there. The session owns the pictures, and they are
- * valid until the next step, insitu_keep_pictures() or insitu_destroy(). Returns NULL and sets 0 where there are none:
- * on other ranks than 0, where nothing was due, or where pictures are not kept. Local. */
+/* Returns the pictures that the last step drew, *count of them, in the order of the scene. The pictures of one image
+ * are sorted by the fields and isovalues of its sweep and then by the views of its orbit; all have the image's name. An
+ * image that could not be drawn is left out; one whose file could not be written is included. The session owns the
+ * pictures, and they are valid until the next step, insitu_keep_pictures() or insitu_destroy(). Returns NULL and sets
+ * *count to 0 if there are none: on ranks other than 0, if nothing was due, or if pictures are not kept. Local. */
 INSITU_API const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count);
 
-/* The message of the last call on the session that failed since insitu_step() was last called, that call included; ""
- * if none did. So a step's failure can be read until the next step, whatever calls succeed in between. Local. Valid
- * until the next call on the session. For NULL: the message of this thread's last insitu_create(),
- * insitu_create_from_text() or insitu_destroy() that failed. */
+/* Returns the message of the most recent failed call on the session since the last insitu_step(), that step included;
+ * "" if none failed. The failure of a step can therefore be read until the next step, even if other calls succeed in
+ * between. Local. Valid until the next call on the session. For NULL it returns the message of this thread's most
+ * recent insitu_create(), insitu_create_from_text() or insitu_destroy() that failed. */
 INSITU_API const char *insitu_error(const insitu_session *session);
 
-/* Close a session and set *session to NULL. Collective. NULL, or a pointer to NULL, is fine. Waiting pictures are
- * written first; one that could not be written is an error, if no step has returned it, and the session is closed all
- * the same. If a run ends without this call, its pictures are written in MPI_Finalize() or as the process exits, and
- * their errors are lost. */
+/* Closes a session and sets *session to NULL. Collective. session may be NULL or point to NULL. Waiting pictures are
+ * written first; a picture that could not be written is an error, if no step has returned it, and the session is closed
+ * nevertheless. If a run ends without this call, its pictures are written in MPI_Finalize() or as the process exits,
+ * and their errors are lost. */
 INSITU_API insitu_status insitu_destroy(insitu_session **session);
 
-/* The name of a status, as in "INSITU_ERROR_MESH". Local. */
+/* Returns the name of a status, such as "INSITU_ERROR_MESH". Local. */
 INSITU_API const char *insitu_status_name(insitu_status status);
 
 #ifdef __cplusplus
