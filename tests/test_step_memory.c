@@ -22,7 +22,8 @@ static int64_t allocation;
     ".exr, data: true}, {path: " name "_deep.exr, deep: true}]\n"
 #define SURFACES                                                                                                       \
     "      - isosurface: {field: f, values: [0.1, -0.4]}\n"                                                            \
-    "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
+    "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5,\n"                               \
+    "          lines: {field: c, count: 3}}\n"
 #define VOLUME(field) "      - volume: {field: " field ", opacity: [[0, 0], [0.3, 0.4], [1, 0.9]]}\n"
 
 /* Surfaces alone and in front of a volume, by samples and by segments, values at vertices and in cells, several
@@ -38,11 +39,11 @@ static const char full_scene[] =
 static const char edited_scene[] = "threads: 1\nfields: {l: {lambda2: [f, f, c]}, h: l * f + c}\nimages:\n" IMAGE(
     "e", "[24, 16]",
     "      - isosurface: {field: f, values: [0.2], normals: differences}\n"
-    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], clip: {sphere: {centre: "
+    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], lines: {count: 2}, clip: {sphere: {centre: "
     "[0, 0, 0], radius: 0.5}}}\n"
     "      - surface: {opacity: 0.5, colour_by: {field: h, discrete: 4,\n"
     "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
-    "          range: run, below: [0, 0, 0]}}\n"
+    "          range: run, below: [0, 0, 0]}, lines: {field: f, values: [0.2]}}\n"
     "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: "
     "symlog,\n"
     "          threshold: 0.1, above: [1, 1, 1]}\n",
@@ -51,7 +52,9 @@ static const char edited_scene[] = "threads: 1\nfields: {l: {lambda2: [f, f, c]}
                       "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
                       "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: "
                       "{field: f}}\n"
-                      "    outputs: [{cinema: memory.cdb}]\n";
+                      "    outputs: [{cinema: memory.cdb}]\n"
+                      "  - name: n\n    size: [8, 8]\n    layers: [{surface: {}}]\n"
+                      "    outputs: [{path: n.png, grid: [1, 1]}]\n";
 
 typedef struct memory_case {
     const char *name;

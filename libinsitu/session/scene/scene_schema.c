@@ -193,8 +193,8 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
           "Columns and rows of a PNG in which pictures stand side by side: all those of a step whose outputs have "    \
           "the same file, row by row, in the order of the images, of each its sweep's pictures, and of these the "     \
           "views of its orbit. They have one size, each with its own decorations, and all say the same `grid`. A "     \
-          "cell whose picture is not due stays transparent. Not with `cinema`. 16 bytes a pixel of the whole are "     \
-          "held on rank 0 while a step's pictures are written.",                                                       \
+          "cell whose picture is not due, or could not be drawn, stays transparent. Not with `cinema`. 16 bytes a "    \
+          "pixel of the whole are held on rank 0 while a step's pictures are written.",                                \
       .by_default = "none", .low = 1, .high = 16)                                                                      \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help =                                                                                                          \
