@@ -5,7 +5,7 @@ function(insitu_add_long_test name)
 endfunction()
 
 # insitu_add_split_test(NAME COMMAND [arg ...]): the usual part of a test as NAME, and the whole of it, which is slow, as
-# NAME_whole among the long ones: with INSITU_TEST_WHOLE=1 (test_effort.h).
+# NAME_whole among the long ones: with INSITU_TEST_WHOLE=1 (test_effort.h). The command is a path, as of $<TARGET_FILE:...>.
 function(insitu_add_split_test name)
   add_test(NAME ${name} COMMAND ${ARGN})
   insitu_add_long_test(${name}_whole ${CMAKE_COMMAND} -E env INSITU_TEST_WHOLE=1 ${ARGN})

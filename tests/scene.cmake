@@ -73,9 +73,9 @@ add_test(NAME decorated_image COMMAND test_decorated_image)
 set_tests_properties(decorated_image PROPERTIES TIMEOUT 60)
 add_test(NAME glyphs COMMAND test_glyphs)
 set_tests_properties(glyphs PROPERTIES TIMEOUT 60)
-insitu_add_split_test(layout test_layout)
+insitu_add_split_test(layout $<TARGET_FILE:test_layout>)
 set_tests_properties(layout PROPERTIES TIMEOUT 60)
-insitu_add_split_test(random_decorations test_random_decorations)
+insitu_add_split_test(random_decorations $<TARGET_FILE:test_random_decorations>)
 set_tests_properties(random_decorations PROPERTIES TIMEOUT 120)
 
 # Memory runs out: quickly at every 41st allocation of the first picture, in the long tests at each.

@@ -116,7 +116,7 @@ find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecut
 add_executable(test_derived_accuracy test_derived_accuracy.c test_derived_vtk.cpp)
 target_link_libraries(test_derived_accuracy PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA VTK::CommonCore
   VTK::CommonDataModel VTK::CommonExecutionModel VTK::FiltersGeneral)
-insitu_add_split_test(derived_accuracy test_derived_accuracy)
+insitu_add_split_test(derived_accuracy $<TARGET_FILE:test_derived_accuracy>)
 set_tests_properties(derived_accuracy PROPERTIES TIMEOUT 60)
 
 # Contour lines beside VTK's.
