@@ -3,6 +3,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "blueprint_node.h"
+
 enum { LANES = 4 };
 
 static uint64_t mix(uint64_t sum, uint64_t bits)
@@ -25,12 +27,6 @@ static uint64_t hash_bytes(const char *data, int64_t bytes)
     return mix(mix(lanes[0], lanes[1]), mix(lanes[2], lanes[3]));
 }
 
-static int64_t element_bytes(insitu_type type)
-{
-    static const unsigned char bytes[] = {0, 4, 8, 4, 8, 1, 1, 2, 2, 4, 8};
-    return bytes[type];
-}
-
 /* As above, of elements apart, all of one size, which is a constant where this is called from. */
 static inline uint64_t hash_elements(const char *data, int64_t count, int64_t stride, size_t size)
 {
@@ -51,7 +47,7 @@ static uint64_t hash_array(uint64_t sum, const insitu_array *array, int64_t coun
 {
     if (!array->data) return mix(sum, 0);
     const char *data = array->data;
-    const int64_t size = element_bytes(array->type), stride = array->stride_bytes ? array->stride_bytes : size;
+    const int64_t size = node_type_bytes(array->type), stride = array->stride_bytes ? array->stride_bytes : size;
     sum = mix(mix(sum, (uint64_t)count), (uint64_t)array->type);
     if (stride == size) return mix(sum, hash_bytes(data, count * size));
     switch (size) {
@@ -65,7 +61,7 @@ static uint64_t hash_array(uint64_t sum, const insitu_array *array, int64_t coun
 /* Tells whether the coordinates are x y z x y z ..., without anything between. */
 static bool are_interleaved(const insitu_array coordinates[3])
 {
-    const int64_t size = element_bytes(coordinates[0].type);
+    const int64_t size = node_type_bytes(coordinates[0].type);
     bool are = coordinates[0].data != NULL;
     for (int axis = 0; axis < 3 && are; axis++)
         are = coordinates[axis].data == (const char *)coordinates[0].data + axis * size &&
@@ -78,7 +74,7 @@ uint64_t door_hash_places(const insitu_mesh *mesh)
     const insitu_array *c = mesh->coordinates;
     uint64_t sum = 1;
     if (are_interleaved(c))
-        sum = hash_bytes(c[0].data, 3 * mesh->vertex_count * element_bytes(c[0].type));
+        sum = hash_bytes(c[0].data, 3 * mesh->vertex_count * node_type_bytes(c[0].type));
     else
         for (int axis = 0; axis < 3; axis++) sum = hash_array(sum, &c[axis], mesh->vertex_count);
     for (int axis = 0; axis < 3 && mesh->lattice; axis++) {

@@ -165,7 +165,7 @@ bool node_need_array(const node *parent, const char *path, node_array *out)
     return node_need(parent, path, &found) && node_read_array(&found, out);
 }
 
-static int64_t type_bytes(insitu_type type)
+int64_t node_type_bytes(insitu_type type)
 {
     switch (type) {
     case INSITU_UINT8:
@@ -191,7 +191,7 @@ static int64_t type_bytes(insitu_type type)
 
 int64_t node_element(const insitu_array *array, int64_t i)
 {
-    const int64_t stride = array->stride_bytes ? array->stride_bytes : type_bytes(array->type);
+    const int64_t stride = array->stride_bytes ? array->stride_bytes : node_type_bytes(array->type);
     const char *p = (const char *)array->data + i * stride;
     switch (array->type) {
     case INSITU_INT8: READ_AS(int8_t)

@@ -74,6 +74,9 @@ bool node_need_array(const node *parent, const char *path, node_array *out);
 /* An element as a whole number, of arrays of integers. */
 int64_t node_element(const insitu_array *array, int64_t i);
 
+/* Bytes of an element of the type. */
+int64_t node_type_bytes(insitu_type type);
+
 bool node_is_integers(const node_array *array);
 
 #endif
