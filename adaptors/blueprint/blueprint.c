@@ -23,6 +23,7 @@ struct insitu_blueprint {
     MPI_Comm comm;
     int part_count;
     door_part *parts;
+    int next_part; /* where the next search begins */
     int64_t round;  /* counts steps */
     bool is_begun;  /* something was set for the next step */
     node_log log;   /* of the sets since the last step */
@@ -38,10 +39,15 @@ static _Thread_local char create_error[256];
 
 /* ---- parts ------------------------------------------------------------------------------------------------------- */
 
+/* Begins after the part that it found last: domains come in one order, and there may be thousands. */
 static door_part *find_part(insitu_blueprint *door, const char *name)
 {
-    for (int i = 0; i < door->part_count; i++)
-        if (strcmp(door->parts[i].name, name) == 0) return &door->parts[i];
+    for (int i = 0; i < door->part_count; i++) {
+        const int number = (door->next_part + i) % door->part_count;
+        if (strcmp(door->parts[number].name, name) != 0) continue;
+        door->next_part = number + 1;
+        return &door->parts[number];
+    }
     return NULL;
 }
 
