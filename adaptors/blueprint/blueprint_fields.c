@@ -136,19 +136,25 @@ static bool is_same_order(const int64_t counts[3], const int64_t a[3], const int
     return is_same;
 }
 
-/* Takes the field's order for cells if it is the first; tells whether it is that of the mesh. */
-static bool has_order(door_mesh *mesh, door_field *field)
+/* Tells whether the field's order is that of the mesh's vertices or cells. */
+static bool has_order(const door_mesh *mesh, const door_field *field)
 {
     int64_t counts[3];
     if (!mesh->mesh.lattice) return true;
     counts_of(mesh, field->is_element, counts);
-    if (!field->is_element) return is_same_order(counts, field->strides, mesh->lattice.vertex_strides);
-    if (!mesh->has_cell_order) {
-        memcpy(mesh->lattice.cell_strides, field->strides, sizeof field->strides);
-        mesh->mesh.cell_count = door_reach(counts, field->strides);
-        mesh->has_cell_order = true;
-    }
-    return is_same_order(counts, field->strides, mesh->lattice.cell_strides);
+    return is_same_order(counts, field->strides,
+                         field->is_element ? mesh->lattice.cell_strides : mesh->lattice.vertex_strides);
+}
+
+/* Gives the cells of a lattice the order of its first element field. */
+static void take_cell_order(door_mesh *mesh, const door_field *field)
+{
+    int64_t counts[3];
+    if (!mesh->mesh.lattice || mesh->has_cell_order) return;
+    counts_of(mesh, true, counts);
+    memcpy(mesh->lattice.cell_strides, field->strides, sizeof field->strides);
+    mesh->mesh.cell_count = door_reach(counts, field->strides);
+    mesh->has_cell_order = true;
 }
 
 /* ---- arrays ------------------------------------------------------------------------------------------------------ */
@@ -272,8 +278,8 @@ bool door_read_ghosts(const node *domain, const char *topology, door_mesh *mesh)
     for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
         if (!w.found.is_element) continue;
         if (!read_order(mesh, &w.found)) return false;
-        const bool is_shown = has_order(mesh, &w.found);
-        if (is_shown && is_ghosts(domain, w.field.name) && !take_flags(&w.found, mesh)) return false;
+        take_cell_order(mesh, &w.found);
+        if (has_order(mesh, &w.found) && is_ghosts(domain, w.field.name) && !take_flags(&w.found, mesh)) return false;
         if (domain->log->status) return false;
     }
     return !domain->log->status && read_nestsets(domain, topology, mesh);
@@ -323,14 +329,13 @@ static bool set_field(const door_field *field, const door_mesh *mesh, insitu_ses
 bool door_set_fields(const node *domain, const char *topology, const door_mesh *mesh, insitu_session *session,
                      const char *name, int *count)
 {
-    door_mesh order = *mesh;
     for (field_walk w = {.domain = domain, .topology = topology, .tells = true}; next_field(&w);) {
         if (is_ghosts(domain, w.field.name)) {
             if (!w.found.is_element) node_leave_out(&w.field, "values", "ghosts at vertices are not read");
             continue;
         }
         if (!read_order(mesh, &w.found)) return false;
-        if (!has_order(&order, &w.found)) {
+        if (!has_order(mesh, &w.found)) {
             node_leave_out(&w.field, "strides", "has other strides than the %s of the topology",
                            w.found.is_element ? "other element fields" : "vertices");
             continue;
