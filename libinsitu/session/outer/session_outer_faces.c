@@ -1,8 +1,11 @@
-/* Faces that two cells share cancel at their vertices: each face has a hash of its vertices' hashes in no order, and
- * each vertex the exclusive or of those of its faces. A vertex that is left with nothing is inside of the mesh, and a
- * face is an outer one only if none of its vertices is. The few faces that so may be are counted exactly, by keys: the
- * first three power sums of their vertices' hashes. So memory is needed for vertices and outer faces, not for all
- * faces, and most cells are seen twice and no more.
+/* Finds outer faces in two passes over the cells.
+ *
+ * The first pass gives each face a hash that does not depend on the order of its vertices, and adds it by exclusive or
+ * to a sum at each of the face's vertices. Two cells that share a face add the same hash, so that it cancels. A vertex
+ * whose sum is 0 lies inside of the mesh, and a face with such a vertex is no outer face.
+ *
+ * The second pass collects the other faces, which are few, and counts them exactly by keys: the first three power sums
+ * of their vertices' hashes. So memory is needed for vertices and outer faces, not for all faces.
  *
  * Shells are faces that are always kept. A shell on a cell's outer face replaces it, so that only one is drawn there.
  *
@@ -20,7 +23,7 @@
 #include "session_neighbours.h"
 #include "session_thresholds.h"
 
-/* Threads that have a word of their own for each vertex. */
+/* The number of threads that have a table of sums of their own, with a word for each vertex. */
 enum { MOST_TABLES = 4 };
 
 typedef struct face_search {
@@ -28,11 +31,11 @@ typedef struct face_search {
     int threads;
     unsigned char *is_hidden; /* a byte a cell, not 0 for those beyond the threshold; NULL: there is no threshold */
     uint64_t *hashes;         /* one for each vertex of the mesh */
-    int table_count;          /* threads beyond these share them */
-    uint64_t *rests;          /* what is left of faces at each vertex, in as many tables, */
-    uint64_t *slots;          /* and at all vertices with the same hash */
+    int table_count;          /* of vertex_sums; when there are more threads, they share tables */
+    uint64_t *vertex_sums;    /* exclusive or of the hashes of a vertex's faces, in table_count tables */
+    uint64_t *hash_sums;      /* the same of all vertices with one hash (& mask), as vertices in one place are one */
     uint64_t mask;
-    unsigned char *is_open; /* a byte a vertex: something is left there */
+    unsigned char *is_open; /* a byte a vertex: its sum is not 0, so that it may be a corner of an outer face */
     int64_t count;
     session_face *faces; /* that may be outer ones, in the order of cells */
     session_key *keys;
@@ -44,8 +47,8 @@ static void search_free(face_search *s)
 {
     base_free(s->is_hidden);
     base_free(s->hashes);
-    base_free(s->rests);
-    base_free(s->slots);
+    base_free(s->vertex_sums);
+    base_free(s->hash_sums);
     base_free(s->is_open);
     base_free(s->faces);
     base_free(s->keys);
@@ -104,27 +107,27 @@ static void hash_vertices(face_search *s, bool by_id)
     }
 }
 
-/* Where a thread leaves what faces have: in words of its own, or in some that it shares with others. */
-typedef struct leaver {
+/* The table to which a thread adds the hashes of faces. */
+typedef struct xor_table {
     const face_search *search;
-    uint64_t *rests; /* one for each vertex */
-    bool is_shared;
-} leaver;
+    uint64_t *vertex_sums; /* one for each vertex */
+    bool is_shared;        /* other threads add to it at the same time */
+} xor_table;
 
-static inline void leave(uint64_t *where, uint64_t rest, bool is_shared)
+static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
 {
     if (!is_shared) {
-        *where ^= rest;
+        *sum ^= hash;
         return;
     }
 #pragma omp atomic
-    *where ^= rest;
+    *sum ^= hash;
 }
 
-/* Leaves the face's hash at its vertices. */
-static void leave_face(const leaver *l, const session_face_loop *loop)
+/* Adds the face's hash to the sums of its vertices. */
+static void add_face(const xor_table *x, const session_face_loop *loop)
 {
-    const face_search *s = l->search;
+    const face_search *s = x->search;
     uint64_t sum = 0;
     int64_t vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
@@ -134,16 +137,17 @@ static void leave_face(const leaver *l, const session_face_loop *loop)
     }
     if (vertices < 3) return;
     for (int64_t i = 0; i < loop->size; i++)
-        if (is_new(s, loop, i)) leave(&l->rests[session_face_vertex(loop, i)], session_mix(sum), l->is_shared);
+        if (is_new(s, loop, i)) add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
 }
 
-/* The same of all faces of a cell of a type, at once; false where two of its vertices are one. */
-static inline bool leave_cell(const leaver *l, const session_face_table *table, const int64_t *vertices, int count)
+/* Adds the hashes of all faces of a cell whose type has a table of faces. Returns false, and adds nothing, where two of
+ * its vertices have one hash: its faces then have fewer vertices than the table says. */
+static inline bool add_cell(const xor_table *x, const session_face_table *table, const int64_t *vertices, int count)
 {
-    uint64_t hashes[GRID_MAX_CELL_VERTICES], rests[GRID_MAX_CELL_VERTICES] = {0};
+    uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
     bool has_twins = false;
     for (int i = 0; i < count; i++) {
-        hashes[i] = l->search->hashes[vertices[i]];
+        hashes[i] = x->search->hashes[vertices[i]];
         for (int k = 0; k < i; k++) has_twins |= hashes[k] == hashes[i];
     }
     if (has_twins) return false;
@@ -152,57 +156,57 @@ static inline bool leave_cell(const leaver *l, const session_face_table *table, 
         const bool is_quad = places[3] >= 0;
         const uint64_t sum = hashes[(int)places[0]] + hashes[(int)places[1]] + hashes[(int)places[2]];
         const uint64_t hash = session_mix(is_quad ? sum + hashes[(int)places[3]] : sum);
-        for (int i = 0; i < 3; i++) rests[(int)places[i]] ^= hash;
-        if (is_quad) rests[(int)places[3]] ^= hash;
+        for (int i = 0; i < 3; i++) sums[(int)places[i]] ^= hash;
+        if (is_quad) sums[(int)places[3]] ^= hash;
     }
-    for (int i = 0; i < count; i++) leave(&l->rests[vertices[i]], rests[i], l->is_shared);
+    for (int i = 0; i < count; i++) add_xor(&x->vertex_sums[vertices[i]], sums[i], x->is_shared);
     return true;
 }
 
-static void leave_faces(const leaver *l, int64_t cell)
+/* Adds the hashes of the cell's faces. */
+static void add_faces(const xor_table *x, int64_t cell)
 {
-    const grid *g = &l->search->mesh->cells;
+    const grid *g = &x->search->mesh->cells;
     const int type = grid_cell_type(g, cell);
     const session_face_table *table = session_faces_of_type(type);
-    if (!has_faces(l->search, cell)) return;
+    if (!has_faces(x->search, cell)) return;
     if (table->count) {
         int64_t vertices[GRID_MAX_CELL_VERTICES];
         const int count = grid_cell_vertices(g, cell, vertices);
         const bool is_tet = type == GRID_TET; /* with constants the compiler unrolls all of it */
-        if (is_tet ? leave_cell(l, session_faces_of_type(GRID_TET), vertices, 4)
-                   : leave_cell(l, table, vertices, count))
+        if (is_tet ? add_cell(x, session_faces_of_type(GRID_TET), vertices, 4) : add_cell(x, table, vertices, count))
             return;
     }
     const session_cell_faces faces = session_faces_of_cell(g, cell);
     for (int64_t f = 0; f < faces.count; f++) {
         const session_face_loop loop = session_face_of(&faces, f);
-        leave_face(l, &loop);
+        add_face(x, &loop);
     }
 }
 
-/* Takes what threads have left at the vertex to all those with its hash. */
-static void unite_rests(const face_search *s, int64_t vertex)
+/* Adds the vertex's sums in all tables to that of its hash. */
+static void add_vertex(const face_search *s, int64_t vertex)
 {
-    uint64_t rest = 0;
-    for (int i = 0; i < s->table_count; i++) rest ^= s->rests[i * s->mesh->cells.vertex_count + vertex];
-    leave(&s->slots[s->hashes[vertex] & s->mask], rest, s->threads > 1);
+    uint64_t sum = 0;
+    for (int i = 0; i < s->table_count; i++) sum ^= s->vertex_sums[i * s->mesh->cells.vertex_count + vertex];
+    add_xor(&s->hash_sums[s->hashes[vertex] & s->mask], sum, s->threads > 1);
 }
 
-/* Finds the vertices at which something is left of the faces. */
+/* Finds the vertices whose sum of faces is not 0. */
 static void cancel_faces(face_search *s)
 {
     const grid *g = &s->mesh->cells;
 #pragma omp parallel num_threads(s->threads)
     {
         region_enter();
-        const leaver l = {s, s->rests + omp_get_thread_num() % s->table_count * g->vertex_count,
-                          omp_get_num_threads() > s->table_count};
+        const xor_table x = {s, s->vertex_sums + omp_get_thread_num() % s->table_count * g->vertex_count,
+                             omp_get_num_threads() > s->table_count};
 #pragma omp for schedule(static)
-        for (int64_t cell = 0; cell < g->cell_count; cell++) leave_faces(&l, cell);
+        for (int64_t cell = 0; cell < g->cell_count; cell++) add_faces(&x, cell);
 #pragma omp for schedule(static)
-        for (int64_t v = 0; v < g->vertex_count; v++) unite_rests(s, v);
+        for (int64_t v = 0; v < g->vertex_count; v++) add_vertex(s, v);
 #pragma omp for schedule(static) nowait
-        for (int64_t v = 0; v < g->vertex_count; v++) s->is_open[v] = s->slots[s->hashes[v] & s->mask] != 0;
+        for (int64_t v = 0; v < g->vertex_count; v++) s->is_open[v] = s->hash_sums[s->hashes[v] & s->mask] != 0;
         region_leave();
     }
 }
@@ -355,10 +359,10 @@ static insitu_status search_own(face_search *s, const session_outer *outer, bool
     s->mask = slots - 1;
     s->hashes = base_alloc((size_t)g->vertex_count * sizeof *s->hashes);
     s->table_count = s->threads < MOST_TABLES ? s->threads : MOST_TABLES;
-    s->rests = base_calloc((size_t)(g->vertex_count * s->table_count), sizeof *s->rests);
-    s->slots = base_calloc(slots, sizeof *s->slots);
+    s->vertex_sums = base_calloc((size_t)(g->vertex_count * s->table_count), sizeof *s->vertex_sums);
+    s->hash_sums = base_calloc(slots, sizeof *s->hash_sums);
     s->is_open = base_alloc((size_t)g->vertex_count);
-    bool is_done = s->hashes && s->rests && s->slots && s->is_open;
+    bool is_done = s->hashes && s->vertex_sums && s->hash_sums && s->is_open;
     if (is_done) {
         hash_vertices(s, by_id);
         cancel_faces(s);
