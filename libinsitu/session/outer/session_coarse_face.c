@@ -35,7 +35,21 @@ double session_place_distance(const double a[3], const double b[3])
     return sqrt(vector3_dot(off, off));
 }
 
-/* Computes the face's normal, bounds, area and width. side: 1 if the cell is behind the face, by the orientation of its
+/* Returns the box around places, of which there is one at least. */
+static session_box box_around(const double places[][3], int count)
+{
+    session_box box;
+    memcpy(box.lower, places[0], sizeof box.lower);
+    memcpy(box.upper, places[0], sizeof box.upper);
+    for (int i = 1; i < count; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            box.lower[axis] = places[i][axis] < box.lower[axis] ? places[i][axis] : box.lower[axis];
+            box.upper[axis] = places[i][axis] > box.upper[axis] ? places[i][axis] : box.upper[axis];
+        }
+    return box;
+}
+
+/* Computes the face's normal, box, area and width. side: 1 if the cell is behind the face, by the orientation of its
  * vertices, -1 if it is in front. */
 static void measure(session_coarse_face *f, double side)
 {
@@ -43,11 +57,8 @@ static void measure(session_coarse_face *f, double side)
     for (int axis = 0; axis < 3; axis++) {
         a[axis] = f->places[2][axis] - f->places[0][axis];
         b[axis] = f->places[f->count == 4 ? 3 : 2][axis] - f->places[1][axis];
-        f->lower[axis] =
-            fmin(fmin(f->places[0][axis], f->places[1][axis]), fmin(f->places[2][axis], f->places[3][axis]));
-        f->upper[axis] =
-            fmax(fmax(f->places[0][axis], f->places[1][axis]), fmax(f->places[2][axis], f->places[3][axis]));
     }
+    f->box = box_around((const double(*)[3])f->places, f->count);
     vector3_cross(a, b, f->normal);
     f->area = sqrt(vector3_dot(f->normal, f->normal)) / 2;
     f->width = sqrt(fmax(vector3_dot(a, a), vector3_dot(b, b)));
@@ -77,19 +88,14 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
     const session_face_loop loop = session_face_of(&faces, face->face);
-    session_box *box = &out->box;
     if (loop.size < 3 || loop.size > 4 || faces.size) return false;
     out->count = (int)loop.size;
     for (int i = 0; i < out->count; i++) {
-        double *place = out->places[i];
         out->vertices[i] = session_face_vertex(&loop, i);
-        grid_vertex(g, out->vertices[i], place);
-        for (int axis = 0; axis < 3; axis++) {
-            box->lower[axis] = i && box->lower[axis] < place[axis] ? box->lower[axis] : place[axis];
-            box->upper[axis] = i && box->upper[axis] > place[axis] ? box->upper[axis] : place[axis];
-        }
+        grid_vertex(g, out->vertices[i], out->places[i]);
     }
-    out->reach = session_place_distance(box->lower, box->upper);
+    out->box = box_around((const double(*)[3])out->places, out->count);
+    out->reach = session_place_distance(out->box.lower, out->box.upper);
     return true;
 }
 
@@ -122,14 +128,12 @@ bool session_may_hold(const session_face_outline *f, const double place[3], doub
 
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4])
 {
-    const session_cell_faces faces = session_faces_of_cell(g, face->cell);
-    const session_face_loop loop = session_face_of(&faces, face->face);
-    double places[4][3];
-    const int count = (int)loop.size;
+    session_face_outline outline;
     int least = 0;
-    if (loop.size < 3 || loop.size > 4 || faces.size) return false;
+    if (!session_read_outline(g, face, &outline)) return false;
+    const int count = outline.count;
+    const double(*places)[3] = (const double(*)[3])outline.places;
     for (int i = 0; i < count; i++) {
-        grid_vertex(g, session_face_vertex(&loop, i), places[i]);
         for (int k = 0; k < i; k++)
             if (session_compare_places(places[k], places[i]) == 0) return false;
         if (session_compare_places(places[i], places[least]) < 0) least = i;
@@ -140,7 +144,7 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     for (int i = 0; i < 4; i++) {
         const int from = (least + step * (i < count ? i : count - 1)) % count;
         memcpy(out->places[i], places[from], sizeof places[from]);
-        vertices[i] = session_face_vertex(&loop, from);
+        vertices[i] = outline.vertices[from];
     }
     measure(out, 1);
     if (!(out->area > 0)) return false;
@@ -226,7 +230,7 @@ bool session_find_on_face(const session_coarse_face *f, const double place[3], d
 {
     double at[2], on[3], slopes[2][3];
     for (int axis = 0; axis < 3; axis++)
-        if (!(f->lower[axis] - slack <= place[axis] && place[axis] <= f->upper[axis] + slack)) return false;
+        if (!(f->box.lower[axis] - slack <= place[axis] && place[axis] <= f->box.upper[axis] + slack)) return false;
     if (!solve(f, place, at)) return false;
     for (int k = 0; k < 2; k++) at[k] = rounded(at[k]);
     const double u = at[0], w = at[1];

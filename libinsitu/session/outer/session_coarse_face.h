@@ -11,7 +11,7 @@ typedef struct session_coarse_face {
      * third */
     double places[4][3];
     double normal[3]; /* unit vector that points away from the cell */
-    double lower[3], upper[3];
+    session_box box;
     double area, width;
 } session_coarse_face;
 

@@ -162,8 +162,7 @@ static bool bin_candidates(hanging_search *s)
     return session_bins_create(&s->bins, s->candidates->place, (int64_t)sizeof *s->candidates, s->candidate_count);
 }
 
-/* ---- faces: most outlines tell enough, so that they are read only if they may matter -------------
- */
+/* ---- faces: outlines rule most of them out, so that few are read ------------------------------------------------- */
 
 typedef enum face_state {
     FACE_UNREAD,
@@ -293,8 +292,7 @@ static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sen
         const int64_t first = mail->total;
         for (int64_t i = 0; i < s->own_count && homes->near[n] != s->team->rank; i++) {
             const session_coarse_face *f = &s->faces[i].face;
-            const session_box box = {{f->lower[0], f->lower[1], f->lower[2]}, {f->upper[0], f->upper[1], f->upper[2]}};
-            if (!does_meet(&box, &homes->boxes[n], slack_of(s, f))) continue;
+            if (!does_meet(&f->box, &homes->boxes[n], slack_of(s, f))) continue;
             if (mail->words) {
                 session_pack_coarse_face(f, mail->words + mail->total);
                 sent[mail->total / SESSION_FACE_WORDS] = i;
@@ -381,7 +379,7 @@ static bool try_faces(hanging_search *s, try_function *try_one)
     bool is_done = true;
     for (int64_t number = 0; number < s->face_count && s->candidate_count && is_done; number++) {
         const session_coarse_face *f = &s->faces[number].face;
-        session_bin_walk walk = session_walk_bins(&s->bins, f->lower, f->upper, slack_of(s, f));
+        session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, slack_of(s, f));
         int64_t near;
         while (is_done && session_next_binned(&walk, &near)) is_done = try_one(s, number, &s->candidates[near]);
     }
