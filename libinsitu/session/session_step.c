@@ -176,22 +176,24 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
                                 changes->is_filled,   s->kept.is_on};
     base_error of_events = {.status = INSITU_OK};
-    const session_drawing drawing = {team,
-                                     s->scene_file.path,
-                                     changes->cycle,
-                                     &s->meshes,
-                                     &s->trees.parent,
-                                     &s->space,
-                                     &s->run_ranges,
-                                     &s->report,
-                                     &s->kept,
-                                     basis.scene,
-                                     &s->cinema,
-                                     &s->montages,
-                                     &s->overwrites,
-                                     &s->writer,
-                                     &s->catalogue,
-                                     changes->writes_behind};
+    const session_drawing drawing = {
+        .team = team,
+        .scene_path = s->scene_file.path,
+        .cycle = changes->cycle,
+        .meshes = &s->meshes,
+        .parent = &s->trees.parent,
+        .space = &s->space,
+        .run_ranges = &s->run_ranges,
+        .report = &s->report,
+        .kept = &s->kept,
+        .scene = basis.scene,
+        .cinema = &s->cinema,
+        .montages = &s->montages,
+        .overwrites = &s->overwrites,
+        .writer = &s->writer,
+        .catalogue = &s->catalogue,
+        .writes_behind = changes->writes_behind,
+    };
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, refused, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
