@@ -1,10 +1,8 @@
 #include "test_contour_vtk.h"
 
-#include <algorithm>
 #include <cstdlib>
 
 #include <vtkCell.h>
-#include <vtkCellType.h>
 #include <vtkContourFilter.h>
 #include <vtkCutter.h>
 #include <vtkDoubleArray.h>
@@ -15,29 +13,18 @@
 #include <vtkPolyData.h>
 #include <vtkUnstructuredGrid.h>
 
+#include "test_vtk_grid.h"
+
 int64_t test_vtk_contour(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
                          const int64_t *connectivity, const double *field, const double origin[3],
                          const double normal[3], int value_count, const double *values, double **points)
 {
     const int parts = 4;
-    vtkNew<vtkUnstructuredGrid> grid;
-    vtkNew<vtkPoints> places;
+    const auto grid = test_vtk_grid(vertex_count, coordinates, cell_count, type, connectivity);
     vtkNew<vtkDoubleArray> scalars;
-    places->SetDataTypeToDouble();
     scalars->SetName("f");
-    for (vtkIdType v = 0; v < vertex_count; v++) {
-        places->InsertNextPoint(coordinates + 3 * v);
-        scalars->InsertNextValue(field[v]);
-    }
-    grid->SetPoints(places);
+    for (vtkIdType v = 0; v < vertex_count; v++) scalars->InsertNextValue(field[v]);
     grid->GetPointData()->SetScalars(scalars);
-    const vtkIdType corners = type == VTK_TETRA ? 4 : 8;
-    grid->Allocate(cell_count);
-    for (vtkIdType cell = 0; cell < cell_count; cell++) {
-        vtkIdType ids[8];
-        std::copy_n(connectivity + cell * corners, corners, ids);
-        grid->InsertNextCell(type, corners, ids);
-    }
     vtkNew<vtkPlane> plane;
     plane->SetOrigin(origin[0], origin[1], origin[2]);
     plane->SetNormal(normal[0], normal[1], normal[2]);

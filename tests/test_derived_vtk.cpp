@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include <vtkCellType.h>
 #include <vtkDataArray.h>
 #include <vtkDoubleArray.h>
 #include <vtkFloatArray.h>
@@ -11,34 +10,21 @@
 #include <vtkIdList.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
-#include <vtkPoints.h>
 #include <vtkSMPTools.h>
 #include <vtkUnstructuredGrid.h>
+
+#include "test_vtk_grid.h"
 
 double test_vtk_q(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
                   const int64_t *connectivity, const float *velocity, int runs, double *q)
 {
-    vtkNew<vtkUnstructuredGrid> grid;
-    vtkNew<vtkPoints> points;
+    const auto grid = test_vtk_grid(vertex_count, coordinates, cell_count, type, connectivity);
     vtkNew<vtkFloatArray> values;
-    points->SetDataTypeToDouble();
-    points->SetNumberOfPoints(vertex_count);
     values->SetName("u");
     values->SetNumberOfComponents(3);
     values->SetNumberOfTuples(vertex_count);
-    for (vtkIdType v = 0; v < vertex_count; v++) {
-        points->SetPoint(v, coordinates + 3 * v);
-        values->SetTypedTuple(v, velocity + 3 * v);
-    }
-    grid->SetPoints(points);
+    for (vtkIdType v = 0; v < vertex_count; v++) values->SetTypedTuple(v, velocity + 3 * v);
     grid->GetPointData()->AddArray(values);
-    const vtkIdType corners = type == VTK_TETRA ? 4 : 8;
-    grid->Allocate(cell_count);
-    for (vtkIdType cell = 0; cell < cell_count; cell++) {
-        vtkIdType ids[8];
-        std::copy_n(connectivity + cell * corners, corners, ids);
-        grid->InsertNextCell(type, corners, ids);
-    }
     vtkSMPTools::Initialize(1);
     double least = 1e30;
     for (int run = 0; run < runs; run++) {
