@@ -214,6 +214,17 @@ void all_are_told(session_input *in, const spoilt_case *cases, size_t count)
     insitu_destroy(&session);
 }
 
+double mean_of(const double *values, int count)
+{
+    double sum = 0, rest = 0; /* Knuth's two-sum: together they have twice the digits */
+    for (int i = 0; i < count; i++) {
+        const double next = sum + values[i], added = next - sum;
+        rest += (sum - (next - added)) + (values[i] - added);
+        sum = next;
+    }
+    return count ? (sum + rest) / count : NAN;
+}
+
 bool enter_folder(const char *name)
 {
     char path[512];

@@ -76,20 +76,6 @@ static int read_loop(const grid *g, const session_face_loop *loop, double points
     return (int)loop->size;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double mean(double *values, int count)
-{
-    double sum = 0;
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    for (int i = 0; i < count; i++) sum += values[i];
-    return count ? sum / count : NAN;
-}
-
 static bool is_among(const double (*points)[3], int count, const double position[3])
 {
     for (int i = 0; i < count; i++)
@@ -118,7 +104,7 @@ static double expected_at(const grid *all, const double position[3])
         }
         if (is_at && isfinite(cell_value(cell))) cells[cell_count++] = cell_value(cell);
     }
-    return face_count ? mean(faces, face_count) : mean(cells, cell_count);
+    return face_count ? mean_of(faces, face_count) : mean_of(cells, cell_count);
 }
 
 /* ---- what is handed over --------------------------------------------------------------------------------------- */

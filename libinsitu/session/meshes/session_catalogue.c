@@ -108,6 +108,7 @@ void session_drop_joints(session_catalogue *catalogue)
     for (int i = 0; i < catalogue->joint_count; i++) {
         session_joint *joint = catalogue->joints[i];
         session_hanging_free(&joint->hanging, joint->count, true);
+        session_vertex_groups_free(&joint->groups);
         session_homes_free(&joint->own_homes);
         base_free(joint->meshes);
         base_free(joint);

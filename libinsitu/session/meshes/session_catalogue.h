@@ -5,6 +5,7 @@
 #include "session_homes.h"
 #include "session_mesh.h"
 #include "session_team.h"
+#include "session_vertex_groups.h"
 
 /* A field of a mesh over all ranks; the same on every rank. */
 typedef struct session_catalogue_field {
@@ -78,6 +79,7 @@ typedef struct session_joint {
     uint64_t places;                 /* hash of the positions of all its meshes */
     session_homes own_homes;         /* used by a joint of several meshes */
     const session_homes *homes;
+    session_vertex_groups groups;
     session_hanging hanging;
 } session_joint;
 

@@ -1,0 +1,160 @@
+#include "session_vertex_groups.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_catalogue.h"
+#include "session_neighbours.h"
+
+typedef session_vertex_groups_basis groups_basis;
+
+/* ---- groups --------------------------------------------------------------------------------------------------- */
+
+static session_key key_of_place(const double place[3])
+{
+    session_key key;
+    for (int axis = 0; axis < 3; axis++) {
+        const double unsigned_zero = place[axis] + 0.0;
+        memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
+    }
+    return key;
+}
+
+/* Assigns groups to the vertices of a mesh's drawn cells. Until then of_vertex is -2 - i for the i-th twin. by_id:
+ * vertex gets one vertex of each group. */
+static void group_mesh(const session_mesh *mesh, const session_border *border, bool by_id, session_vertex_groups *out,
+                       int64_t *of_vertex, int64_t *one_vertex)
+{
+    const grid *g = &mesh->cells;
+    for (int64_t v = 0; v < g->vertex_count; v++) of_vertex[v] = -1;
+    for (int64_t i = 0; border && i < border->twin_count; i++) of_vertex[border->twins[i].vertex] = -2 - i;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (grid_is_ghost(g, cell)) continue;
+        grid_walk walk = grid_walk_cell(g, cell);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) {
+            if (of_vertex[vertex] < 0) {
+                const int64_t twin = -2 - of_vertex[vertex];
+                const session_key key =
+                    twin >= 0 ? key_of_place(border->twins[twin].place) : session_vertex_key(mesh, vertex, by_id);
+                of_vertex[vertex] = session_keys_add(&out->keys, &key);
+                if (by_id) one_vertex[of_vertex[vertex]] = vertex;
+            }
+            out->starts[of_vertex[vertex] + 1]++;
+        }
+    }
+}
+
+/* Groups the vertices of all meshes. *one_vertex: if they are grouped by id, one vertex of each group. */
+static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
+{
+    out->firsts = base_calloc((size_t)basis->mesh_count + 1, sizeof *out->firsts);
+    if (!out->firsts) return false;
+    for (int i = 0; i < basis->mesh_count; i++)
+        out->firsts[i + 1] = out->firsts[i] + (basis->meshes[i] ? basis->meshes[i]->cells.vertex_count : 0);
+    const int64_t most = out->firsts[basis->mesh_count];
+    *one_vertex = basis->by_id ? base_alloc((size_t)most * sizeof **one_vertex) : NULL;
+    out->of_vertex = base_alloc((size_t)most * sizeof *out->of_vertex);
+    out->starts = base_calloc((size_t)most + 1, sizeof *out->starts);
+    if (!out->of_vertex || !out->starts || (basis->by_id && !*one_vertex) || !session_keys_create(&out->keys, most))
+        return false;
+    for (int i = 0; i < basis->mesh_count; i++)
+        if (basis->meshes[i])
+            group_mesh(basis->meshes[i], basis->borders ? &basis->borders[i] : NULL, basis->by_id, out,
+                       out->of_vertex + out->firsts[i], *one_vertex);
+    out->count = out->keys.count;
+    for (int64_t group = 0; group < out->count; group++) out->starts[group + 1] += out->starts[group];
+    int64_t *starts = base_realloc(out->starts, (size_t)(out->count + 1) * sizeof *starts);
+    if (starts) out->starts = starts;
+    return true;
+}
+
+/* ---- groups that other ranks may have -------------------------------------------------------------------------- */
+
+static void place_of(const groups_basis *basis, const session_vertex_groups *groups, const int64_t *one_vertex,
+                     int64_t group, double place[3])
+{
+    if (one_vertex)
+        grid_vertex(&basis->meshes[0]->cells, one_vertex[group], place);
+    else
+        memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
+}
+
+/* Finds the home of each group in another rank's box, and counts the homes; -1: this rank alone has the group. */
+static void find_homes(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out, int *home)
+{
+    for (int64_t group = 0; group < out->count; group++) {
+        const session_key *key = &out->keys.keys[group];
+        double place[1][3];
+        place_of(basis, out, one_vertex, group, place[0]);
+        home[group] = -1;
+        if (!session_homes_share(basis->homes, place[0])) continue;
+        home[group] = session_home(basis->homes, (const double(*)[3])place, 1, session_key_hash(key),
+                                   (int64_t)key->words[0]);
+        out->shared_counts[home[group]]++;
+        out->shared_count++;
+    }
+}
+
+/* Lists the shared groups by their homes. */
+static bool list_shared(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out)
+{
+    int *home = base_alloc((size_t)out->count * sizeof *home);
+    int64_t *places = base_calloc((size_t)basis->ranks + 1, sizeof *places);
+    out->shared_counts = base_calloc((size_t)basis->ranks, sizeof *out->shared_counts);
+    bool is_done = home && places && out->shared_counts;
+    if (is_done) {
+        find_homes(basis, one_vertex, out, home);
+        out->shared = base_alloc((size_t)out->shared_count * sizeof *out->shared);
+        out->shared_keys = base_alloc((size_t)out->shared_count * sizeof *out->shared_keys);
+        is_done = out->shared && out->shared_keys;
+    }
+    for (int rank = 0; rank < basis->ranks && is_done; rank++)
+        places[rank + 1] = places[rank] + out->shared_counts[rank];
+    for (int64_t group = 0; group < out->count && is_done; group++) {
+        if (home[group] < 0) continue;
+        const int64_t at = places[home[group]]++;
+        out->shared[at] = group;
+        out->shared_keys[at] = out->keys.keys[group];
+    }
+    base_free(home);
+    base_free(places);
+    return is_done;
+}
+
+/* ---- updates --------------------------------------------------------------------------------------------------- */
+
+static bool has_patches(const groups_basis *basis)
+{
+    for (int i = 0; i < basis->mesh_count; i++)
+        for (int f = 0; basis->meshes[i] && f < basis->meshes[i]->field_count; f++)
+            if (basis->meshes[i]->fields[f].given.patch_count) return true;
+    return false;
+}
+
+bool session_update_vertex_groups(const session_vertex_groups_basis *basis, session_vertex_groups *groups)
+{
+    int64_t *one_vertex = NULL;
+    const bool needs_keys = has_patches(basis);
+    if (groups->places == basis->places && (groups->keys.keys || !needs_keys)) return true;
+    session_vertex_groups_free(groups);
+    const bool is_done =
+        group_vertices(basis, groups, &one_vertex) && (basis->ranks == 1 || list_shared(basis, one_vertex, groups));
+    base_free(one_vertex);
+    if (!is_done) session_vertex_groups_free(groups);
+    if (!needs_keys) session_keys_free(&groups->keys);
+    if (is_done) groups->places = basis->places;
+    return is_done;
+}
+
+void session_vertex_groups_free(session_vertex_groups *groups)
+{
+    base_free(groups->firsts);
+    base_free(groups->of_vertex);
+    base_free(groups->starts);
+    session_keys_free(&groups->keys);
+    base_free(groups->shared);
+    base_free(groups->shared_keys);
+    base_free(groups->shared_counts);
+    *groups = (session_vertex_groups){0};
+}
