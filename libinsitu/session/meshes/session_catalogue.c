@@ -103,6 +103,18 @@ void session_hanging_free(session_hanging *hanging, int count, bool with_borders
     hanging->twins = twins;
 }
 
+void session_vertex_groups_free(session_vertex_groups *groups)
+{
+    base_free(groups->firsts);
+    base_free(groups->of_vertex);
+    base_free(groups->starts);
+    session_keys_free(&groups->keys);
+    base_free(groups->shared);
+    base_free(groups->shared_keys);
+    base_free(groups->shared_counts);
+    *groups = (session_vertex_groups){0};
+}
+
 void session_drop_joints(session_catalogue *catalogue)
 {
     for (int i = 0; i < catalogue->joint_count; i++) {

@@ -3,9 +3,9 @@
 #define SESSION_CATALOGUE_H
 
 #include "session_homes.h"
+#include "session_keys.h"
 #include "session_mesh.h"
 #include "session_team.h"
-#include "session_vertex_groups.h"
 
 /* A field of a mesh over all ranks; the same on every rank. */
 typedef struct session_catalogue_field {
@@ -55,6 +55,22 @@ typedef struct session_hanging {
     int64_t *sent_counts, *sent_groups; /* per rank, the number of values sent; their groups, in the order of ranks */
     int64_t sent_total;
 } session_hanging;
+
+/* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are kept while the meshes
+ * stay as they are. */
+typedef struct session_vertex_groups {
+    uint64_t places;    /* session_joint.places that they are of; 0: not known */
+    int64_t *firsts;    /* per mesh, the number of its first vertex, and at the end the number of vertices */
+    int64_t *of_vertex; /* group of each vertex; -1: it belongs to no drawn cell */
+    int64_t count;
+    int64_t *starts;        /* count + 1: number of corners of drawn cells in the groups before */
+    session_key_table keys; /* of the groups; empty unless a mesh has patches, whose vertices are found by key */
+    /* The groups in other ranks' boxes, sorted by their home; none if there is one rank. */
+    int64_t shared_count;
+    int64_t *shared;
+    session_key *shared_keys;
+    int64_t *shared_counts; /* per rank, the number of groups whose home it is */
+} session_vertex_groups;
 
 typedef struct session_catalogue_mesh {
     char *name;
@@ -119,6 +135,8 @@ session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t n
 void session_drop_joints(session_catalogue *catalogue);
 /* Frees the data of vertices, and if with_borders also that of faces. count: number of meshes. */
 void session_hanging_free(session_hanging *hanging, int count, bool with_borders);
+
+void session_vertex_groups_free(session_vertex_groups *groups);
 
 /* Returns a hash of this rank's names, which is equal on two ranks if their tables are. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);

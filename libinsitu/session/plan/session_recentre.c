@@ -25,6 +25,7 @@
 #include "session_hanging.h"
 #include "session_patches.h"
 #include "session_scalars.h"
+#include "session_vertex_groups.h"
 
 /* Values by group: those of group g are values[starts[g]] .. values[ends[g] - 1]. There is room up to starts[g + 1], as
  * a cell whose value is not finite gives none. */

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "memory.h"
-#include "session_catalogue.h"
 #include "session_neighbours.h"
 
 typedef session_vertex_groups_basis groups_basis;
@@ -145,16 +144,4 @@ bool session_update_vertex_groups(const session_vertex_groups_basis *basis, sess
     if (!needs_keys) session_keys_free(&groups->keys);
     if (is_done) groups->places = basis->places;
     return is_done;
-}
-
-void session_vertex_groups_free(session_vertex_groups *groups)
-{
-    base_free(groups->firsts);
-    base_free(groups->of_vertex);
-    base_free(groups->starts);
-    session_keys_free(&groups->keys);
-    base_free(groups->shared);
-    base_free(groups->shared_keys);
-    base_free(groups->shared_counts);
-    *groups = (session_vertex_groups){0};
 }

@@ -1,0 +1,39 @@
+/* Keys of vertices, and a table of them. */
+#ifndef SESSION_KEYS_H
+#define SESSION_KEYS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Key of a vertex: a global id, or the bits of three coordinates. Vertices with equal keys are the same vertex. */
+typedef struct session_key {
+    uint64_t words[3];
+} session_key;
+
+/* Spreads the bits of a word over all of it. */
+static inline uint64_t session_mix(uint64_t x)
+{
+    x += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
+uint64_t session_key_hash(const session_key *key);
+
+/* Keys, numbered 0, 1, ... in the order of their first appearance. */
+typedef struct session_key_table {
+    session_key *keys; /* count keys */
+    int64_t count;
+    int64_t *slots; /* mask + 1; -1: free */
+    uint64_t mask;
+} session_key_table;
+
+/* Creates a table with space for `most` keys. Returns false if memory ran out; nothing is then left to free. */
+bool session_keys_create(session_key_table *table, int64_t most);
+/* Return the key's number; session_keys_find() returns -1 if it is missing, session_keys_add() adds it. */
+int64_t session_keys_find(const session_key_table *table, const session_key *key);
+int64_t session_keys_add(session_key_table *table, const session_key *key);
+void session_keys_free(session_key_table *table);
+
+#endif
