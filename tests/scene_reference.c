@@ -78,21 +78,29 @@ static const char introduction[] =
     "| `{q_criterion: u}`, `{lambda2: u}` | criteria of vortices: Q > 0, lambda2 < 0 | 1 | 2; 1 at the border |\n"
     "| `{strain_rate: u}` | sqrt(2 S:S), S being half of the slopes and their transposed | 1 | 2; 1 at the border |\n"
     "\n"
-    "Gradients are found at vertices, from all cells around each, on all ranks and on all meshes that have the field as\n"
-    "one, so that no border of ranks or blocks shows and any partition gives the same bits. Of a linear field they are\n"
+    "Gradients are found at vertices, from all cells around each, on all ranks and on all meshes that have the field "
+    "as\n"
+    "one, so that no border of ranks or blocks shows and any partition gives the same bits. Of a linear field they "
+    "are\n"
     "exact on every cell type. The order is that of lattices whose cells turn and stretch gradually; where cells are\n"
-    "moved at random an error of first order, of their amount, remains. On meshes of triangles, quads and polygons alone\n"
-    "gradients lie in the cells' planes. Values in cells are taken to the vertices first, which has an error of second\n"
-    "order of its own, and of first at the border unless the field has values there (`insitu_patch`). An expression of\n"
+    "moved at random an error of first order, of their amount, remains. On meshes of triangles, quads and polygons "
+    "alone\n"
+    "gradients lie in the cells' planes. Values in cells are taken to the vertices first, which has an error of "
+    "second\n"
+    "order of its own, and of first at the border unless the field has values there (`insitu_patch`). An expression "
+    "of\n"
     "fields in cells alone is a field in cells, without values on the boundary.\n"
     "\n"
-    "Values are made in the steps that need them, and again where what they are made of, or for gradients the mesh, has\n"
-    "changed. A component takes 4 bytes a vertex or cell, 8 where a field that it is made of has 8; the report says so.\n"
+    "Values are made in the steps that need them, and again where what they are made of, or for gradients the mesh, "
+    "has\n"
+    "changed. A component takes 4 bytes a vertex or cell, 8 where a field that it is made of has 8; the report says "
+    "so.\n"
     "While gradients of a vector are found, some 220 bytes a vertex are held. A number that is not finite makes the\n"
     "values that depend on it so, and those cells are not drawn; of gradients, cells with such a vertex do not count.\n"
     "A derived field is on the meshes that have all that it is made of.\n";
 
-static const scene_mapping *shown[32];
+enum { MOST_MAPPINGS = 128 };
+static const scene_mapping *shown[MOST_MAPPINGS];
 static int shown_count;
 
 /* Mappings with their paths in the file, each once, in the order a reader meets them. */
@@ -100,6 +108,10 @@ static void print_mapping(FILE *to, const scene_mapping *mapping, const char *pa
 {
     for (int i = 0; i < shown_count; i++) {
         if (shown[i] == mapping) return;
+    }
+    if (shown_count == MOST_MAPPINGS) {
+        fputs("scene_reference: there are more mappings than MOST_MAPPINGS\n", stderr);
+        exit(1);
     }
     shown[shown_count++] = mapping;
     fprintf(to, "\n## %s\n\n| key | value | default | meaning |\n|---|---|---|---|\n", *path ? path : "The file");

@@ -28,8 +28,8 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
 void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
                  const char *file, int line);
 
-/* Returns the values' sum, rounded once, divided by their number; NAN if there are none. Recentring leaves out less than
- * 2^-85 of the largest of 100 values, so that it has the same bits unless a sum is that near to a tie. */
+/* Returns the values' sum, rounded once, divided by their number; NAN if there are none. Recentring leaves out less
+ * than 2^-85 of the largest of 100 values, so that it has the same bits unless a sum is that near to a tie. */
 double mean_of(const double *values, int count);
 
 /* Goes into a folder of this name and the count of ranks, within the folder for scene files: each count's files are

@@ -23,7 +23,7 @@ struct insitu_blueprint {
     MPI_Comm comm;
     int part_count;
     door_part *parts;
-    int next_part; /* where the next search begins */
+    int next_part;  /* where the next search begins */
     int64_t round;  /* counts steps */
     bool is_begun;  /* something was set for the next step */
     node_log log;   /* of the sets since the last step */

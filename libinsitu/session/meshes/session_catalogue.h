@@ -56,8 +56,8 @@ typedef struct session_hanging {
     int64_t sent_total;
 } session_hanging;
 
-/* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are kept while the meshes
- * stay as they are. */
+/* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are kept while the
+ * meshes stay as they are. */
 typedef struct session_vertex_groups {
     uint64_t places;    /* session_joint.places that they are of; 0: not known */
     int64_t *firsts;    /* per mesh, the number of its first vertex, and at the end the number of vertices */

@@ -32,7 +32,7 @@
 typedef struct value_groups {
     int64_t count;
     const int64_t *starts; /* count + 1 entries */
-    int64_t *ends;   /* count entries */
+    int64_t *ends;         /* count entries */
     double *values;
     double *means;            /* count entries */
     unsigned char *are_faces; /* count entries: the values are those of faces, else those of cells or corners */
@@ -78,10 +78,10 @@ static void groups_free(value_groups *groups)
 }
 
 /* Sums finite values, each times scale, to the same bits in whatever order they stand. A value is rounded to a multiple
- * of a unit that is coarse enough for sums of such multiples to be exact; the rest of it, which is exact too, is rounded
- * to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate floating-point summation, 2008, section 3). The rests of
- * 100 values that are then left out are below 2^-85 of the largest value, so that the sum is rounded correctly but where
- * it is as near as that to a tie. */
+ * of a unit that is coarse enough for sums of such multiples to be exact; the rest of it, which is exact too, is
+ * rounded to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate floating-point summation, 2008, section 3).
+ * The rests of 100 values that are then left out are below 2^-85 of the largest value, so that the sum is rounded
+ * correctly but where it is as near as that to a tie. */
 static double sum_of(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
@@ -226,13 +226,9 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
 static bool update_groups(recentring *r, int ranks)
 {
     session_joint *joint = r->joint;
-    const session_vertex_groups_basis basis = {joint->places,
-                                               joint->count,
-                                               r->meshes,
-                                               joint->count > 1 ? joint->hanging.borders : NULL,
-                                               joint->homes,
-                                               joint->by_id,
-                                               ranks};
+    const session_vertex_groups_basis basis = {
+        joint->places, joint->count, r->meshes, joint->count > 1 ? joint->hanging.borders : NULL,
+        joint->homes,  joint->by_id, ranks};
     return session_update_vertex_groups(&basis, &joint->groups);
 }
 

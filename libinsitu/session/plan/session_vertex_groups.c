@@ -88,8 +88,8 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
         place_of(basis, out, one_vertex, group, place[0]);
         home[group] = -1;
         if (!session_homes_share(basis->homes, place[0])) continue;
-        home[group] = session_home(basis->homes, (const double(*)[3])place, 1, session_key_hash(key),
-                                   (int64_t)key->words[0]);
+        home[group] =
+            session_home(basis->homes, (const double(*)[3])place, 1, session_key_hash(key), (int64_t)key->words[0]);
         out->shared_counts[home[group]]++;
         out->shared_count++;
     }

@@ -19,11 +19,12 @@ static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"
 #define MESH_DEFAULT "the meshes that have the field"
 #define INTERPOLATE_HELP                                                                                               \
     "A field that has one value a cell is drawn by `cell` as it is, the same throughout each cell, and by `vertex` "   \
-    "by the means of the cells at each vertex, on all ranks, interpolated between the vertices (8 bytes a vertex are " \
-    "held). A field that has a value at each corner of each cell is drawn torn by `cell`, and by the means of the "    \
+    "by the means of the cells at each vertex, on all ranks, interpolated between the vertices (24 bytes a vertex "    \
+    "are held). A field that has a value at each corner of each cell is drawn torn by `cell`, and by the means of "    \
+    "the "                                                                                                             \
     "corners at each vertex by `vertex`. It does not matter to a field that has one value a vertex."
 #define ISO_INTERPOLATE_HELP                                                                                           \
-    "A field that has one value a cell is drawn by the means of the cells at each vertex, on all ranks (8 bytes "      \
+    "A field that has one value a cell is drawn by the means of the cells at each vertex, on all ranks (24 bytes "     \
     "a vertex are held). `cell` is refused: between cells of two values there is a face, not a surface of the value "  \
     "asked for. A field that has a value at each corner of each cell is drawn torn unless this says `vertex`."
 #define RANGE_DEFAULT "`data`"
