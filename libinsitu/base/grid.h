@@ -51,6 +51,13 @@ typedef struct grid_axis {
     int axis;
 } grid_axis;
 
+/* Returns the coordinate of vertex n. Numbers that only padding has, which loops over all numbers meet, get the last. */
+static inline double grid_axis_place(const grid_axis *axis, int64_t n)
+{
+    const int64_t index = grid_index_along(axis->vertices, axis->axis, n);
+    return axis->places[index < axis->count ? index : axis->count - 1];
+}
+
 /* Elements that are read one by one, at any address. Only values of fields and axes are; whoever makes a grid copies
  * other arrays of such elements. */
 typedef enum grid_odd {
@@ -162,7 +169,7 @@ static inline int64_t grid_element_bytes(const grid_array *a)
 
 static inline double grid_array_number(const grid_array *a, int64_t i)
 {
-    if (a->axis) return a->axis->places[grid_index_along(a->axis->vertices, a->axis->axis, i)];
+    if (a->axis) return grid_axis_place(a->axis, i);
     const char *p = a->data + i * a->stride;
     if (!a->is_integer) return a->is_wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
     if (a->odd) return grid_odd_number(a->odd, p);
