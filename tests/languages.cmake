@@ -30,6 +30,9 @@ endfunction()
 add_executable(blocks ${PROJECT_SOURCE_DIR}/examples/blocks.c)
 target_link_libraries(blocks PRIVATE insitu insitu_flags m)
 insitu_add_block_example(blocks blocks $<TARGET_FILE:blocks>)
+add_executable(levels ${PROJECT_SOURCE_DIR}/examples/levels.c)
+target_link_libraries(levels PRIVATE insitu insitu_flags m)
+insitu_add_block_example(levels levels $<TARGET_FILE:levels>)
 
 # C++: from the header alone, under more warnings than our own code has. MPI's header is the system's, and not asked.
 add_executable(six_calls_cpp ${PROJECT_SOURCE_DIR}/examples/six_calls.cpp)

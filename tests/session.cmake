@@ -27,6 +27,12 @@ insitu_session_program(test_session_lattice_changes)
 insitu_add_mpi_test(session_lattice_changes test_session_lattice_changes 1 3 WHOLE 2 TIMEOUT 120
   ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_blocks)
+insitu_add_mpi_test(session_blocks test_session_blocks 1 3 WHOLE 2 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
+insitu_session_program(test_session_levels)
+insitu_add_mpi_test(session_levels test_session_levels 1 3 WHOLE 2 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_slices)
 insitu_add_mpi_test(session_slices test_session_slices 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

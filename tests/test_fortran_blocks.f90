@@ -221,6 +221,24 @@ contains
         call expect(status == INSITU_OK, s%error())
         call s%set_filled_field('m', 'p', fill_layers, status)
         call expect(picture(s) == plain .or. rank /= 0, 'ghost layers, and values by a procedure')
+        call start(s)
+        call s%set_block('m', [2, 4, 4], status, spacing=spacing, first=first, refinement=[1, 1, 1], number=7, &
+            cell_layout=insitu_borrow(c(:2, :, :)))
+        call s%set_field('m', 'p', insitu_borrow(c(:2, :, :)), status, centring=INSITU_CELL, number=7)
+        call s%set_block('m', [4, 4, 4], status, spacing=spacing, first=first, number=8)
+        call s%set_block('m', [2, 4, 4], status, spacing=spacing, first=first + [2, 0, 0], refinement=[1, 1, 1], number=9, &
+            cell_layout=insitu_borrow(c(3:, :, :)))
+        call s%set_components('m', 'p', [insitu_borrow(c(3:, :, :))], status, centring=INSITU_CELL, number=9)
+        call expect(status == INSITU_OK, s%error())
+        call s%set_field('m', 'p', insitu_borrow(c), status, centring=INSITU_CELL)
+        call expect(status /= INSITU_OK, 'the mesh is of blocks')
+        call s%remove_mesh('m', status, number=8)
+        call expect(picture(s) == of_cells .or. rank /= 0, 'two blocks of one mesh draw the picture of hexes')
+        call start(s)
+        call s%set_block('m', [6, 6, 6], status, spacing=spacing, first=first - 1, interior_first=[2, 2, 2], &
+            interior_last=[5, 5, 5], number=3)
+        call s%set_filled_field('m', 'p', fill_layers, status, number=3)
+        call expect(picture(s) == plain .or. rank /= 0, 'values of a numbered block by a procedure')
     end subroutine hexes_are_drawn_by_blocks
 
     ! Their memory as lists.

@@ -308,7 +308,7 @@ def blocks_are_their_hexes():
 
 def levels_are_their_hexes():
     """A coarse level under a finer one of ratio 2 on each rank, cell values, isosurfaces across both: bitwise the hexes, of
-    which none is covered. Ghosts flag the covered ones."""
+    which none is covered. Ghosts flag the covered ones; or both are blocks of one mesh, and they are found."""
     origin, spacing = (0.1, -0.3, 0.7), (0.3, 0.2, 0.25)
 
     def centres(first, cells, ratio):
@@ -326,6 +326,15 @@ def levels_are_their_hexes():
             x, y, z = centres(first, cells, ratio)
             s.set_field(name, "f", 1 + 0.4 * x + numpy.sin(3 * y) * z, centring=insitu.CELL)
 
+    def set_numbered(s):
+        for number, (first, cells, ratio) in enumerate(levels.values()):
+            x, y, z = centres(first, cells, ratio)
+            for n in number, 10:  # number 10 goes again
+                s.set_block("amr", cells, origin=origin, spacing=tuple(h / ratio for h in spacing), first=first,
+                            refinement=(ratio,) * 3, number=n)
+                s.set_field("amr", "f", 1 + 0.4 * x + numpy.sin(3 * y) * z, centring=insitu.CELL, number=n)
+        s.remove_mesh("amr", number=10)
+
     def set_hexes(s):
         for name, (first, cells, ratio) in levels.items():
             axes = [origin[a] + spacing[a] / ratio * (first[a] + numpy.arange(cells[a] + 1)) for a in range(3)]
@@ -339,7 +348,9 @@ def levels_are_their_hexes():
             x, y, z = centres(first, cells, ratio)
             s.set_field(name, "f", (1 + 0.4 * x + numpy.sin(3 * y) * z)[own], centring=insitu.CELL)
 
-    everywhere(drawn("levels", set_blocks) == drawn("levels", set_hexes), "levels of blocks are levels of hexes")
+    hexes = drawn("levels", set_hexes)
+    everywhere(drawn("levels", set_blocks) == hexes, "levels of blocks are levels of hexes")
+    everywhere(drawn("levels", set_numbered) == hexes, "levels of blocks of one mesh are levels of hexes")
 
 
 def blocks_of_two_dimensions_are_their_quads():

@@ -68,6 +68,7 @@ module insitu
         real(c_double) :: origin(3), spacing(3)
         integer(c_int64_t) :: first(3)
         type(c_array) :: axes(3)
+        integer(c_int64_t) :: refinement(3)
     end type c_lattice
 
     type, bind(C) :: c_mesh
@@ -188,9 +189,9 @@ module insitu
         type(fill_record), pointer :: next => null()
     end type fill_record
 
-    ! Sizes of a mesh that was handed over: they tell how long the index of a field must be.
+    ! Sizes of a mesh or block that was handed over: they tell how long the index of a field must be.
     type :: mesh_size
-        character(:), allocatable :: name
+        character(:), allocatable :: name ! or name[number]
         integer(c_int64_t) :: vertices = 0, cells = 0, corners = 0
         integer :: cell_size = 0 ! vertices of a cell; 0: cells have offsets
         type(block_shape) :: block
@@ -202,6 +203,7 @@ module insitu
         type(c_ptr) :: handle = c_null_ptr
         character(:), allocatable :: own_error ! about an argument that was not passed to C
         type(mesh_size), allocatable :: sizes(:)
+        integer :: size_count = 0, last_size = 1 ! how many are in use; the last that was looked for
         type(fill_record), pointer :: fills => null()
     contains
         procedure, private :: create_integer, create_f08, text_integer, text_f08
@@ -264,6 +266,19 @@ module insitu
             character(kind=c_char), intent(in) :: mesh(*)
             type(c_field), intent(in) :: field
         end function c_set_field
+        integer(c_int) function c_set_block(session, name, number, mesh) bind(C, name='insitu_set_block')
+            import :: c_int, c_char, c_ptr, c_int64_t
+            type(c_ptr), value :: session, mesh
+            integer(c_int64_t), value :: number
+            character(kind=c_char), intent(in) :: name(*)
+        end function c_set_block
+        integer(c_int) function c_set_block_field(session, mesh, number, field) bind(C, name='insitu_set_block_field')
+            import :: c_int, c_char, c_ptr, c_int64_t, c_field
+            type(c_ptr), value :: session
+            integer(c_int64_t), value :: number
+            character(kind=c_char), intent(in) :: mesh(*)
+            type(c_field), intent(in) :: field
+        end function c_set_block_field
         integer(c_int) function c_step(session, cycle, time) bind(C, name='insitu_step')
             import :: c_int, c_ptr, c_int64_t, c_double
             type(c_ptr), value :: session
@@ -617,7 +632,8 @@ contains
         character(:), allocatable, intent(out) :: fault
         type(c_array), parameter :: none = c_array(c_null_ptr, float32, 0)
         integer(c_int64_t), parameter :: zero(3) = 0
-        lattice = c_lattice(zero, zero, zero, zero, zero, [0, 0, 0], [0, 0, 0], zero, [none, none, none])
+        lattice = c_lattice(zero, zero, zero, zero, zero, [0, 0, 0], [0, 0, 0], zero, [none, none, none], &
+            zero)
         fault = 'cells are '//as_text(int(cells, c_int64_t))//', expected two or three numbers of at least 1, or all 0 '// &
             'without cells'
         if (size(cells) < 2 .or. size(cells) > 3) return
@@ -641,18 +657,20 @@ contains
             as_text([int(dimensions, c_int64_t)])//', one for each axis'
     end subroutine check_size
 
-    subroutine put_ranges(lattice, dimensions, fault, spacing, origin, first, interior_first, interior_last)
+    subroutine put_ranges(lattice, dimensions, fault, spacing, origin, first, interior_first, interior_last, refinement)
         type(c_lattice), intent(inout) :: lattice
         integer, intent(in) :: dimensions
         character(:), allocatable, intent(inout) :: fault
         real(real64), intent(in), optional :: spacing(:), origin(:)
-        integer, intent(in), optional :: first(:), interior_first(:), interior_last(:)
+        integer, intent(in), optional :: first(:), interior_first(:), interior_last(:), refinement(:)
+        if (present(refinement)) call check_size('refinement', size(refinement), dimensions, fault)
         if (present(spacing)) call check_size('spacing', size(spacing), dimensions, fault)
         if (present(origin)) call check_size('origin', size(origin), dimensions, fault)
         if (present(first)) call check_size('first', size(first), dimensions, fault)
         if (present(interior_first)) call check_size('interior_first', size(interior_first), dimensions, fault)
         if (present(interior_last)) call check_size('interior_last', size(interior_last), dimensions, fault)
-        if (len(fault) == 0 .and. .not. present(spacing) .and. (present(origin) .or. present(first))) &
+        if (len(fault) == 0 .and. .not. present(spacing) .and. &
+            (present(origin) .or. (present(first) .and. .not. present(refinement)))) &
             fault = 'spacing is not given, and origin or first is; expected it for a uniform block'
         if (len(fault) == 0 .and. (present(interior_first) .neqv. present(interior_last))) &
             fault = 'one of interior_first and interior_last is given, expected both or none'
@@ -660,6 +678,8 @@ contains
         if (present(spacing)) lattice%spacing(:size(spacing)) = spacing
         if (present(origin)) lattice%origin(:size(origin)) = origin
         if (present(first)) lattice%first(:size(first)) = first
+        if (present(refinement)) lattice%refinement = 1
+        if (present(refinement)) lattice%refinement(:size(refinement)) = refinement
         if (.not. present(interior_first)) return
         lattice%interior_end(3) = 1
         lattice%interior_first(:size(interior_first)) = interior_first - 1
@@ -945,12 +965,12 @@ contains
     ! then faces and face_offsets are the faces' vertices and where each face begins, or face_lists replaces them. All
     ! indices and offsets count from 1, or from index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
-        ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order, face_lists)
+        ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order, face_lists, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity
         integer, intent(out) :: status
-        integer, intent(in), optional :: cell_type, changed, index_base, vertex_order
+        integer, intent(in), optional :: cell_type, changed, index_base, vertex_order, number
         type(insitu_array), intent(in), optional :: cell_types, offsets, faces, face_offsets, ghosts, vertex_ids
         type(insitu_face_lists), intent(in), optional :: face_lists
         logical, intent(in), optional :: keep_polyhedra
@@ -958,7 +978,7 @@ contains
         integer(c_int64_t) :: gap ! elements between one column's last and the next one's first
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
-        character(:), allocatable :: fault
+        character(:), allocatable :: fault, part
         integer :: axis, corners
         nothing = 0
         call c_mesh_defaults(mesh)
@@ -1005,10 +1025,11 @@ contains
         end if
         fault = find_length(mesh%cell_count, mesh%vertex_count, connectivity%rows, corners, given(1:5))
         if (is_refused(self, fault)) return
-        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_loc(mesh)), status)
+        call set_part(self, name, c_loc(mesh), status, number)
         if (present(offsets) .or. present(cell_types)) corners = 0
         if (status /= INSITU_OK) return
-        call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, &
+        part = part_name(name, number)
+        call note_size(self, mesh_size(part, mesh%vertex_count, mesh%cell_count, &
             merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
 
@@ -1104,7 +1125,7 @@ contains
         logical, intent(in), optional :: keep_polyhedra
         type(insitu_array) :: given(4)
         real(real64), target :: nothing
-        character(:), allocatable :: fault
+        character(:), allocatable :: fault, part
         integer :: axis
         nothing = 0
         mesh%index_base = 1
@@ -1132,8 +1153,23 @@ contains
         if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
         call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_loc(mesh)), status)
         if (status /= INSITU_OK) return
-        call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
+        part = part_name(name)
+        call note_size(self, mesh_size(part, mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
     end subroutine set_owned
+
+    ! Hands a mesh to C, or one of its blocks where a number is given; mesh: none takes it away.
+    subroutine set_part(self, name, mesh, status, number)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        type(c_ptr), intent(in) :: mesh
+        integer, intent(out) :: status
+        integer, intent(in), optional :: number
+        if (present(number)) then
+            call take_status(self, c_set_block(self%handle, as_c_text(name), int(number, c_int64_t), mesh), status)
+        else
+            call take_status(self, c_set_mesh(self%handle, as_c_text(name), mesh), status)
+        end if
+    end subroutine set_part
 
     ! As find_length(). given: ghosts, vertex_ids.
     function find_face_length(vertices, cells, given) result(out)
@@ -1182,78 +1218,108 @@ contains
         end select
     end function corners_of
 
-    subroutine note_size(sizes, new)
-        type(mesh_size), allocatable, intent(inout) :: sizes(:)
+    subroutine note_size(self, new)
+        class(insitu_session), intent(inout) :: self
         type(mesh_size), intent(in) :: new
-        integer :: i
-        if (.not. allocated(sizes)) allocate (sizes(0))
-        do i = 1, size(sizes)
-            if (sizes(i)%name /= new%name) cycle
-            sizes(i) = new
-            return
-        end do
-        sizes = [sizes, new]
+        type(mesh_size), allocatable :: more(:)
+        integer :: at
+        at = size_at(self, new%name)
+        if (at == 0) then
+            if (.not. allocated(self%sizes)) allocate (self%sizes(8))
+            if (self%size_count == size(self%sizes)) then
+                allocate (more(2 * self%size_count))
+                more(:self%size_count) = self%sizes
+                call move_alloc(more, self%sizes)
+            end if
+            self%size_count = self%size_count + 1
+            at = self%size_count
+        end if
+        self%sizes(at) = new
+        self%last_size = at
     end subroutine note_size
 
-    ! The shape of a mesh that is a block, for fields at its vertices or in its cells.
-    function block_of(sizes, mesh, centring) result(out)
-        type(mesh_size), allocatable, intent(in) :: sizes(:)
-        character(*), intent(in) :: mesh
+    ! How a part of a mesh is called among the sizes.
+    function part_name(name, number) result(out)
+        character(*), intent(in) :: name
+        integer, intent(in), optional :: number
+        character(:), allocatable :: out
+        out = trim(name)
+        if (present(number)) out = out//'['//as_text([int(number, c_int64_t)])//']'
+    end function part_name
+
+    ! Where a part stands among the sizes; 0: it is not there. Parts are mostly looked for in the order in which they stand,
+    ! so the search begins at the last one.
+    integer function size_at(self, name)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        integer :: i
+        do i = 1, self%size_count
+            size_at = 1 + mod(self%last_size + i - 2, self%size_count)
+            if (self%sizes(size_at)%name /= name) cycle
+            self%last_size = size_at
+            return
+        end do
+        size_at = 0
+    end function size_at
+
+    ! The shape of a part that is a block, for fields at its vertices or in its cells.
+    function block_of(self, part, centring) result(out)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: part
         integer(c_int), intent(in) :: centring
         type(block_shape) :: out
-        integer :: i
-        if (.not. allocated(sizes) .or. (centring /= INSITU_VERTEX .and. centring /= INSITU_CELL)) return
-        do i = 1, size(sizes)
-            if (sizes(i)%name == trim(mesh)) out = sizes(i)%block
-        end do
+        integer :: at
+        if (centring /= INSITU_VERTEX .and. centring /= INSITU_CELL) return
+        at = size_at(self, part)
+        if (at > 0) out = self%sizes(at)%block
     end function block_of
 
-    ! Has the index of a field an entry for each vertex, cell or corner of the mesh? What C refuses anyway is well.
-    logical function is_as_long(sizes, mesh, centring, row, length)
-        type(mesh_size), allocatable, intent(in) :: sizes(:)
-        character(*), intent(in) :: mesh
+    ! Has the index of a field an entry for each vertex, cell or corner of the part? What C refuses anyway is well.
+    logical function is_as_long(self, part, centring, row, length)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: part
         integer(c_int), intent(in) :: centring
         integer(c_int64_t), intent(in) :: row, length
-        integer :: i
+        integer :: at
         is_as_long = .true.
-        if (.not. allocated(sizes)) return
-        do i = 1, size(sizes)
-            if (sizes(i)%name /= trim(mesh)) cycle
-            select case (centring)
-            case (INSITU_VERTEX); is_as_long = length == sizes(i)%vertices
-            case (INSITU_CELL); is_as_long = length == sizes(i)%cells
-            case default
-                is_as_long = length == sizes(i)%corners
-                if (row > 0) is_as_long = length >= (sizes(i)%cells - 1) * row + sizes(i)%cell_size
-            end select
-        end do
+        at = size_at(self, part)
+        if (at == 0) return
+        select case (centring)
+        case (INSITU_VERTEX); is_as_long = length == self%sizes(at)%vertices
+        case (INSITU_CELL); is_as_long = length == self%sizes(at)%cells
+        case default
+            is_as_long = length == self%sizes(at)%corners
+            if (row > 0) is_as_long = length >= (self%sizes(at)%cells - 1) * row + self%sizes(at)%cell_size
+        end select
     end function is_as_long
 
     ! Hand over this rank's part of a mesh as a structured block of so many cells along i, j and k, or along i and j: then
-    ! they are quads. docs/structured.md is the page about blocks. Uniform: spacing and origin (0 by default), of the whole
+    ! they are quads. With a number from 0 on it is one of several blocks of the mesh. refinement: how many of its cells make
+    ! one of the coarsest level along each axis; cells that finer blocks cover are not drawn. docs/structured.md is the page about blocks. Uniform: spacing and origin (0 by default), of the whole
     ! lattice, of which first cells lie before the block along each axis. Rectilinear: x, y, z are lists along the axes.
     ! Curvilinear: x, y, z (i, j, k). Cells with indices from interior_first to interior_last, counted from 1, are drawn,
     ! the others are ghost layers. vertex_layout, cell_layout: any arrays that lie in memory as those of later fields at
     ! vertices and in cells do; without them, and where no other array is given, fields are packed with i fastest.
     subroutine set_block(self, name, cells, status, spacing, origin, first, x, y, z, interior_first, interior_last, ghosts, &
-        vertex_ids, vertex_layout, cell_layout, changed)
+        vertex_ids, vertex_layout, cell_layout, changed, refinement, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         integer, intent(in) :: cells(:)
         integer, intent(out) :: status
         real(real64), intent(in), optional :: spacing(:), origin(:)
-        integer, intent(in), optional :: first(:), interior_first(:), interior_last(:), changed
+        integer, intent(in), optional :: first(:), interior_first(:), interior_last(:), changed, refinement(:), number
         type(insitu_array), intent(in), optional :: x, y, z, ghosts, vertex_ids, vertex_layout, cell_layout
         type(c_mesh), target :: mesh
         type(c_lattice), target :: lattice
         type(block_shape) :: block
         type(block_array) :: laid
         real(real64), target :: nothing
-        character(:), allocatable :: fault
+        character(:), allocatable :: fault, part
         nothing = 0
         call c_mesh_defaults(mesh)
         call make_block(cells, lattice, block, fault)
-        if (len(fault) == 0) call put_ranges(lattice, size(cells), fault, spacing, origin, first, interior_first, interior_last)
+        if (len(fault) == 0) call put_ranges(lattice, size(cells), fault, spacing, origin, first, &
+            interior_first, interior_last, refinement)
         call borrow_for(block, 'vertex_layout', 1, .true., laid, fault, nothing, vertex_layout)
         call borrow_for(block, 'cell_layout', 2, .true., laid, fault, nothing, cell_layout)
         call put_places(block, mesh, lattice, 1, 'x', fault, nothing, x)
@@ -1275,32 +1341,34 @@ contains
         mesh%index_base = 1
         if (present(changed)) mesh%changed = changed
         mesh%lattice = c_loc(lattice)
-        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_loc(mesh)), status)
+        call set_part(self, name, c_loc(mesh), status, number)
         if (status /= INSITU_OK) return
-        call note_size(self%sizes, mesh_size(name(:len_trim(name)), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0, block))
+        part = part_name(name, number)
+        call note_size(self, mesh_size(part, mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0, block))
     end subroutine set_block
 
-    ! Take this rank's part of a mesh away.
-    subroutine remove_mesh(self, name, status)
+    ! Take this rank's part of a mesh away, or the block of that number.
+    subroutine remove_mesh(self, name, status, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         integer, intent(out) :: status
+        integer, intent(in), optional :: number
         status = INSITU_ERROR_ARGUMENT
         if (is_refused(self, find_zero(name))) return
-        call take_status(self, c_set_mesh(self%handle, as_c_text(name), c_null_ptr), status)
+        call set_part(self, name, c_null_ptr, status, number)
     end subroutine remove_mesh
 
     ! Hand over this rank's part of a field: a list, or a matrix (components, tuples); on a block (i, j, k), with
     ! components before or after. index: the tuple that each
     ! vertex, cell or corner has, from 1 or from the mesh's index_base; for corners a list, or a matrix (corners,
     ! cells), also its first rows. corner_row, for corners: tuples (or entries of a list index) from the first of a cell
-    ! to that of the next. patches, for cells: the values on the boundary.
-    subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row, patches)
+    ! to that of the next. patches, for cells: the values on the boundary. number: of a block of the mesh.
+    subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row, patches, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
         type(insitu_array), intent(in) :: values
         integer, intent(out) :: status
-        integer, intent(in), optional :: centring, changed, corner_row
+        integer, intent(in), optional :: centring, changed, corner_row, number
         type(insitu_array), intent(in), optional :: index
         type(insitu_patch), intent(in), optional :: patches(:)
         type(c_patch), allocatable, target :: table(:)
@@ -1325,7 +1393,7 @@ contains
         field%values%stride = values%stride
         status = INSITU_ERROR_ARGUMENT
         fault = find_zero(name, mesh)
-        block = block_of(self%sizes, mesh, field%centring)
+        block = block_of(self, part_name(mesh, number), field%centring)
         if (block%dimensions > 0) call borrow_for(block, 'index', field%centring + 1, .false., laid, fault, nothing, index)
         if (present(index)) then
             field%index = laid%array
@@ -1345,7 +1413,7 @@ contains
                 fault = 'index is a list, and a matrix is given'
             else if (field%corner_row == 0 .and. .not. is_list(index)) then
                 fault = 'index has gaps between its columns'
-            else if (.not. is_as_long(self%sizes, mesh, field%centring, field%corner_row, entries)) then
+            else if (.not. is_as_long(self, part_name(mesh, number), field%centring, field%corner_row, entries)) then
                 fault = 'index has not as many entries as the mesh has vertices, cells or corners'
             end if
             status = INSITU_ERROR_ARGUMENT
@@ -1360,18 +1428,32 @@ contains
             field%patch_count = size(patches)
             if (size(patches) > 0) field%patches = c_loc(table)
         end if
-        call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
+        call set_part_field(self, mesh, field, status, number)
     end subroutine set_field
+
+    ! Hands a field to C, of one of the blocks of its mesh if a number is given.
+    subroutine set_part_field(self, mesh, field, status, number)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: mesh
+        type(c_field), intent(in) :: field
+        integer, intent(out) :: status
+        integer, intent(in), optional :: number
+        if (present(number)) then
+            call take_status(self, c_set_block_field(self%handle, as_c_text(mesh), int(number, c_int64_t), field), status)
+        else
+            call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
+        end if
+    end subroutine set_part_field
 
     ! Hand over this rank's part of a field whose components are arrays of their own, of any types:
     ! call pictures%set_components('domain', 'velocity', [insitu_borrow(u), insitu_borrow(v), insitu_borrow(w)], status).
-    ! Local.
-    subroutine set_components(self, mesh, name, components, status, centring, changed)
+    ! number: of a block of the mesh. Local.
+    subroutine set_components(self, mesh, name, components, status, centring, changed, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
         type(insitu_array), intent(in) :: components(:)
         integer, intent(out) :: status
-        integer, intent(in), optional :: centring, changed
+        integer, intent(in), optional :: centring, changed, number
         type(c_array), target :: table(max(1, size(components)))
         type(block_shape) :: block
         type(block_array) :: laid
@@ -1388,7 +1470,7 @@ contains
         if (present(changed)) field%changed = changed
         fault = find_zero(name, mesh)
         if (size(components) == 0) fault = 'components are none'
-        block = block_of(self%sizes, mesh, field%centring)
+        block = block_of(self, part_name(mesh, number), field%centring)
         do i = 1, size(components)
             if (block%dimensions > 0) then
                 call borrow_for(block, 'components', field%centring + 1, .false., laid, fault, nothing, components(i))
@@ -1405,7 +1487,7 @@ contains
         if (is_refused(self, fault)) return
         field%component_count = size(components)
         field%components = c_loc(table)
-        call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
+        call set_part_field(self, mesh, field, status, number)
     end subroutine set_components
 
     subroutine put_block_values(block, field, values, nothing, fault)
@@ -1518,27 +1600,27 @@ contains
     end function record_of
 
     ! Hand over this rank's part of a field of so many components, whose values fill makes in the steps that need them.
-    subroutine set_filled_field(self, mesh, name, fill, status, centring, components)
+    subroutine set_filled_field(self, mesh, name, fill, status, centring, components, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
         procedure(insitu_fill) :: fill
         integer, intent(out) :: status
-        integer, intent(in), optional :: centring, components
+        integer, intent(in), optional :: centring, components, number
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(fill_record), pointer :: record
         type(c_field) :: field
         status = INSITU_ERROR_ARGUMENT
         if (is_refused(self, find_zero(name, mesh))) return
         c_name = as_c_text(name)
-        record => record_of(self, mesh, name)
+        record => record_of(self, part_name(mesh, number), name)
         call c_field_defaults(field)
         field%name = c_loc(c_name)
         if (present(centring)) field%centring = centring
         if (present(components)) field%component_count = components
-        record%block = block_of(self%sizes, mesh, field%centring)
+        record%block = block_of(self, part_name(mesh, number), field%centring)
         field%fill = c_funloc(run_fill)
         field%fill_data = c_loc(record)
-        call take_status(self, c_set_field(self%handle, as_c_text(mesh), field), status)
+        call set_part_field(self, mesh, field, status, number)
         if (status == INSITU_OK) record%fill => fill
     end subroutine set_filled_field
 

@@ -55,6 +55,7 @@ class _Lattice(ctypes.Structure):
         ("spacing", ctypes.c_double * 3),
         ("first", ctypes.c_int64 * 3),
         ("axes", _Array * 3),
+        ("refinement", ctypes.c_int64 * 3),
     ]
 
 
@@ -204,6 +205,8 @@ def _load():
         ("insitu_field_defaults", None, [ctypes.POINTER(_Field)]),
         ("insitu_set_mesh", ctypes.c_int, [pointer, text, ctypes.POINTER(_Mesh)]),
         ("insitu_set_field", ctypes.c_int, [pointer, text, ctypes.POINTER(_Field)]),
+        ("insitu_set_block", ctypes.c_int, [pointer, text, ctypes.c_int64, ctypes.POINTER(_Mesh)]),
+        ("insitu_set_block_field", ctypes.c_int, [pointer, text, ctypes.c_int64, ctypes.POINTER(_Field)]),
         ("insitu_step", ctypes.c_int, [pointer, ctypes.c_int64, ctypes.c_double]),
         ("insitu_last_report", ctypes.POINTER(_Report), [pointer]),
         ("insitu_parameter", ctypes.c_int, [pointer, text, ctypes.POINTER(ctypes.c_double)]),
@@ -549,6 +552,10 @@ def _fill_by(make, index, row, block, made, raised, running):
     return _Fill(fill)
 
 
+_MESH_CALLS = _library.insitu_set_mesh, _library.insitu_set_block  # of a whole mesh, and of a block
+_FIELD_CALLS = _library.insitu_set_field, _library.insitu_set_block_field
+
+
 class Session:
     """A session. Opening and closing it and step() are collective: every rank of the communicator calls them."""
 
@@ -557,9 +564,11 @@ class Session:
         if scene is not None and scene_text is not None:
             raise TypeError("scene, scene_text: both are given, expected one of them")
         self._session = ctypes.c_void_p()
-        self._counts = {}  # mesh: its vertices, cells and corners, and the vertices of a cell
-        self._blocks = {}  # mesh: its _Block, if it is one
-        self._held = {}  # mesh: {None: what the mesh borrows, field: what that borrows}
+        # Of each part: (mesh, None) if it is whole, or (mesh, a block's number).
+        self._counts = {}  # its vertices, cells and corners, and the vertices of a cell
+        self._blocks = {}  # its _Block, if it is one
+        self._held = {}  # {None: what the part borrows, field: what that borrows}
+        self._numbers = {}  # mesh: the numbers of its parts
         self._retired = []  # borrowed before it was set again: until a step has returned
         self._made = []  # by callables: until the step has returned
         self._raised = []  # by callables, in this step
@@ -575,8 +584,8 @@ class Session:
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
                  keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL, boundary_faces=None,
                  boundary_face_offsets=None, boundary_owner=None, halo_cell_count=0, open_offsets=False,
-                 cell_type_map=None):
-        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h),
+                 cell_type_map=None, number=None):
+        """Hand over this rank's part of a mesh, or, with a number from 0 on, one of the blocks that it consists of. Local. faces: the faces' vertices (face_connectivity of insitu.h),
         or a list of arrays, one a face, without face_offsets. For cells of one type, connectivity may be the first
         columns of a table: nodes[:, :8]. Finite-volume codes may give owner, neighbour and cell_count instead of
         connectivity, cell_type, cell_types and offsets; boundary_faces, boundary_face_offsets and boundary_owner, if
@@ -631,23 +640,25 @@ class Session:
         mesh.neighbour_count = counts.get("neighbour", 0)
         mesh.cell_count = self._cell_count(counts, cells) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
-        self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
+        self._hand_over(_MESH_CALLS, name, number, mesh, None, held)
         size = _CORNERS.get(mesh.cell_type, 0) if cell_types is None and offsets is None else 0
         corners = mesh.cell_count * size if size else mesh.connectivity_count
-        self._counts[name] = mesh.vertex_count, mesh.cell_count, corners, size
-        self._blocks.pop(name, None)
+        self._take_place(name, number)
+        self._counts[name, number] = mesh.vertex_count, mesh.cell_count, corners, size
+        self._blocks.pop((name, number), None)
 
     def set_block(self, name, cells, *, spacing=None, origin=None, first=None, coordinates=None, interior_first=None,
                   interior_end=None, ghosts=None, vertex_ids=None, vertex_layout=None, cell_layout=None,
-                  changed=CHANGED_ALL):
+                  refinement=None, number=None, changed=CHANGED_ALL):
         """Hand over this rank's part of a mesh as a structured block of so many cells along i, j and k, or along i and j:
-        then they are quads. Local. All arrays are [i, j, k], in any order and with any padding, in one of the vertices
+        then they are quads. With a number from 0 on it is one of several blocks of the mesh. Local. All arrays are [i, j, k], in any order and with any padding, in one of the vertices
         and in one of the cells. docs/structured.md is the page about blocks.
 
         Uniform: spacing and origin (0 by default), of the whole lattice, in which the block's first vertex has the indices
         first. Rectilinear: coordinates=(x, y, z), lists along the axes. Curvilinear: coordinates=(x, y, z), arrays, or
         one array with components x, y, z. Cells from interior_first to interior_end - 1 are drawn, the others are ghost
-        layers. vertex_layout, cell_layout: any arrays that lie as those of later fields do; without them, and where no
+        layers. refinement: how many of its cells make one of the coarsest level along each axis; cells that finer blocks of
+        the mesh cover are not drawn. vertex_layout, cell_layout: any arrays that lie as those of later fields do; without them, and where no
         other array is given, fields are packed with k fastest."""
         mesh, lattice, held = _Mesh(), _Lattice(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
@@ -657,8 +668,11 @@ class Session:
         rank = len(cells)
         if (spacing is None) == (coordinates is None):
             raise TypeError("spacing, coordinates: expected one of them")
-        _put_places(lattice, rank, spacing, origin, first)
+        _put_places(lattice, rank, spacing, origin, first if spacing is not None or refinement is None else None)
         _put_interior(lattice, rank, interior_first, interior_end)
+        if refinement is not None:
+            lattice.refinement[:] = _numbers("refinement", refinement, rank, operator.index, 1)
+            lattice.first[:] = _numbers("first", (0, 0, 0) if first is None else first, rank, operator.index)
         for what, given, of in ("vertex_layout", vertex_layout, VERTEX), ("cell_layout", cell_layout, CELL):
             if given is not None:
                 block.borrow(what, given, of, True)
@@ -673,19 +687,38 @@ class Session:
             strides[:] = block.strides_of(of) + (1,) * (3 - rank)
         mesh.vertex_count, mesh.cell_count, mesh.changed = block.count(VERTEX), block.count(CELL), changed
         mesh.lattice = ctypes.pointer(lattice)
-        self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
-        self._counts[name] = mesh.vertex_count, mesh.cell_count, 0, 0
-        self._blocks[name] = block
+        self._hand_over(_MESH_CALLS, name, number, mesh, None, held)
+        self._take_place(name, number)
+        self._counts[name, number] = mesh.vertex_count, mesh.cell_count, 0, 0
+        self._blocks[name, number] = block
 
-    def remove_mesh(self, name):
-        """Take this rank's part of a mesh away, and its fields. Local."""
-        _check(_library.insitu_set_mesh(self._open(), _encoded("name", name), None), self._session, False)
-        self._retired.append(self._held.pop(name, None))
-        self._blocks.pop(name, None)
+    def remove_mesh(self, name, *, number=None):
+        """Take this rank's part of a mesh away, or the block of that number, and its fields. Local."""
+        text = _encoded("name", name)
+        if number is None:
+            _check(_library.insitu_set_mesh(self._open(), text, None), self._session, False)
+        else:
+            _check(_library.insitu_set_block(self._open(), text, number, None), self._session, False)
+        for part in list(self._numbers.get(name, ())) if number is None else [number]:
+            self._drop(name, part)
+
+    def _drop(self, name, number):
+        self._retired.append(self._held.pop((name, number), None))
+        self._blocks.pop((name, number), None)
+        self._counts.pop((name, number), None)
+        self._numbers.get(name, set()).discard(number)
+
+    def _take_place(self, name, number):
+        """A mesh is whole or of blocks: the other is gone."""
+        numbers = self._numbers.setdefault(name, set())
+        if number is None or None in numbers:
+            for other in [other for other in numbers if other != number]:
+                self._drop(name, other)
+        numbers.add(number)
 
     def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
-                  patches=(), changed=CHANGED_ALL):
-        """Hand over this rank's part of a field: values of n tuples, or n x components, or a list of arrays, one for each
+                  patches=(), number=None, changed=CHANGED_ALL):
+        """Hand over this rank's part of a field, or of that on the block of this number: values of n tuples, or n x components, or a list of arrays, one for each
         component, of any types; on a block [i, j, k], or with
         components before or after. index: the tuple that each vertex, cell or corner has, from the mesh's index_base on; for corners it may be the first columns of a table:
         dofs[:, :8]. corner_row, for corners: values (or entries of index) from one cell's first to the next one's.
@@ -698,21 +731,21 @@ class Session:
         field.centring = _constant("centring", centring, "insitu.VERTEX, insitu.CELL or insitu.CORNER")
         field.name, field.changed = _encoded("name", name), changed
         if index is not None:
-            borrowed, _, corner_row, array = self._index(mesh, index, centring, corner_row)
+            borrowed, _, corner_row, array = self._index((mesh, number), index, centring, corner_row)
             held.append(array)
+        block = None if index is not None else self._blocks.get((mesh, number))
         if callable(values):
             if len(patches) > 0:
                 raise TypeError("patches: are given, and values are made by a callable; expected an array of values")
-            field.fill = _fill_by(values, borrowed, corner_row, None if index is not None else self._blocks.get(mesh),
-                                  self._made, self._raised, self._running)
+            field.fill = _fill_by(values, borrowed, corner_row, block, self._made, self._raised, self._running)
             field.component_count = components
             held.append(field.fill)
         else:
-            held.append(_put_values(field, values, None if index is not None else self._blocks.get(mesh)))
+            held.append(_put_values(field, values, block))
             field.index = borrowed
             held.append(_patches(field, patches))
         field.corner_row = corner_row
-        self._hand_over(_library.insitu_set_field, mesh, field, name, held)
+        self._hand_over(_FIELD_CALLS, mesh, number, field, name, held)
 
     def step(self, cycle, time):
         """Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable."""
@@ -800,19 +833,23 @@ class Session:
         if self._running:
             _check(1, self._session, False)  # INSITU_ERROR_ARGUMENT
 
-    def _hand_over(self, call, mesh, description, key, arrays):
+    def _hand_over(self, calls, mesh, number, description, key, arrays):
         """Those borrowed before are held until a step has returned, or with these if the call is refused."""
         mesh_name = _encoded("mesh", mesh)
-        fields = self._held.setdefault(mesh, {})
+        fields = self._held.setdefault((mesh, number), {})
         before = fields.get(key, [])
         fields[key] = before + arrays
-        _check(call(self._open(), mesh_name, ctypes.byref(description)), self._session, False)
+        if number is None:
+            status = calls[0](self._open(), mesh_name, ctypes.byref(description))
+        else:
+            status = calls[1](self._open(), mesh_name, operator.index(number), ctypes.byref(description))
+        _check(status, self._session, False)
         self._retired.append(before)
         fields[key] = arrays
 
-    def _index(self, mesh, given, centring, row):
+    def _index(self, part, given, centring, row):
         """The index of a field, its length, and its row where it is of corners and has gaps."""
-        counts, block = self._counts.get(mesh), self._blocks.get(mesh)
+        counts, block = self._counts.get(part), self._blocks.get(part)
         if block is not None and centring in (VERTEX, CELL):
             borrowed, _, _, array = block.borrow("index", given, centring)
             return borrowed, None, row, array

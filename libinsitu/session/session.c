@@ -156,7 +156,7 @@ insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, co
 {
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_mesh")) return INSITU_ERROR_ARGUMENT;
-    session_set_mesh(&session->meshes, mesh_name, mesh, &error);
+    session_set_mesh(&session->meshes, mesh_name, SESSION_WHOLE, mesh, &error);
     return keep_error(session, &error);
 }
 
@@ -164,7 +164,24 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
 {
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
-    session_set_field(&session->meshes, mesh_name, field, &error);
+    session_set_field(&session->meshes, mesh_name, SESSION_WHOLE, field, &error);
+    return keep_error(session, &error);
+}
+
+insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, int64_t block, const insitu_mesh *mesh)
+{
+    base_error error = {.status = INSITU_OK};
+    if (!session || is_in_fill(session, "insitu_set_block")) return INSITU_ERROR_ARGUMENT;
+    session_set_mesh(&session->meshes, mesh_name, block, mesh, &error);
+    return keep_error(session, &error);
+}
+
+insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_name, int64_t block,
+                                     const insitu_field *field)
+{
+    base_error error = {.status = INSITU_OK};
+    if (!session || is_in_fill(session, "insitu_set_block_field")) return INSITU_ERROR_ARGUMENT;
+    session_set_field(&session->meshes, mesh_name, block, field, &error);
     return keep_error(session, &error);
 }
 

@@ -1,9 +1,9 @@
 /* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
- * minimum), the lowest rank with an error, whether cells, coordinates or names changed anywhere, whether all tables of
- * names are equal, whether any rank lacks threads, the lowest of the instruction sets, whether any field has a fill
- * function, and the lowest rank that has a warning for all. From rank 0 it has the time, whether the scene file was
- * edited, whether pictures could not be written, and whether they are written in the step. After it, all ranks decide
- * alike without further messages. */
+ * minimum), the lowest rank with an error, whether cells, coordinates, levels of refinement or names changed anywhere,
+ * whether all tables of names are equal, whether any rank lacks threads, the lowest of the instruction sets, whether
+ * any field has a fill function, and the lowest rank that has a warning for all. From rank 0 it has the time, whether
+ * the scene file was edited, whether pictures could not be written, and whether they are written in the step. After it,
+ * all ranks decide alike without further messages. */
 #include "session_changes.h"
 
 #include <string.h>
@@ -17,6 +17,7 @@ enum change_word {
     CYCLE_LOW, /* negated, as everything called low */
     FAILED,    /* ranks - lowest failing rank; 0: none */
     CELLS_CHANGED,
+    LEVELS_CHANGED,
     NAMES_CHANGED,
     NAMES_HIGH,
     NAMES_LOW,
@@ -66,6 +67,7 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[CYCLE_LOW] = ~cycle; /* negated without overflow */
     words[FAILED] = session_pending_error(meshes) ? team->ranks - team->rank : 0;
     words[CELLS_CHANGED] = meshes->are_cells_changed || !session->space.has_extent;
+    words[LEVELS_CHANGED] = meshes->are_levels_changed;
     words[NAMES_CHANGED] = meshes->are_names_changed || !session->catalogue.is_known;
     words[NAMES_HIGH] = names;
     words[NAMES_LOW] = ~names;
@@ -94,6 +96,7 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .failed_rank = all[FAILED] ? session->team.ranks - (int)all[FAILED] : -1,
                              .of_scene = all[SCENE_CHANGED],
                              .of_cells = all[CELLS_CHANGED],
+                             .of_levels = all[LEVELS_CHANGED],
                              .of_names = all[NAMES_CHANGED],
                              .are_names_shared = all[NAMES_HIGH] == ~all[NAMES_LOW],
                              .are_threads_lacking = all[THREADS_LACKING],

@@ -10,6 +10,7 @@ typedef struct session_changes {
     double time;                 /* time of rank 0 */
     int failed_rank;             /* the lowest rank with an error of a set call; -1: none */
     bool of_scene, of_cells, of_names;
+    bool of_levels;        /* of blocks with levels of refinement */
     bool are_names_shared; /* all ranks have the same tables of names */
     bool are_threads_lacking;
     bool are_unwritten; /* pictures of earlier steps could not be written */

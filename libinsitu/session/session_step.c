@@ -12,6 +12,7 @@
 #include "session_changes.h"
 #include "session_check.h"
 #include "session_checksums.h"
+#include "session_covers.h"
 #include "session_derive.h"
 #include "session_derived.h"
 #include "session_distances.h"
@@ -137,6 +138,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
 {
     const session_team *team = &s->team;
     base_error reason = {.status = INSITU_OK};
+    if (changes->of_levels && session_update_covers(&s->meshes, team, error)) return error->status;
     if (changes->of_cells) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
     const bool of_names = changes->of_names || refused->status || s->catalogue.has_faults;

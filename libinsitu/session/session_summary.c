@@ -1,6 +1,10 @@
 /* Bytes and counts are summed up at the end of a step, instead of being tracked while it runs. */
 #include "session_summary.h"
 
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
 #include "render.h"
 #include "session_field_input.h"
 #include "session_scalars.h"
@@ -44,6 +48,44 @@ static int64_t patch_bytes(const insitu_field *field)
     return bytes;
 }
 
+/* What was copied of a mesh, and why: the bytes of its blocks are added up by the reason. */
+enum { MOST_REASONS = 24, REASON_SIZE = 512 };
+
+typedef struct copied_reasons {
+    int count;
+    int64_t bytes[MOST_REASONS];
+    char words[MOST_REASONS][REASON_SIZE];
+} copied_reasons;
+
+__attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *reasons, int64_t bytes, const char *format,
+                                                             ...)
+{
+    char words[REASON_SIZE];
+    int at = 0;
+    va_list arguments;
+    if (!bytes) return;
+    va_start(arguments, format);
+    vsnprintf(words, sizeof words, format, arguments);
+    va_end(arguments);
+    while (at < reasons->count && strcmp(reasons->words[at], words) != 0) at++;
+    if (at == MOST_REASONS) at--; /* counted with the last one */
+    if (at == reasons->count) {
+        memcpy(reasons->words[at], words, sizeof words);
+        reasons->bytes[at] = 0;
+        reasons->count++;
+    }
+    reasons->bytes[at] += bytes;
+}
+
+static void tell_copied(const copied_reasons *reasons, const char *mesh, session_report *out)
+{
+    for (int i = 0; i < reasons->count; i++) {
+        out->numbers.bytes_copied += reasons->bytes[i];
+        session_text_add(&out->copied_why, "mesh \"%s\": %s: %lld bytes", mesh, reasons->words[i],
+                         (long long)reasons->bytes[i]);
+    }
+}
+
 static bool is_field_in_use(const session_mesh *mesh, int field)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
@@ -59,53 +101,42 @@ static int64_t value_bytes(const insitu_field *field)
     return bytes;
 }
 
-static void report_field(session_report *out, const session_mesh *mesh, int index)
+static void report_field(session_report *out, copied_reasons *copied, const session_mesh *mesh, int index)
 {
     const insitu_field *field = &mesh->fields[index].given;
-    const int64_t copied = mesh->fields[index].copy_bytes;
-    out->numbers.bytes_copied += copied;
-    if (copied)
-        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" %s: %lld bytes", mesh->name, field->name,
-                         mesh->fields[index].is_derived ? "derived from others"
-                         : field->index.data            ? "by its index"
-                         : field->corner_row            ? "in rows of corners"
-                                                        : "at the corners of a torn mesh",
-                         (long long)copied);
+    add_copied(copied, mesh->fields[index].copy_bytes, "field \"%s\" %s", field->name,
+               mesh->fields[index].is_derived ? "derived from others"
+               : field->index.data            ? "by its index"
+               : field->corner_row            ? "in rows of corners"
+                                              : "at the corners of a torn mesh");
     if (is_field_in_use(mesh, index))
         out->numbers.bytes_borrowed += value_bytes(field) +
                                        array_bytes(&field->index, session_field_places(&mesh->given, field)) +
                                        patch_bytes(field);
-    else if (out->numbers.images)
-        session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", mesh->name, field->name);
 }
 
-static void report_scalar(session_report *out, const session_mesh *mesh, const session_scalar *scalar)
+static void report_scalar(session_report *out, copied_reasons *copied, const session_mesh *mesh,
+                          const session_scalar *scalar)
 {
     const char *name = session_scalar_name(mesh, scalar);
+    const int64_t vertices = session_vertex_count(mesh);
     if (scalar->pairs) out->numbers.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
     if (scalar->vertex_values) {
-        const int64_t bytes = session_vertex_count(mesh) * (int64_t)sizeof(double);
-        const bool is_of_cells = mesh->fields[scalar->field].given.centring == INSITU_CELL;
-        out->numbers.bytes_copied += bytes;
-        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" recentred from %s to vertices: %lld bytes",
-                         mesh->name, name, is_of_cells ? "cells" : "corners", (long long)bytes);
+        const insitu_centring centring = mesh->fields[scalar->field].given.centring;
+        add_copied(copied, vertices * (int64_t)sizeof(double), "field \"%s\" recentred from %s to vertices", name,
+                   centring == INSITU_CELL     ? "cells"
+                   : centring == INSITU_CORNER ? "corners"
+                                               : "levels of refinement");
     }
-    if (scalar->gradients) {
-        const int64_t bytes = session_vertex_count(mesh) * (int64_t)sizeof *scalar->gradient_entries +
-                              scalar->gradient_count * (int64_t)sizeof *scalar->gradients;
-        out->numbers.bytes_copied += bytes;
-        session_text_add(&out->copied_why, "mesh \"%s\": gradients of field \"%s\" at vertices: %lld bytes", mesh->name,
-                         name, (long long)bytes);
-    }
-    if (scalar->distances) {
-        const int64_t bytes = session_vertex_count(mesh) * (int64_t)sizeof(float);
-        out->numbers.bytes_copied += bytes;
-        session_text_add(&out->copied_why, "mesh \"%s\": distances of vertices from a slice: %lld bytes", mesh->name,
-                         (long long)bytes);
-    }
+    if (scalar->gradients)
+        add_copied(copied,
+                   vertices * (int64_t)sizeof *scalar->gradient_entries +
+                       scalar->gradient_count * (int64_t)sizeof *scalar->gradients,
+                   "gradients of field \"%s\" at vertices", name);
+    if (scalar->distances) add_copied(copied, vertices * (int64_t)sizeof(float), "distances of vertices from a slice");
 }
 
-static void report_outer(session_report *out, const session_mesh *mesh)
+static void report_outer(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     int64_t bytes = 0;
     for (int i = 0; i < mesh->outer_count; i++) {
@@ -114,58 +145,36 @@ static void report_outer(session_report *out, const session_mesh *mesh)
         bytes += outer->bytes;
         out->numbers.bytes_trees += outer->mesh->has_tree ? mmbvh_bytes(&outer->mesh->tree) : 0;
     }
-    if (!bytes) return;
-    out->numbers.bytes_copied += bytes;
-    session_text_add(&out->copied_why, "mesh \"%s\": its outer faces: %lld bytes", mesh->name, (long long)bytes);
+    add_copied(copied, bytes, "its outer faces");
 }
 
-static void report_topology(session_report *out, const session_mesh *mesh)
+static void report_topology(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     const session_topology *t = &mesh->topology;
-    const long long bytes = t->cell_bytes, face_bytes = t->face_bytes;
     out->numbers.cells_recognised += t->recognised_count;
-    out->numbers.bytes_copied += t->cell_bytes + t->face_bytes;
     if (t->recognised_count)
-        session_text_add(&out->copied_why,
-                         "mesh \"%s\": %lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that "
-                         "their faces make: %lld bytes",
-                         mesh->name, (long long)t->recognised_count, (long long)t->polyhedron_count, bytes);
+        add_copied(copied, t->cell_bytes,
+                   "%lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that their faces make",
+                   (long long)t->recognised_count, (long long)t->polyhedron_count);
     else if (t->has_own_order)
-        session_text_add(&out->copied_why,
-                         "mesh \"%s\": its cells' vertices, one after the other in VTK's order: %lld bytes", mesh->name,
-                         bytes);
-    else if (bytes)
-        session_text_add(&out->copied_why, "mesh \"%s\": its cells' faces, by owner and neighbour: %lld bytes",
-                         mesh->name, bytes);
-    if (face_bytes)
-        session_text_add(&out->copied_why, "mesh \"%s\": its faces' vertices, out of lists: %lld bytes", mesh->name,
-                         face_bytes);
-    if (mesh->conformed.bytes) {
-        out->numbers.bytes_copied += mesh->conformed.bytes;
-        session_text_add(&out->copied_why,
-                         "mesh \"%s\": arrays that are not aligned or of types that are not read in place: %lld bytes",
-                         mesh->name, (long long)mesh->conformed.bytes);
-    }
-    if (mesh->lattice.bytes) {
-        out->numbers.bytes_copied += mesh->lattice.bytes;
-        session_text_add(&out->copied_why, "mesh \"%s\": coordinates along the axes of its lattice: %lld bytes",
-                         mesh->name, (long long)mesh->lattice.bytes);
-    }
-    if (!mesh->torn.bytes) return;
-    out->numbers.bytes_copied += mesh->torn.bytes;
-    session_text_add(&out->copied_why,
-                     "mesh \"%s\": vertices of each cell's own, for fields with values at corners: %lld bytes",
-                     mesh->name, (long long)mesh->torn.bytes);
+        add_copied(copied, t->cell_bytes, "its cells' vertices, one after the other in VTK's order");
+    else
+        add_copied(copied, t->cell_bytes, "its cells' faces, by owner and neighbour");
+    add_copied(copied, t->face_bytes, "its faces' vertices, out of lists");
+    add_copied(copied, mesh->conformed.bytes, "arrays that are not aligned or of types that are not read in place");
+    add_copied(copied, mesh->lattice.bytes, "coordinates along the axes of its lattice");
+    if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
+    add_copied(copied, mesh->torn.bytes, "vertices of each cell's own, for fields with values at corners");
 }
 
-static void report_mesh(session_report *out, const session_mesh *mesh)
+static void report_part(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
-    if (!mesh->is_given) return;
     insitu_report *report = &out->numbers;
     int64_t unusable = 0;
+    if (!mesh->is_given) return;
     report->cells += session_cell_count(mesh);
     report->bytes_borrowed += mesh_bytes(&mesh->original);
-    report_topology(out, mesh);
+    report_topology(out, copied, mesh);
     if (!mesh->is_check_stale) {
         report->cells_ghost += mesh->ghost_count;
         report->cells_inverted += mesh->inverted_count;
@@ -173,22 +182,54 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
         report->cells_shell += mesh->shell_count;
     }
     if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
-    for (int i = 0; i < mesh->field_count; i++) report_field(out, mesh, i);
+    for (int i = 0; i < mesh->field_count; i++) report_field(out, copied, mesh, i);
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
-        report_scalar(out, mesh, scalar);
+        report_scalar(out, copied, mesh, scalar);
         if (scalar->is_used && scalar->wants_ranges && scalar->unusable > unusable) unusable = scalar->unusable;
     }
     report->cells_unusable += unusable;
-    report_outer(out, mesh);
-    bool is_shown = mesh->is_needed;
-    for (int i = 0; i < mesh->outer_count; i++) is_shown = is_shown || mesh->outers[i]->is_wanted;
-    if (report->images && !is_shown)
-        session_text_add(&out->left_out, "mesh \"%s\" is in no picture: no tree is built", mesh->name);
-    if (report->images && mesh->is_needed && mesh->is_partial)
-        session_text_add(
-            &out->left_out, "mesh \"%s\": %lld of %lld cells show nothing in this step: the tree is without them",
-            mesh->name, (long long)(mesh->drawn_count - mesh->tree.cell_count), (long long)mesh->drawn_count);
+    report_outer(out, copied, mesh);
+}
+
+static bool is_shown(const session_mesh *mesh)
+{
+    bool is_any = mesh->is_needed;
+    for (int i = 0; i < mesh->outer_count; i++) is_any = is_any || mesh->outers[i]->is_wanted;
+    return is_any;
+}
+
+/* Fields of blocks are the same on all of them. */
+static void report_left_out(session_report *out, const session_parts *parts)
+{
+    const session_mesh *first = parts->items[0];
+    int64_t shown = 0, drawn = 0, given = 0, partial = 0;
+    for (int i = 0; i < parts->count; i++) {
+        const session_mesh *part = parts->items[i];
+        given += part->is_given;
+        shown += part->is_given && is_shown(part);
+        if (!part->is_given || !part->is_needed) continue;
+        drawn += part->drawn_count;
+        if (part->is_partial) partial += part->drawn_count - part->tree.cell_count;
+    }
+    if (!given || !out->numbers.images) return;
+    for (int i = 0; i < first->field_count; i++)
+        if (!is_field_in_use(first, i))
+            session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", first->name,
+                             first->fields[i].given.name);
+    if (!shown) session_text_add(&out->left_out, "mesh \"%s\" is in no picture: no tree is built", first->name);
+    if (partial)
+        session_text_add(&out->left_out,
+                         "mesh \"%s\": %lld of %lld cells show nothing in this step: the tree is without them",
+                         first->name, (long long)partial, (long long)drawn);
+}
+
+static void report_parts(session_report *out, const session_parts *parts)
+{
+    copied_reasons copied = {.count = 0};
+    for (int i = 0; i < parts->count; i++) report_part(out, &copied, parts->items[i]);
+    tell_copied(&copied, parts->items[0]->name, out);
+    report_left_out(out, parts);
 }
 
 void session_summarize(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
@@ -196,7 +237,11 @@ void session_summarize(const session_meshes *meshes, const mmbvh *parent, sessio
 {
     insitu_report *report = &out->numbers;
     if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
-    for (int i = 0; i < meshes->count; i++) report_mesh(out, meshes->items[i]);
+    for (int i = 0; i < meshes->count;) {
+        const session_parts parts = session_parts_at(meshes, i);
+        report_parts(out, &parts);
+        i += parts.count;
+    }
     report->bytes_trees += mmbvh_bytes(parent);
     report->bytes_pictures = session_writer_bytes(writer, &report->pictures_waiting);
     session_report_end(out);

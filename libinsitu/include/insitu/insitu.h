@@ -136,6 +136,13 @@ typedef struct insitu_lattice {
     /* Rectilinear: cells[a] + 1 coordinates along each axis, float32, float64 or any integers; not given where the
      * lattice is uniform. A lattice of quads may lack those of the axis without cells; its coordinate is 0 then. */
     insitu_array axes[3];
+    /* Levels of refinement: how many of the block's cells make one of the coarsest level along each axis, as 1, 2 or 8;
+     * at most 2^20, and not read along an axis without cells. All 0: the mesh has no levels. first then says where the
+     * block's first cell is among all that its level may have; it is at most 2^40 in size. A cell over which the inner
+     * cells of a finer block of the mesh lie, on any rank, is not drawn; finer blocks begin and end at borders of
+     * coarser cells. A vertex that lies on a coarser cell's face or edge gets the value that is interpolated there,
+     * also where values are given at vertices. */
+    int64_t refinement[3];
 } insitu_lattice;
 
 /* One rank's part of a mesh. All arrays are borrowed until the next insitu_step() returns or the mesh is set again
@@ -239,7 +246,8 @@ typedef struct insitu_mesh {
  * cell values as they are, unless the scene says `interpolate: vertex`; then, and always for isosurfaces, each vertex
  * gets the mean of its cells' values, over all ranks and without ghosts. Vertices of several meshes at one place are
  * one there, if one layer shows the field on these meshes and they have no vertex ids; a vertex that hangs on a larger
- * cell's triangle or quad gets that face's value. A vertex on the boundary gets the mean of the
+ * cell's triangle or quad gets that face's value. So do vertices with values of their own on a mesh with levels of
+ * refinement (insitu_lattice). A vertex on the boundary gets the mean of the
  * boundary's own values instead, where the field has some (insitu_patch).
  *
  * Corner fields may differ from cell to cell at a shared vertex, as in discontinuous Galerkin methods. They have one
@@ -437,6 +445,18 @@ INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *na
  * again is taken as unchanged. Values that are NaN or infinite are no error: cells that have one are counted in the
  * report and not drawn. */
 INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *mesh, const insitu_field *field);
+
+/* Hand over one of the blocks that this rank's part of a mesh consists of, by a number of the rank's own choice from 0
+ * on: each block is a lattice or a list of cells, with arrays of its own. Other ranks may have other blocks, or none.
+ * All blocks of a mesh are drawn as one: their vertices are the same where vertex_ids or, without them, the bits of the
+ * coordinates are, and no wall is drawn between them. They have the same fields, but for blocks without cells, each set
+ * by insitu_set_block_field(). NULL for block takes the block away; insitu_set_mesh() replaces or takes away all of
+ * them. In all else these are as insitu_set_mesh() and insitu_set_field(); messages call block 17 of mesh "m" "m[17]".
+ * Local. */
+INSITU_API insitu_status insitu_set_block(insitu_session *session, const char *mesh, int64_t number,
+                                          const insitu_mesh *block);
+INSITU_API insitu_status insitu_set_block_field(insitu_session *session, const char *mesh, int64_t number,
+                                                const insitu_field *field);
 
 /* Draw the images that are due at this cycle and time. Collective. Where nothing is due it costs one small reduction.
  * An error on any rank is returned on every rank, with the rank and the place in the message. Images that need

@@ -18,7 +18,7 @@ enum { ENDS = 6 };
 
 static void widen(const session_mesh *mesh, double ends[ENDS])
 {
-    if (!mesh || !mesh->is_given || mesh->drawn_count == 0) return;
+    if (!mesh->is_given || mesh->drawn_count == 0) return;
     for (int axis = 0; axis < 3; axis++) {
         ends[axis] = fmin(ends[axis], mesh->lower[axis]);
         ends[3 + axis] = fmin(ends[3 + axis], -mesh->upper[axis]);
@@ -42,8 +42,10 @@ static void take_boxes(const double *ends, int count, session_outline *out)
 static void find_ends(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
 {
     for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;
-    for (int i = 0; i < catalogue->mesh_count; i++)
-        widen(session_find_mesh(meshes, catalogue->meshes[i].name), ends + (by_mesh ? i * (ptrdiff_t)ENDS : 0));
+    for (int i = 0; i < catalogue->mesh_count; i++) {
+        const session_parts parts = session_find_parts(meshes, catalogue->meshes[i].name);
+        for (int n = 0; n < parts.count; n++) widen(parts.items[n], ends + (by_mesh ? i * (ptrdiff_t)ENDS : 0));
+    }
 }
 
 static insitu_status gather(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, int boxes,

@@ -1,10 +1,10 @@
 /* The catalogue lists the meshes and fields of all ranks. From it every rank determines, without communication and with
  * the same result, whether a picture can be drawn, so that no rank lacks a field in the middle of a collective call.
  *
- * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <centring> <name>"
- * is a field of it, "e <status> 0 <message>" is the fault of the preceding mesh or field, if it has one. If all ranks'
- * tables are equal (the usual case, which the step's one reduction finds by hashes) nothing is exchanged; else all
- * ranks gather all texts. */
+ * A rank's table is a text of lines: "m <has cells> <has ids, + 2: has levels> <name>" begins a mesh, "f <components>
+ * <centring> <name>" is a field of it, "e <status> 0 <message>" is the fault of the preceding mesh or field, if it has
+ * one. If all ranks' tables are equal (the usual case, which the step's one reduction finds by hashes) nothing is
+ * exchanged; else all ranks gather all texts. */
 #include "session_catalogue.h"
 
 #include <inttypes.h>
@@ -31,16 +31,97 @@ static size_t append_fault(char *text, size_t capacity, size_t at, const base_er
     return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
 }
 
-static size_t append_mesh(char *text, size_t capacity, size_t at, const session_mesh *mesh)
+/* What this rank's parts of a mesh have in common. */
+typedef struct part_summary {
+    bool is_given, has_cells, has_ids, is_refined;
+    const base_error *problem; /* of the first part that is at fault; NULL: of none */
+} part_summary;
+
+/* Vertices have ids where all parts with cells have some. */
+static part_summary summarize(const session_parts *parts)
 {
-    at = append_line(text, capacity, at, 'm', mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL,
-                     mesh->name);
-    at = append_fault(text, capacity, at, &mesh->problem);
-    for (int f = 0; f < mesh->field_count; f++) {
-        const insitu_field *field = &mesh->fields[f].given;
-        if (mesh->fields[f].is_derived) continue;
-        at = append_line(text, capacity, at, 'f', field->component_count, (int)field->centring, field->name);
-        at = append_fault(text, capacity, at, &mesh->fields[f].problem);
+    part_summary out = {.has_ids = true};
+    bool has_any = false;
+    for (int i = 0; i < parts->count; i++) {
+        const session_mesh *part = parts->items[i];
+        const bool has_cells = part->given.cell_count > 0, has_ids = part->given.vertex_ids.data != NULL;
+        out.is_given = out.is_given || part->is_given || part->problem.status;
+        out.has_cells = out.has_cells || has_cells;
+        out.is_refined = out.is_refined || session_has_levels(&part->given);
+        if (has_cells && !has_ids) out.has_ids = false;
+        has_any = has_any || has_ids;
+        if (part->problem.status && !out.problem) out.problem = &part->problem;
+    }
+    out.has_ids = out.has_ids && has_any;
+    return out;
+}
+
+static const session_field *find_given(const session_mesh *part, const char *name)
+{
+    const int index = session_find_field(part, name);
+    return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
+}
+
+/* Tells whether no part before this one has the field, so that it is listed here. */
+static bool is_first_with(const session_parts *parts, int part, const session_field *field)
+{
+    for (int i = 0; i < part; i++)
+        if (find_given(parts->items[i], field->given.name)) return false;
+    return true;
+}
+
+/* Finds what is wrong with a field on some part: what was told of it, or that it is not the same on all blocks. */
+static void find_problem(const session_parts *parts, const session_field *first, base_error *problem)
+{
+    const insitu_field *as = &first->given;
+    for (int i = 0; i < parts->count && !problem->status; i++) {
+        const session_mesh *part = parts->items[i];
+        const session_field *field = find_given(part, as->name);
+        if (field && field->problem.status) {
+            *problem = field->problem;
+        } else if (!field && part->given.cell_count > 0) {
+            base_fail(problem, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\" is not set, other blocks have it",
+                      part->label, as->name);
+        } else if (field &&
+                   (field->given.component_count != as->component_count || field->given.centring != as->centring)) {
+            base_fail(problem, INSITU_ERROR_FIELD,
+                      "mesh \"%s\": field \"%s\" has another centring or number of components than on other blocks",
+                      part->label, as->name);
+        }
+    }
+}
+
+/* Visits the fields that the parts have, each once, by the first part that has it. */
+typedef struct field_visit {
+    const session_parts *parts;
+    int part, next;
+} field_visit;
+
+static const session_field *next_given(field_visit *visit)
+{
+    for (; visit->part < visit->parts->count; visit->part++, visit->next = 0) {
+        const session_mesh *part = visit->parts->items[visit->part];
+        while (visit->next < part->field_count) {
+            const session_field *field = &part->fields[visit->next++];
+            if (!field->is_derived && is_first_with(visit->parts, visit->part, field)) return field;
+        }
+    }
+    return NULL;
+}
+
+static size_t append_parts(char *text, size_t capacity, size_t at, const session_parts *parts)
+{
+    const part_summary of = summarize(parts);
+    if (!of.is_given) return at;
+    at = append_line(text, capacity, at, 'm', of.has_cells, of.has_ids | 2 * of.is_refined, parts->items[0]->name);
+    if (of.problem) at = append_fault(text, capacity, at, of.problem);
+    field_visit visit = {.parts = parts};
+    for (const session_field *field; (field = next_given(&visit)) != NULL;) {
+        base_error problem = {.status = INSITU_OK};
+        find_problem(parts, field, &problem);
+        at = append_line(text, capacity, at, 'f', field->given.component_count, (int)field->given.centring,
+                         field->given.name);
+        at = append_fault(text, capacity, at, &problem);
     }
     return at;
 }
@@ -53,45 +134,55 @@ static size_t write_table(const session_meshes *meshes, char *text, size_t capac
         at = append_line(text, capacity, at, 'f', 0, 0, meshes->pending_field);
     }
     at = append_fault(text, capacity, at, &meshes->pending);
-    for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
-        if (mesh->is_given || mesh->problem.status) at = append_mesh(text, capacity, at, mesh);
+    for (int i = 0; i < meshes->count;) {
+        const session_parts parts = session_parts_at(meshes, i);
+        at = append_parts(text, capacity, at, &parts);
+        i += parts.count;
     }
     return at;
 }
 
+static void hash_parts(const session_parts *parts, uint64_t *hash)
+{
+    const part_summary of = summarize(parts);
+    if (!of.is_given) return;
+    const int head[] = {0, of.has_cells, of.has_ids, of.is_refined};
+    session_hash_bytes(hash, head, sizeof head);
+    session_hash_text(hash, parts->items[0]->name);
+    field_visit visit = {.parts = parts};
+    for (const session_field *field; (field = next_given(&visit)) != NULL;) {
+        const int tail[] = {1, field->given.component_count, (int)field->given.centring};
+        base_error problem = {.status = INSITU_OK};
+        find_problem(parts, field, &problem);
+        session_hash_bytes(hash, tail, sizeof tail);
+        session_hash_text(hash, field->given.name);
+        if (problem.status) session_hash_text(hash, problem.message);
+    }
+}
+
+/* What is wrong on some blocks alone counts, as other ranks do not know of it. */
 uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
-    for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
-        if (!mesh->is_given) continue;
-        int given_count = 0;
-        for (int f = 0; f < mesh->field_count; f++) given_count += !mesh->fields[f].is_derived;
-        const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, given_count};
-        session_hash_bytes(&hash, head, sizeof head);
-        session_hash_text(&hash, mesh->name);
-        for (int f = 0; f < mesh->field_count; f++) {
-            const insitu_field *field = &mesh->fields[f].given;
-            if (mesh->fields[f].is_derived) continue;
-            const int tail[] = {field->component_count, (int)field->centring};
-            session_hash_bytes(&hash, tail, sizeof tail);
-            session_hash_text(&hash, field->name);
-        }
+    for (int i = 0; i < meshes->count;) {
+        const session_parts parts = session_parts_at(meshes, i);
+        hash_parts(&parts, &hash);
+        i += parts.count;
     }
     return hash;
 }
 
 /* ---- texts to a catalogue ------------------------------------------------------------------------------------ */
 
-void session_hanging_free(session_hanging *hanging, int count, bool with_borders)
+void session_hanging_free(session_hanging *hanging, bool with_borders)
 {
     session_border *borders = hanging->borders;
+    const int border_count = hanging->border_count;
     const uint64_t twins = hanging->twins;
     base_free(hanging->vertices);
     base_free(hanging->sent_counts);
     base_free(hanging->sent_groups);
-    for (int i = 0; i < count && borders && with_borders; i++) {
+    for (int i = 0; i < border_count && with_borders; i++) {
         base_free(borders[i].faces);
         base_free(borders[i].vertices);
         base_free(borders[i].twins);
@@ -100,6 +191,7 @@ void session_hanging_free(session_hanging *hanging, int count, bool with_borders
     *hanging = (session_hanging){0};
     if (with_borders) return;
     hanging->borders = borders;
+    hanging->border_count = border_count;
     hanging->twins = twins;
 }
 
@@ -119,7 +211,7 @@ void session_drop_joints(session_catalogue *catalogue)
 {
     for (int i = 0; i < catalogue->joint_count; i++) {
         session_joint *joint = catalogue->joints[i];
-        session_hanging_free(&joint->hanging, joint->count, true);
+        session_hanging_free(&joint->hanging, true);
         session_vertex_groups_free(&joint->groups);
         session_homes_free(&joint->own_homes);
         base_free(joint->meshes);
@@ -293,7 +385,8 @@ static bool take_table(session_catalogue *catalogue, const char *text, size_t si
             mesh = find_mesh(catalogue, name);
             field = NULL;
             has_cells = a != 0;
-            has_ids = b != 0;
+            has_ids = b & 1;
+            if (mesh && b & 2) mesh->is_refined = true;
         } else if (line[0] == 'e') {
             if (!take_fault(catalogue, mesh, field, rank, (insitu_status)a, name)) return false;
         } else {
@@ -428,8 +521,9 @@ static bool take_tables(int ranks, const gathered_tables *tables, session_catalo
 static void put_faulty_aside(const session_catalogue *catalogue, session_meshes *meshes)
 {
     for (int i = 0; i < catalogue->mesh_count; i++) {
-        session_mesh *mesh = catalogue->meshes[i].fault ? session_find_mesh(meshes, catalogue->meshes[i].name) : NULL;
-        if (mesh) session_put_aside(meshes, mesh);
+        if (!catalogue->meshes[i].fault) continue;
+        const session_parts parts = session_find_parts(meshes, catalogue->meshes[i].name);
+        for (int n = parts.count; n > 0; n--) session_put_aside(meshes, parts.items[n - 1]);
     }
 }
 
@@ -465,13 +559,22 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
-/* Returns a hash of the rank and the stamp; 0 if this rank has no part. */
-static uint64_t stamp_of(int rank, int64_t stamp)
+/* Hashes when the cells and the coordinates of this rank's parts of a mesh were last new; 0 if it has none. */
+static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2])
 {
-    uint64_t hash = SESSION_HASH_BEGIN;
-    session_hash_bytes(&hash, &rank, sizeof rank);
-    session_hash_bytes(&hash, &stamp, sizeof stamp);
-    return stamp ? hash : 0;
+    bool has_any = false;
+    for (int k = 0; k < 2; k++) {
+        hashes[k] = SESSION_HASH_BEGIN;
+        session_hash_bytes(&hashes[k], &rank, sizeof rank);
+    }
+    for (int i = 0; i < parts->count; i++) {
+        const session_mesh *part = parts->items[i];
+        if (!part->is_given) continue;
+        has_any = true;
+        session_hash_bytes(&hashes[0], &part->cells_stamp, sizeof part->cells_stamp);
+        session_hash_bytes(&hashes[1], &part->places_stamp, sizeof part->places_stamp);
+    }
+    if (!has_any) hashes[0] = hashes[1] = 0;
 }
 
 /* Sums up, over the ranks, hashes of the stamps at which each mesh last changed. */
@@ -482,10 +585,8 @@ static insitu_status update_parts(session_catalogue *catalogue, const session_me
     uint64_t *sums = base_calloc((size_t)count * 2 + 1, sizeof *sums);
     if (!sums) session_no_memory(error, count * 16LL, "hashes of meshes");
     for (int i = 0; i < count && sums; i++) {
-        const session_mesh *mesh = session_find_mesh(meshes, catalogue->meshes[i].name);
-        if (!mesh || !mesh->is_given) continue;
-        sums[2 * i] = stamp_of(team->rank, mesh->cells_stamp);
-        sums[2 * i + 1] = stamp_of(team->rank, mesh->places_stamp);
+        const session_parts parts = session_find_parts(meshes, catalogue->meshes[i].name);
+        hash_stamps(&parts, team->rank, sums + 2 * (ptrdiff_t)i);
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status)
@@ -502,6 +603,31 @@ static insitu_status update_parts(session_catalogue *catalogue, const session_me
     return status;
 }
 
+bool session_list_joint_parts(const session_joint *joint, const session_meshes *meshes, session_joint_parts *out)
+{
+    *out = (session_joint_parts){0};
+    out->firsts = base_calloc((size_t)joint->count + 1, sizeof *out->firsts);
+    out->items = base_calloc((size_t)meshes->count + 1, sizeof *out->items);
+    if (!out->firsts || !out->items) {
+        session_joint_parts_free(out);
+        return false;
+    }
+    for (int m = 0; m < joint->count; m++) {
+        const session_parts parts = session_find_parts(meshes, joint->meshes[m]->name);
+        for (int i = 0; i < parts.count; i++)
+            if (parts.items[i]->is_given) out->items[out->count++] = parts.items[i];
+        out->firsts[m + 1] = out->count;
+    }
+    return true;
+}
+
+void session_joint_parts_free(session_joint_parts *parts)
+{
+    base_free(parts->firsts);
+    base_free(parts->items);
+    *parts = (session_joint_parts){0};
+}
+
 static insitu_status update_joint(session_joint *joint, const session_meshes *meshes, double half_diagonal,
                                   const session_team *team, base_error *error)
 {
@@ -512,13 +638,13 @@ static insitu_status update_joint(session_joint *joint, const session_meshes *me
     joint->places = places | 1;
     joint->homes = joint->count == 1 ? &joint->meshes[0]->homes : &joint->own_homes;
     if (is_known || joint->count == 1) return INSITU_OK;
-    const session_mesh **parts = base_calloc((size_t)joint->count, sizeof *parts);
-    if (!parts) session_no_memory(error, joint->count * (int64_t)sizeof *parts, "homes of meshes");
-    for (int i = 0; i < joint->count && parts; i++) parts[i] = session_find_mesh(meshes, joint->meshes[i]->name);
+    session_joint_parts parts;
+    if (!session_list_joint_parts(joint, meshes, &parts))
+        session_no_memory(error, meshes->count * (int64_t)sizeof *parts.items, "homes of meshes");
     const insitu_status status =
-        session_homes_find(&joint->own_homes, parts, parts ? joint->count : 0, false, half_diagonal, team, error);
+        session_homes_find(&joint->own_homes, parts.items, parts.count, false, half_diagonal, team, error);
     if (status) joint->places = 0;
-    base_free(parts);
+    session_joint_parts_free(&parts);
     return status;
 }
 
@@ -529,9 +655,10 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
     if (!catalogue->are_parts_known) status = update_parts(catalogue, meshes, team, error);
     for (int i = 0; i < catalogue->mesh_count && !status; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
-        const session_mesh *part = session_find_mesh(meshes, mesh->name);
+        const session_parts parts = session_find_parts(meshes, mesh->name);
         if (!mesh->homes.is_known)
-            status = session_homes_find(&mesh->homes, &part, 1, mesh->has_ids, half_diagonal, team, error);
+            status = session_homes_find(&mesh->homes, (const session_mesh *const *)parts.items, parts.count,
+                                        mesh->has_ids, half_diagonal, team, error);
     }
     for (int i = 0; i < catalogue->joint_count && !status; i++)
         status = update_joint(catalogue->joints[i], meshes, half_diagonal, team, error);

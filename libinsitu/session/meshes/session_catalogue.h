@@ -34,8 +34,8 @@ typedef struct session_twin {
     double place[3];
 } session_twin;
 
-/* This rank's outer faces of a mesh, on which vertices may hang, and the vertices that may hang; kept while vertices
- * move. */
+/* The outer faces of one of this rank's parts of a mesh, on which vertices may hang, and the vertices that may hang;
+ * kept while vertices move. */
 typedef struct session_border {
     uint64_t cells; /* value of session_catalogue_mesh.cells for which it was computed; 0: unknown */
     int64_t face_count, vertex_count;
@@ -47,8 +47,9 @@ typedef struct session_border {
 
 /* This rank's hanging vertices in the meshes of a joint, and the values that it sends to other ranks for theirs. */
 typedef struct session_hanging {
-    uint64_t places;         /* session_joint.places that it is of; 0: not known */
-    session_border *borders; /* one for each mesh; NULL: none are known */
+    uint64_t places; /* session_joint.places that it is of; 0: not known */
+    int border_count;
+    session_border *borders; /* one per part; NULL: none are known */
     uint64_t twins;          /* version of the vertex places for which the twins of borders were found */
     int64_t count, total;    /* on this rank, on all */
     session_hanging_vertex *vertices;
@@ -60,7 +61,7 @@ typedef struct session_hanging {
  * meshes stay as they are. */
 typedef struct session_vertex_groups {
     uint64_t places;    /* session_joint.places that they are of; 0: not known */
-    int64_t *firsts;    /* per mesh, the number of its first vertex, and at the end the number of vertices */
+    int64_t *firsts;    /* per part, the number of its first vertex, and at the end the number of vertices */
     int64_t *of_vertex; /* group of each vertex; -1: it belongs to no drawn cell */
     int64_t count;
     int64_t *starts;        /* count + 1: number of corners of drawn cells in the groups before */
@@ -76,6 +77,7 @@ typedef struct session_catalogue_mesh {
     char *name;
     int first_rank;        /* first rank that has cells of it; -1: none */
     bool has_ids;          /* all ranks with cells give vertex ids */
+    bool is_refined;       /* some block, on any rank, has a level of refinement */
     bool has_shells_alone; /* all drawn cells, over all ranks, are shells; set by session_check_vertex_order() */
     base_error *fault;     /* likewise a fault: the step then ignores the mesh, but its fields' names are kept */
     int field_count;
@@ -133,8 +135,19 @@ static inline uint64_t session_joint_name(const session_catalogue_mesh *mesh, ui
 /* Returns the joint of this name; NULL if there is none. */
 session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t name);
 void session_drop_joints(session_catalogue *catalogue);
-/* Frees the data of vertices, and if with_borders also that of faces. count: number of meshes. */
-void session_hanging_free(session_hanging *hanging, int count, bool with_borders);
+/* Frees the data of vertices, and if with_borders also that of faces. */
+void session_hanging_free(session_hanging *hanging, bool with_borders);
+
+/* This rank's parts of the meshes of a joint, sorted by mesh. */
+typedef struct session_joint_parts {
+    int count;
+    const session_mesh **items;
+    int *firsts; /* the joint's count + 1 entries: the first part of each mesh */
+} session_joint_parts;
+
+/* Returns false if memory runs out; then there is nothing to free. */
+bool session_list_joint_parts(const session_joint *joint, const session_meshes *meshes, session_joint_parts *out);
+void session_joint_parts_free(session_joint_parts *parts);
 
 void session_vertex_groups_free(session_vertex_groups *groups);
 

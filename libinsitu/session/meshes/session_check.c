@@ -150,7 +150,7 @@ static face_fault check_faces(const session_mesh *mesh, int64_t cell, face_room 
 static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault, const face_place *place,
                                     base_error *error)
 {
-    const char *name = mesh->name;
+    const char *name = mesh->label;
     const long long base = mesh->given.index_base; /* indices and offsets are reported as the caller has them */
     const long long at = cell, face = place->face + base, vertex = place->vertex + base;
     switch (fault) {
@@ -316,25 +316,25 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
     if (place->type == GRID_POLYGON && place->first >= 0 && place->next <= mesh->given.connectivity_count)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polygon): offsets %lld and %lld; a polygon has at least 3 vertices",
-                         mesh->name, (long long)cell, first, next);
+                         mesh->label, (long long)cell, first, next);
     if (place->type == GRID_POLYHEDRON && next < first)
         return base_fail(
             error, INSITU_ERROR_MESH,
             "mesh \"%s\": cell %lld (polyhedron): offsets fall from %lld to %lld; a polyhedron has at least 4 faces",
-            mesh->name, (long long)cell, first, next);
+            mesh->label, (long long)cell, first, next);
     const char *format =
         place->next < place->first
             ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"
             : "mesh \"%s\": cell %lld (%s): offsets %lld and %lld do not lie %d apart, the vertices of its type";
     if (place->first < 0 || (next >= first && place->next > mesh->topology.connectivity_count))
         return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside %lld..%lld", mesh->name,
+                         "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside %lld..%lld", mesh->label,
                          (long long)cell, type_name(place->type), first, next, base,
                          mesh->topology.connectivity_count + base);
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
-    return base_fail(error, INSITU_ERROR_MESH, format, mesh->name, (long long)cell, type_name(place->type), first, next,
-                     grid_type_vertices(place->type));
+    return base_fail(error, INSITU_ERROR_MESH, format, mesh->label, (long long)cell, type_name(place->type), first,
+                     next, grid_type_vertices(place->type));
 #pragma GCC diagnostic pop
 }
 
@@ -352,21 +352,21 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     case BAD_TYPE:
         if (place.type == GRID_POLYHEDRON)
             return base_fail(error, INSITU_ERROR_MESH,
-                             "mesh \"%s\": cell %lld is a polyhedron, and face_offsets are not given", mesh->name, at);
+                             "mesh \"%s\": cell %lld is a polyhedron, and face_offsets are not given", mesh->label, at);
         return base_fail(
             error, INSITU_ERROR_MESH,
             "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
             "triangle, 9 quad, 7 polygon)",
-            mesh->name, at, given_type(mesh, cell));
+            mesh->label, at, given_type(mesh, cell));
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): vertex index %lld is outside %lld..%lld (index_base is %lld)",
-                         mesh->name, at, type, vertex, base, (long long)mesh->given.vertex_count - 1 + base, base);
+                         mesh->label, at, type, vertex, base, (long long)mesh->given.vertex_count - 1 + base, base);
     case BAD_COORDINATE:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): vertex %lld has a coordinate that is not finite: (%g, %g, %g)",
-                         mesh->name, at, type, vertex, place.position[0], place.position[1], place.position[2]);
+                         mesh->label, at, type, vertex, place.position[0], place.position[1], place.position[2]);
     case CELL_GOOD: break;
     }
     return describe_faces(mesh, cell, FACES_NO_MEMORY, &place.faces, error);
@@ -421,7 +421,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
     if (last == mesh->topology.connectivity_count) return INSITU_OK;
     const long long base = mesh->given.index_base;
     return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld",
-                     mesh->name, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
+                     mesh->label, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
 /* Largest coordinate with which squares and volumes do not overflow double. */
@@ -443,7 +443,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
                     error, INSITU_ERROR_MESH,
                     "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
                     "are supported",
-                    mesh->name, (long long)cell, given_name(mesh, cell), (long long)vertex + mesh->given.index_base,
+                    mesh->label, (long long)cell, given_name(mesh, cell), (long long)vertex + mesh->given.index_base,
                     p[0], p[1], p[2], largest_coordinate);
         }
     }
@@ -462,7 +462,7 @@ static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tal
         error, INSITU_ERROR_MESH,
         "mesh \"%s\": z coordinates are not given, but cell %lld (%s) needs them: only triangles, quads and "
         "polygons go without",
-        mesh->name, (long long)cell, given_name(mesh, cell));
+        mesh->label, (long long)cell, given_name(mesh, cell));
 }
 
 static bool is_far(const mesh_tally *tally)
@@ -529,10 +529,23 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     return INSITU_OK;
 }
 
+static insitu_status describe_misfit(const session_mesh *mesh, base_error *error)
+{
+    const session_misfit *m = &mesh->misfit;
+    const int64_t own = mesh->given.lattice->refinement[m->axis];
+    return base_fail(error, INSITU_ERROR_MESH,
+                     "mesh \"%s\": lattice: block %lld of rank %d, whose refinement along %c is %lld, covers part of a "
+                     "cell of this block, whose refinement is %lld: finer blocks begin and end at borders of coarser "
+                     "cells",
+                     mesh->label, (long long)m->block, m->rank, "ijk"[m->axis], (long long)m->refinement,
+                     (long long)own);
+}
+
 /* Checks a mesh. If cells are invalid, the topology computed from them is dropped, as the caller may correct them in
  * place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
+    if (mesh->misfit.is_any) return describe_misfit(mesh, error);
     session_fill_conformed(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
     insitu_status status = session_make_axes(mesh, error);

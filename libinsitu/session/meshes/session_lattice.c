@@ -148,6 +148,25 @@ static insitu_status check_interior(const insitu_lattice *l, base_error *error)
 /* Some integers above this are not representable as doubles. */
 static const int64_t largest_first = (int64_t)1 << 53;
 
+/* Keeps products of indices and refinements within 2^62. */
+static const int64_t largest_refined_first = (int64_t)1 << 40, largest_refinement = (int64_t)1 << 20;
+
+static insitu_status check_refinement(const insitu_lattice *l, base_error *error)
+{
+    if (are_zero(l->refinement)) return INSITU_OK;
+    for (int axis = 0; axis < 3; axis++) {
+        if (!l->cells[axis]) continue;
+        if (l->refinement[axis] < 1 || l->refinement[axis] > largest_refinement)
+            return base_fail(error, INSITU_ERROR_MESH, "lattice: refinement along %c is %lld, expected 1..%lld",
+                             axis_name[axis], (long long)l->refinement[axis], (long long)largest_refinement);
+        if (l->first[axis] < -largest_refined_first || l->first[axis] > largest_refined_first)
+            return base_fail(error, INSITU_ERROR_MESH,
+                             "lattice: first along %c is %lld, expected at most %lld in size with a refinement",
+                             axis_name[axis], (long long)l->first[axis], (long long)largest_refined_first);
+    }
+    return INSITU_OK;
+}
+
 static insitu_status check_uniform(const insitu_lattice *l, base_error *error)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -210,6 +229,7 @@ insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error)
                          (long long)mesh->cell_count);
     status = check_numbers(mesh, error);
     if (!status) status = check_interior(l, error);
+    if (!status) status = check_refinement(l, error);
     if (!status && session_has_axes(mesh) &&
         (mesh->coordinates[0].data || mesh->coordinates[1].data || mesh->coordinates[2].data))
         return base_fail(error, INSITU_ERROR_MESH,
@@ -234,6 +254,9 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
     if (memcmp(a->interior_first, b->interior_first, sizeof a->interior_first) != 0 ||
         memcmp(a->interior_end, b->interior_end, sizeof a->interior_end) != 0)
         changes |= INSITU_CHANGED_TOPOLOGY;
+    const bool is_moved = memcmp(a->first, b->first, sizeof a->first) != 0;
+    if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_zero(a->refinement)))
+        changes |= INSITU_CHANGED_TOPOLOGY; /* others are covered, and cover */
     for (int axis = 0; axis < 3; axis++)
         if (a->origin[axis] != b->origin[axis] || a->spacing[axis] != b->spacing[axis] ||
             a->first[axis] != b->first[axis] || !session_is_same_array(&a->axes[axis], &b->axes[axis]))
@@ -329,7 +352,7 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
         double *places = base_alloc((size_t)count * sizeof *places);
         if (!places)
             return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",
-                             mesh->name, (long long)count, axis_name[axis]);
+                             mesh->label, (long long)count, axis_name[axis]);
         fill_axis(l, axis, places);
         own->places[axis] = places;
         own->cells.axes[axis].places = places;
@@ -337,7 +360,7 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
         for (int64_t n = 0; n < count; n++)
             if (!isfinite(places[n]))
                 return base_fail(error, INSITU_ERROR_MESH,
-                                 "mesh \"%s\": lattice: coordinate %lld along %c is not finite: %g", mesh->name,
+                                 "mesh \"%s\": lattice: coordinate %lld along %c is not finite: %g", mesh->label,
                                  (long long)n, axis_name[axis], places[n]);
     }
     return INSITU_OK;

@@ -1,6 +1,7 @@
-/* The table of meshes, sorted by name, so that all ranks visit theirs in the same order. */
+/* The table of meshes, sorted by name and block, so that all ranks visit theirs in the same order. */
 #include "session_mesh.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
@@ -74,7 +75,7 @@ bool session_make_indices(const session_mesh *mesh, const char *what, int64_t co
     const long long bytes = size * (count + 1);
     const void *data = base_calloc((size_t)count + 1, (size_t)size);
     if (!data) {
-        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name, bytes, what);
+        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->label, bytes, what);
         return false;
     }
     *out = (grid_array){.data = data, .stride = size, .is_wide = is_wide, .is_integer = true};
@@ -289,17 +290,34 @@ bool session_next_part(session_part_walk *walk)
     return false;
 }
 
-static void drop_cells(session_mesh *mesh)
+/* Frees what is made of the cells. */
+static void drop_made(session_mesh *mesh)
 {
     session_drop_outers(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     session_drop_topology(&mesh->topology);
     session_drop_torn(&mesh->torn);
+}
+
+void session_renew_cells(session_meshes *meshes, session_mesh *mesh)
+{
+    drop_made(mesh);
+    mesh->rent = 0;
+    mesh->is_topology_stale = mesh->is_geometry_stale = mesh->is_check_stale = true;
+    mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
+    meshes->are_cells_changed = true;
+}
+
+static void drop_cells(session_mesh *mesh)
+{
+    drop_made(mesh);
     session_drop_axes(&mesh->lattice);
     session_drop_conformed(&mesh->conformed);
     base_free(mesh->flat);
+    base_free(mesh->covered);
     mesh->flat = NULL;
+    mesh->covered = NULL;
 }
 
 void session_drop_contents(session_mesh *mesh)
@@ -330,16 +348,19 @@ static void free_mesh(session_mesh *mesh)
     if (!mesh) return;
     session_drop_contents(mesh);
     base_free(mesh->name);
+    base_free(mesh->label);
     base_free(mesh);
 }
 
-/* Returns the index at which name is, or would be inserted, among the meshes. */
-static int mesh_position(const session_meshes *meshes, const char *name)
+/* Returns how many meshes stand before the block, or before the end of all blocks of that name. */
+static int count_before(const session_meshes *meshes, const char *name, int64_t block, bool is_end)
 {
     int low = 0, high = meshes->count;
     while (low < high) {
         const int middle = low + (high - low) / 2;
-        if (strcmp(meshes->items[middle]->name, name) < 0)
+        const session_mesh *mesh = meshes->items[middle];
+        const int order = strcmp(mesh->name, name);
+        if (order < 0 || (order == 0 && (is_end || mesh->block < block)))
             low = middle + 1;
         else
             high = middle;
@@ -347,10 +368,30 @@ static int mesh_position(const session_meshes *meshes, const char *name)
     return low;
 }
 
-session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
+/* Returns the index at which the block is, or would be inserted, among the meshes. */
+static int mesh_position(const session_meshes *meshes, const char *name, int64_t block)
 {
-    const int at = mesh_position(meshes, name);
-    return at < meshes->count && strcmp(meshes->items[at]->name, name) == 0 ? meshes->items[at] : NULL;
+    return count_before(meshes, name, block, false);
+}
+
+session_parts session_parts_at(const session_meshes *meshes, int first)
+{
+    const char *name = meshes->items[first]->name;
+    const bool has_more = first + 1 < meshes->count && strcmp(meshes->items[first + 1]->name, name) == 0;
+    return (session_parts){has_more ? count_before(meshes, name, 0, true) - first : 1, meshes->items + first};
+}
+
+session_parts session_find_parts(const session_meshes *meshes, const char *name)
+{
+    const int first = mesh_position(meshes, name, INT64_MIN), end = count_before(meshes, name, 0, true);
+    return (session_parts){end - first, meshes->items + first};
+}
+
+session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block)
+{
+    const int at = mesh_position(meshes, name, block);
+    session_mesh *mesh = at < meshes->count ? meshes->items[at] : NULL;
+    return mesh && mesh->block == block && strcmp(mesh->name, name) == 0 ? mesh : NULL;
 }
 
 /* Ensures space for one more mesh. */
@@ -374,17 +415,31 @@ void session_keep_problem(session_field *field, const base_error *problem, base_
 
 static void insert_mesh(session_meshes *meshes, session_mesh *mesh)
 {
-    const int at = mesh_position(meshes, mesh->name);
+    const int at = mesh_position(meshes, mesh->name, mesh->block);
     memmove(meshes->items + at + 1, meshes->items + at, (size_t)(meshes->count - at) * sizeof *meshes->items);
     meshes->items[at] = mesh;
     meshes->count++;
 }
 
-session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error)
+/* NULL where memory runs out. */
+static char *make_label(const char *name, int64_t block)
+{
+    const size_t size = strlen(name) + 24;
+    char *label = base_alloc(size);
+    if (label && block == SESSION_WHOLE) snprintf(label, size, "%s", name);
+    if (label && block != SESSION_WHOLE) snprintf(label, size, "%s[%lld]", name, (long long)block);
+    return label;
+}
+
+session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error)
 {
     session_mesh *mesh = base_calloc(1, sizeof *mesh);
-    if (mesh) mesh->name = base_strdup(name);
-    if (!mesh || !mesh->name || !make_room(meshes)) {
+    if (mesh) {
+        mesh->name = base_strdup(name);
+        mesh->label = make_label(name, block);
+        mesh->block = block;
+    }
+    if (!mesh || !mesh->name || !mesh->label || !make_room(meshes)) {
         session_no_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
         free_mesh(mesh);
         return NULL;
@@ -393,16 +448,29 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_er
     return mesh;
 }
 
-void session_remove_mesh(session_meshes *meshes, const char *name)
+/* Removes so many meshes from the first on. */
+static void remove_meshes(session_meshes *meshes, int first, int count)
 {
-    session_mesh *mesh = session_find_mesh(meshes, name);
-    if (!mesh) return;
-    const int at = mesh_position(meshes, name);
-    meshes->count--;
-    for (int i = at; i < meshes->count; i++) meshes->items[i] = meshes->items[i + 1];
-    free_mesh(mesh);
+    for (int i = first; i < first + count; i++) {
+        meshes->are_levels_changed = meshes->are_levels_changed || session_has_levels(&meshes->items[i]->given);
+        free_mesh(meshes->items[i]);
+    }
+    meshes->count -= count;
+    for (int i = first; i < meshes->count; i++) meshes->items[i] = meshes->items[i + count];
+    if (!count) return;
     meshes->are_cells_changed = true;
     meshes->are_names_changed = true;
+}
+
+void session_remove_block(session_meshes *meshes, const char *name, int64_t block)
+{
+    if (session_find_block(meshes, name, block)) remove_meshes(meshes, mesh_position(meshes, name, block), 1);
+}
+
+void session_remove_mesh(session_meshes *meshes, const char *name)
+{
+    const session_parts parts = session_find_parts(meshes, name);
+    if (parts.count) remove_meshes(meshes, (int)(parts.items - meshes->items), parts.count);
 }
 
 int session_find_field(const session_mesh *mesh, const char *name)
@@ -474,5 +542,6 @@ void session_meshes_free(session_meshes *meshes)
     session_drop_pending(meshes);
     for (int i = 0; i < meshes->count; i++) free_mesh(meshes->items[i]);
     base_free(meshes->items);
+    base_free(meshes->level_boxes);
     *meshes = (session_meshes){0};
 }

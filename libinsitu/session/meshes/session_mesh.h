@@ -172,15 +172,39 @@ typedef struct session_conformed {
     int64_t bytes;
 } session_conformed;
 
-/* One rank's part of a mesh. */
+/* The cells of a block with a level of refinement, without ghost layers, as indices of its level. It is sent to other
+ * ranks as words. */
+typedef struct session_level_box {
+    uint64_t mesh; /* hash of its name */
+    int64_t block, rank;
+    int64_t lower[3], upper[3], refinement[3];
+} session_level_box;
+
+/* A finer block that covers part of a cell of this block. */
+typedef struct session_misfit {
+    bool is_any;
+    int axis;                  /* along which it ends within the cell */
+    int64_t block, refinement; /* the finer block's number on its rank, and its refinement along the axis */
+    int rank;
+} session_misfit;
+
+/* Block number of a mesh that is not given as blocks, whose numbers start at 0. */
+#define SESSION_WHOLE INT64_MIN
+
+/* One rank's part of a mesh, or one block of it. Blocks of one mesh have the same name. */
 typedef struct session_mesh {
     char *name;
+    int64_t block;        /* SESSION_WHOLE, or the block's number */
+    char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description, */
     insitu_mesh given;    /* with copies for the arrays that cannot be read in place */
     session_conformed conformed;
     session_topology topology;
     session_torn torn;
     session_lattice lattice;
+    unsigned char *covered; /* NULL, or a byte a cell read in place of ghosts: those, and the cells that finer blocks
+                               cover (outer/session_covers.h); a declared copy */
+    session_misfit misfit;
     grid cells;
     bool is_given;               /* false after an insitu_set_mesh() that failed: problem says why */
     base_error problem;          /* what was wrong with the last insitu_set_mesh(), */
@@ -198,8 +222,9 @@ typedef struct session_mesh {
     double size_sum;       /* the sum of the cube roots of drawn cells' volumes */
     uint64_t *flat;        /* NULL: no cell is flat; else as in cells */
 
-    uint64_t apart; /* session_catalogue_mesh.apart */
-    bool is_needed; /* an image of this step draws it */
+    uint64_t apart;  /* session_catalogue_mesh.apart */
+    bool is_refined; /* session_catalogue_mesh.is_refined */
+    bool is_needed;  /* an image of this step draws it */
     bool has_tree;
     mmbvh tree;
     bool is_partial;         /* the tree contains only the candidates of candidates_key, as long as nothing changes */
@@ -225,9 +250,12 @@ typedef struct session_filling {
 /* All meshes of this rank. */
 typedef struct session_meshes {
     int count, capacity;
-    session_mesh **items;               /* sorted by name */
+    session_mesh **items;               /* sorted by name, then by block */
     bool are_cells_changed;             /* cells or coordinates have changed since the last agreed extent */
     bool are_names_changed;             /* names have changed since the last agreed catalogue */
+    bool are_levels_changed;            /* blocks with levels of refinement have changed since covered cells were found */
+    int64_t level_box_count;            /* number of refined blocks near this rank's, including its own */
+    session_level_box *level_boxes;
     int64_t stamp;                      /* incremented by each change of cells or coordinates */
     base_error pending;                 /* error of a set call for which there was no mesh to keep it; for one step */
     char *pending_mesh, *pending_field; /* its mesh and field; NULL: any */
@@ -284,16 +312,31 @@ static inline void session_put_index(const grid_array *array, int64_t i, int64_t
 /* Frees an array owned by the session. */
 void session_drop_array(grid_array *array);
 
-/* Returns the mesh; NULL if there is none of this name. */
-session_mesh *session_find_mesh(const session_meshes *meshes, const char *name);
+/* This rank's parts of a mesh: the mesh itself, or its blocks. */
+typedef struct session_parts {
+    int count; /* 0: there is none of this name */
+    session_mesh **items;
+} session_parts;
+
+session_parts session_find_parts(const session_meshes *meshes, const char *name);
+/* Returns the parts from this index on that have the name of the first. */
+session_parts session_parts_at(const session_meshes *meshes, int first);
+/* Returns the block; NULL if there is none of this name and number. */
+session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block);
+/* The same of a mesh that is not given as blocks. */
+static inline session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
+{
+    return session_find_block(meshes, name, SESSION_WHOLE);
+}
 int session_find_field(const session_mesh *mesh, const char *name); /* index, or -1 */
 
 /* Adds a field without values; its name must be new and is copied. Returns NULL if memory runs out. */
 session_field *session_add_field(session_mesh *mesh, const char *name);
 
-/* Adds an empty mesh, whose name must be new. Returns NULL if memory runs out. */
-session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error);
-/* Removes the mesh if there is one of this name. */
+/* Adds an empty mesh or block, which must be new. Returns NULL if memory runs out. */
+session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error);
+/* Remove a block, or a mesh with all its blocks, if there is such a one. */
+void session_remove_block(session_meshes *meshes, const char *name, int64_t block);
 void session_remove_mesh(session_meshes *meshes, const char *name);
 
 /* Free the data that depends on the fields' values, on the cells, or all data of the mesh. */
@@ -310,6 +353,8 @@ void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Frees the copies of the caller's tables: patches and components. */
 void session_drop_field_tables(session_field *field);
+/* Frees what depends on the cells after these have changed; fields stay. */
+void session_renew_cells(session_meshes *meshes, session_mesh *mesh);
 /* Removes the derived fields, and with them all scalars and thresholds, which go by the numbers of fields. */
 void session_drop_derived(session_mesh *mesh);
 /* Frees the mesh of outer faces, and if with_faces also the faces; its threshold stays. */
@@ -373,6 +418,13 @@ bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 static inline bool session_has_owners(const insitu_mesh *mesh)
 {
     return mesh->owner.data || mesh->boundary_owner.data;
+}
+
+/* Returns whether the mesh is a block with a level of refinement. */
+static inline bool session_has_levels(const insitu_mesh *mesh)
+{
+    const insitu_lattice *l = mesh->lattice;
+    return l && mesh->cell_count > 0 && (l->refinement[0] || l->refinement[1] || l->refinement[2]);
 }
 
 /* Returns the number of given faces. Those of the separate list for the boundary come after the others. */

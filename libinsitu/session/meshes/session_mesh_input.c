@@ -305,25 +305,24 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
     unsigned changed = given->changed;
     if (!mesh->is_given || has_other_shape(&mesh->original, given)) changed = INSITU_CHANGED_ALL;
     const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
-    const bool had_ids = mesh->given.vertex_ids.data;
+    const bool had_ids = mesh->given.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
     changed |= seen_changes(mesh, given);
     if (session_conform_mesh(mesh, given, changed, error)) return;
     if (drops_fields) {
         session_drop_fields(mesh);
         meshes->are_names_changed = true;
     }
+
     if (changed & INSITU_CHANGED_TOPOLOGY) {
-        session_drop_scalars(mesh);
-        session_drop_tree(mesh);
-        session_drop_topology(&mesh->topology);
-        session_drop_torn(&mesh->torn);
-        mesh->rent = 0;
-        mesh->is_topology_stale = true;
+        session_renew_cells(meshes, mesh);
+        base_free(mesh->covered);
+        mesh->covered = NULL;
+        meshes->are_levels_changed = meshes->are_levels_changed || had_levels || session_has_levels(given);
     }
-    if (had_ids != (given->vertex_ids.data != NULL)) meshes->are_names_changed = true;
+    if (had_ids != (given->vertex_ids.data != NULL) || had_levels != session_has_levels(given))
+        meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
         mesh->places_stamp = ++meshes->stamp;
-        if (changed & INSITU_CHANGED_TOPOLOGY) mesh->cells_stamp = meshes->stamp;
         mesh->is_check_stale = true;
         mesh->torn.is_made = false;
         session_drop_outers(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);
@@ -344,37 +343,54 @@ insitu_status session_place_error(base_error *error, const char *mesh, const cha
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
 }
 
-static insitu_status set_mesh(session_meshes *meshes, const char *name, const insitu_mesh *given, base_error *error)
+/* A mesh is either whole or of blocks: the other is removed. */
+static void remove_others(session_meshes *meshes, const char *name, int64_t block)
 {
-    if (!given) {
+    const session_parts parts = session_find_parts(meshes, name);
+    if (parts.count && (parts.items[0]->block == SESSION_WHOLE) != (block == SESSION_WHOLE))
         session_remove_mesh(meshes, name);
-        return INSITU_OK;
-    }
-    session_mesh *mesh = session_find_mesh(meshes, name);
-    if (!mesh) mesh = session_add_mesh(meshes, name, error);
+}
+
+static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
+                              base_error *error)
+{
+    if (!given && block == SESSION_WHOLE) session_remove_mesh(meshes, name);
+    if (!given) session_remove_block(meshes, name, block);
+    if (!given) return INSITU_OK;
+    remove_others(meshes, name, block);
+    session_mesh *mesh = session_find_block(meshes, name, block);
+    if (!mesh) mesh = session_add_mesh(meshes, name, block, error);
     if (!mesh) return INSITU_ERROR_MEMORY;
     base_error what = {0};
+    const bool had_levels = session_has_levels(&mesh->given);
     if (check_mesh(given, &what) == INSITU_OK) take_mesh(meshes, mesh, given, &what);
     if (!what.status) return INSITU_OK;
+    meshes->are_levels_changed = meshes->are_levels_changed || had_levels;
     session_refuse_mesh(mesh);
     meshes->are_cells_changed = true;
     meshes->are_names_changed = true;
     mesh->problem = (base_error){0};
     mesh->is_problem_of_contents = false;
-    session_place_error(&mesh->problem, name, NULL, &what);
+    session_place_error(&mesh->problem, mesh->label, NULL, &what);
     *error = mesh->problem;
     return error->status;
 }
 
-insitu_status session_set_mesh(session_meshes *meshes, const char *name, const insitu_mesh *given, base_error *error)
+insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
+                               base_error *error)
 {
+    const char *call = block == SESSION_WHOLE ? "insitu_set_mesh" : "insitu_set_block";
     *error = (base_error){0};
-    if (!name || !*name) {
-        base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_mesh: the mesh has no name");
+    if (!name || !*name)
+        base_fail(error, INSITU_ERROR_ARGUMENT, "%s: the mesh has no name", call);
+    else if (block < 0 && block != SESSION_WHOLE)
+        base_fail(error, INSITU_ERROR_ARGUMENT, "%s: mesh \"%s\": the number of the block is %lld, expected 0 or more",
+                  call, name, (long long)block);
+    if (error->status) {
         session_keep_pending(meshes, error, NULL, NULL);
         return error->status;
     }
-    const insitu_status status = set_mesh(meshes, name, given, error);
+    const insitu_status status = set_mesh(meshes, name, block, given, error);
     if (status == INSITU_ERROR_MEMORY) session_keep_pending(meshes, error, NULL, NULL);
     return status;
 }

@@ -5,8 +5,9 @@
 #include "session_arrays.h"
 #include "session_mesh.h"
 
-/* Implements insitu_set_mesh(). *error is cleared first. Local. */
-insitu_status session_set_mesh(session_meshes *meshes, const char *name, const insitu_mesh *given, base_error *error);
+/* Implements insitu_set_mesh(), if block is SESSION_WHOLE, or insitu_set_block(). *error is cleared first. Local. */
+insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
+                               base_error *error);
 
 /* Stores the error of a check, preceded by "mesh "name": " and the field's name if there is one. */
 insitu_status session_place_error(base_error *error, const char *mesh, const char *field, const base_error *what);

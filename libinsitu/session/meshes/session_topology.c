@@ -82,6 +82,10 @@ void session_read_topology(session_mesh *mesh)
         g.connectivity = mesh->torn.corners;
         for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = mesh->torn.coordinates[axis];
     }
+    if (mesh->covered) {
+        g.ghosts = (const char *)mesh->covered;
+        g.ghosts_stride = g.ghosts_bytes = 1;
+    }
     session_read_lattice(mesh, &g);
     g.flat = mesh->flat;
     mesh->cells = g;
@@ -123,13 +127,13 @@ static insitu_status check_row(const session_mesh *mesh, int64_t face, const ses
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": face %lld: its vertices from offset %lld on, %lld of them, do not lie within "
                          "%lld..%lld",
-                         mesh->name, at, first + base, size, base, (long long)row->limit + base);
+                         mesh->label, at, first + base, size, base, (long long)row->limit + base);
     }
     if (size < 0 || size > INT64_MAX / 64)
-        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld", mesh->name, at, size);
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld", mesh->label, at, size);
     if (size > 0 && !row->list.data)
         return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its list is NULL, its size %lld",
-                         mesh->name, at, size);
+                         mesh->label, at, size);
     return INSITU_OK;
 }
 
@@ -143,7 +147,7 @@ static int64_t count_listed(const session_mesh *mesh, base_error *error)
         total += row.size;
         if (total <= INT64_MAX / 64) continue;
         base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld, too many with those before",
-                  mesh->name, (long long)face + mesh->given.index_base, (long long)row.size);
+                  mesh->label, (long long)face + mesh->given.index_base, (long long)row.size);
         return -1;
     }
     return total;
@@ -167,7 +171,7 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
             if (vertex < 0 || vertex >= given->vertex_count)
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
-                                 mesh->name, face + base, vertex + base, base, given->vertex_count - 1 + base, base);
+                                 mesh->label, face + base, vertex + base, base, given->vertex_count - 1 + base, base);
             session_put_index(&t->face_connectivity, at++, vertex);
         }
         session_put_index(&t->face_offsets, face + 1, at);
@@ -214,15 +218,15 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
     if (cells[0] != outside && (cells[0] < 0 || cells[0] > last - base))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": face %lld: its owner %lld is outside %lld..%lld (index_base is %lld)",
-                         mesh->name, at, cells[0] + base, base, last, base);
+                         mesh->label, at, cells[0] + base, base, last, base);
     if (cells[1] != outside && (cells[1] < -1 || cells[1] > last - base))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": face %lld: its neighbour %lld is outside %lld..%lld (index_base is %lld), "
                          "nor is it %lld, as on the boundary",
-                         mesh->name, at, cells[1] + base, base, last, base, base - 1);
+                         mesh->label, at, cells[1] + base, base, last, base, base - 1);
     if (cells[0] == cells[1] && cells[0] != outside)
         return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its owner and its neighbour are both %lld",
-                         mesh->name, at, cells[0] + base);
+                         mesh->label, at, cells[0] + base);
     return INSITU_OK;
 }
 
@@ -561,7 +565,7 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
     r.types = base_alloc((size_t)count);
     if (!r.types)
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of cells' types",
-                         mesh->name, (long long)count);
+                         mesh->label, (long long)count);
     recognise_cells(mesh, threads, &r);
     insitu_status status = INSITU_OK;
     if (!r.is_faulty) t->polyhedron_count = r.polyhedra;

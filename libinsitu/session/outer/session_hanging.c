@@ -91,42 +91,88 @@ static bool keep_border(const session_mesh *mesh, session_outer *outer, const un
     return true;
 }
 
-/* Updates a mesh's border. mesh: NULL if this rank has no part of it. */
-static insitu_status update_border(const session_mesh *mesh, const session_catalogue_mesh *of, session_border *border,
-                                   const session_team *team, base_error *error)
+bool session_has_twins(const session_joint *joint)
 {
-    session_outer outer = {0};
-    unsigned char *is_border = NULL;
-    if (border->cells == of->cells) return INSITU_OK;
-    const int64_t count = mesh ? mesh->cells.vertex_count : 0;
-    if (mesh) is_border = base_calloc((size_t)count + 1, 1);
-    if (mesh && !is_border) session_no_memory(error, count, "hanging vertices");
+    return joint->count > 1 || (joint->meshes[0]->is_refined && !joint->by_id);
+}
+
+/* Lists the parts, with a byte for each vertex of each. Returns false if memory runs out. */
+static bool list_faces_of(const session_joint_parts *parts, int first, int count, session_face_part *out)
+{
+    bool is_done = true;
+    for (int i = 0; i < count && is_done; i++) {
+        const session_mesh *mesh = parts->items[first + i];
+        out[i].mesh = mesh;
+        out[i].is_border = base_calloc((size_t)mesh->cells.vertex_count + 1, 1);
+        is_done = out[i].is_border != NULL;
+    }
+    return is_done;
+}
+
+/* Finds the borders of this rank's parts of one mesh of the joint. */
+static insitu_status update_mesh_borders(const session_joint *joint, int m, const session_joint_parts *parts,
+                                         const session_team *team, base_error *error)
+{
+    const int first = parts->firsts[m], count = parts->firsts[m + 1] - first;
+    session_border *borders = joint->hanging.borders + first;
+    session_outer *outers = base_calloc((size_t)count + 1, sizeof *outers);
+    session_face_part *of = base_calloc((size_t)count + 1, sizeof *of);
+    for (int i = 0; i < count && outers && of; i++) of[i].outer = &outers[i];
+    if (!outers || !of || !list_faces_of(parts, first, count, of))
+        session_no_memory(error, count * 100LL, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = session_find_outer_faces(mesh, &outer, &of->homes, team, is_border, error);
-    if (!status && mesh && !keep_border(mesh, &outer, is_border, border))
-        session_no_memory(error, count * 8, "hanging vertices");
+    if (!status) status = session_find_outer_faces(of, count, &joint->meshes[m]->homes, team, error);
+    for (int i = 0; i < count && !status && !error->status; i++)
+        if (!keep_border(of[i].mesh, &outers[i], of[i].is_border, &borders[i]))
+            session_no_memory(error, of[i].mesh->cells.vertex_count * 8, "hanging vertices");
     if (!status) status = session_agree(team->comm, error);
-    if (!status && !mesh) border->face_count = border->vertex_count = border->twin_count = 0;
-    if (!status) border->cells = of->cells;
-    session_drop_outer(&outer, true);
-    base_free(is_border);
+    for (int i = 0; i < count && !status; i++) borders[i].cells = joint->meshes[m]->cells;
+    for (int i = 0; i < count && of && outers; i++) {
+        session_drop_outer(&outers[i], true);
+        base_free(of[i].is_border);
+    }
+    base_free(outers);
+    base_free(of);
     return status;
 }
 
-insitu_status session_update_borders(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+/* Makes room for the borders of the parts; those of as many parts are kept. */
+static bool make_borders(session_hanging *hanging, int count)
+{
+    if (hanging->borders && hanging->border_count == count) return true;
+    session_hanging_free(hanging, true);
+    hanging->borders = base_calloc((size_t)count + 1, sizeof *hanging->borders);
+    if (hanging->borders) hanging->border_count = count;
+    return hanging->borders != NULL;
+}
+
+/* Marks the meshes whose borders are not those of their present cells on some rank. */
+static insitu_status find_stale_borders(const session_joint *joint, const session_joint_parts *parts,
+                                        const session_team *team, int *stale, base_error *error)
+{
+    for (int m = 0; m < joint->count; m++)
+        for (int i = parts->firsts[m]; i < parts->firsts[m + 1]; i++)
+            if (joint->hanging.borders[i].cells != joint->meshes[m]->cells) stale[m] = 1;
+    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, joint->count, MPI_INT, MPI_MAX, team->comm),
+                       "MPI_Allreduce");
+}
+
+insitu_status session_update_borders(session_joint *joint, const session_joint_parts *parts, const session_team *team,
                                      base_error *error)
 {
     session_hanging *hanging = &joint->hanging;
-    const int count = joint->count;
     if (hanging->borders && hanging->twins == joint->places) return INSITU_OK;
-    if (!hanging->borders) hanging->borders = base_calloc((size_t)count, sizeof *hanging->borders);
-    if (!hanging->borders) session_no_memory(error, count * (int64_t)sizeof *hanging->borders, "hanging vertices");
+    int *stale = base_calloc((size_t)joint->count, sizeof *stale);
+    if (!stale || !make_borders(hanging, parts->count))
+        session_no_memory(error, parts->count * (int64_t)sizeof *hanging->borders, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
-    for (int i = 0; i < count && !status; i++)
-        status = update_border(meshes[i], joint->meshes[i], &hanging->borders[i], team, error);
-    if (!status && count > 1) status = session_find_twins(joint, meshes, team, error);
+    if (!status) status = find_stale_borders(joint, parts, team, stale, error);
+    for (int m = 0; m < joint->count && !status; m++)
+        if (stale[m]) status = update_mesh_borders(joint, m, parts, team, error);
+    if (!status && session_has_twins(joint)) status = session_find_twins(joint, parts, team, error);
     if (!status) status = session_agree(team->comm, error);
     if (!status) hanging->twins = joint->places;
+    base_free(stale);
     return status;
 }
 
@@ -137,14 +183,14 @@ static bool list_candidates(hanging_search *s)
     const session_hanging_basis *basis = s->basis;
     const session_border *borders = basis->joint->hanging.borders;
     int64_t most = 0;
-    for (int m = 0; m < basis->joint->count; m++) most += borders[m].vertex_count;
+    for (int m = 0; m < basis->part_count; m++) most += borders[m].vertex_count;
     unsigned char *is_listed = base_calloc((size_t)basis->group_count + 1, 1);
     s->candidates = base_alloc((size_t)(most + 1) * sizeof *s->candidates);
     if (!is_listed || !s->candidates) {
         base_free(is_listed);
         return false;
     }
-    for (int m = 0; m < basis->joint->count; m++)
+    for (int m = 0; m < basis->part_count; m++)
         for (int64_t i = 0; i < borders[m].vertex_count; i++) {
             const int64_t v = borders[m].vertices[i], group = basis->of_vertex[basis->firsts[m] + v];
             if (group < 0 || is_listed[group]) continue;
@@ -247,7 +293,7 @@ static bool read_faces(hanging_search *s, bool is_hit)
     const session_border *borders = s->basis->joint->hanging.borders;
     unsigned char *states = s->states;
     bool is_done = true;
-    for (int m = 0; m < s->basis->joint->count; m++) {
+    for (int m = 0; m < s->basis->part_count; m++) {
         const session_border *border = &borders[m];
 #pragma omp parallel num_threads(border->face_count > REGION_ITEMS ? s->team->threads : 1)
         {
@@ -271,7 +317,7 @@ static bool read_faces(hanging_search *s, bool is_hit)
 static bool read_own_faces(hanging_search *s)
 {
     int64_t count = 0;
-    for (int m = 0; m < s->basis->joint->count; m++) count += s->basis->joint->hanging.borders[m].face_count;
+    for (int m = 0; m < s->basis->part_count; m++) count += s->basis->joint->hanging.borders[m].face_count;
     s->states = base_calloc((size_t)count + 1, 1);
     if (!s->states || !read_faces(s, false)) return false;
     s->own_count = s->face_count;
@@ -523,7 +569,7 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
     hanging_search search = {.basis = basis, .team = team};
     session_hanging found = {.places = joint->places};
     if (joint->hanging.places == joint->places) return INSITU_OK;
-    for (int i = 0; i < joint->count; i++)
+    for (int i = 0; i < basis->part_count; i++)
         search.rounding = fmax(search.rounding, session_place_rounding(basis->meshes[i]));
     if (!list_candidates(&search) || !bin_candidates(&search) || !read_own_faces(&search))
         session_no_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
@@ -532,11 +578,12 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
     if (!status) status = session_agree(team->comm, error);
     if (!status) status = count_all(team, &found, error);
     if (status) {
-        session_hanging_free(&found, 0, false);
+        session_hanging_free(&found, false);
         return status;
     }
-    session_hanging_free(&joint->hanging, joint->count, false);
+    session_hanging_free(&joint->hanging, false);
     found.borders = joint->hanging.borders;
+    found.border_count = joint->hanging.border_count;
     found.twins = joint->hanging.twins;
     joint->hanging = found;
     return INSITU_OK;

@@ -21,15 +21,20 @@
  * cells' vertices, are numbered consecutively. */
 typedef struct session_hanging_basis {
     session_joint *joint;
-    const session_mesh *const *meshes; /* the joint's meshes; NULL: this rank has no part of one */
-    const int64_t *firsts;             /* per mesh, the number of its first vertex */
+    int part_count;
+    const session_mesh *const *meshes; /* this rank's parts of the joint's meshes */
+    const int64_t *firsts;             /* per part, the number of its first vertex */
     const int64_t *of_vertex;          /* per vertex, its group; -1: it belongs to no drawn cell */
     int64_t group_count;
 } session_hanging_basis;
 
-/* Finds the joint's borders if they are not known, and for a joint of several meshes also which vertices are twins.
- * meshes: as above. Collective, agreed. */
-insitu_status session_update_borders(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+/* Returns whether vertices of the joint that differ only by rounding are one: those of several meshes, and those of
+ * levels of refinement. */
+bool session_has_twins(const session_joint *joint);
+
+/* Finds the joint's borders and the twins of its vertices if they are not known. parts: this rank's. Collective,
+ * agreed. */
+insitu_status session_update_borders(session_joint *joint, const session_joint_parts *parts, const session_team *team,
                                      base_error *error);
 
 /* Updates the joint's hanging vertices, unless they are up to date. Its borders must be. Collective, agreed. */

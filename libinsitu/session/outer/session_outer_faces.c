@@ -26,18 +26,36 @@
 /* The number of threads that have a table of sums of their own, with a word for each vertex. */
 enum { MOST_TABLES = 4 };
 
-typedef struct face_search {
-    const session_mesh *mesh;
-    int threads;
+/* What the search has of one part. */
+typedef struct part_cells {
+    const grid *grid;
     unsigned char *is_hidden; /* a byte a cell, not 0 for those beyond the threshold; NULL: there is no threshold */
-    uint64_t *hashes;         /* one for each vertex of the mesh */
-    int table_count;          /* of vertex_sums; when there are more threads, they share tables */
-    uint64_t *vertex_sums;    /* exclusive or of the hashes of a vertex's faces, in table_count tables */
-    uint64_t *hash_sums;      /* the same of all vertices with one hash (& mask), as vertices in one place are one */
+    int64_t first_cell;       /* number of its first cell among those of all parts */
+    int64_t first_vertex;     /* the same of vertices */
+    uint64_t *hashes;         /* one for each vertex */
+    unsigned char *is_open;   /* a byte a vertex: its sum is not 0, so that it may be a corner of an outer face */
+} part_cells;
+
+/* A face that may be an outer one. */
+typedef struct found_face {
+    session_face face;
+    int part; /* -1: the face is none after all */
+} found_face;
+
+typedef struct face_search {
+    const session_face_part *parts;
+    int part_count;
+    int threads;
+    part_cells *cells;                /* of each part */
+    int64_t cell_count, vertex_count; /* of all parts */
+    uint64_t *hashes;                 /* one for each vertex */
+    int table_count;                  /* of vertex_sums; when there are more threads, they share tables */
+    uint64_t *vertex_sums;  /* exclusive or of the hashes of a vertex's faces, in table_count tables */
+    uint64_t *hash_sums;    /* the same of all vertices with one hash (& mask), as vertices in one place are one */
     uint64_t mask;
-    unsigned char *is_open; /* a byte a vertex: its sum is not 0, so that it may be a corner of an outer face */
+    unsigned char *is_open; /* of all vertices */
     int64_t count;
-    session_face *faces; /* that may be outer ones, in the order of cells */
+    found_face *faces; /* in the order of parts and cells */
     session_key *keys;
     int64_t *groups; /* faces with equal keys share a group */
     int64_t *sizes;  /* number of faces in each group */
@@ -45,7 +63,8 @@ typedef struct face_search {
 
 static void search_free(face_search *s)
 {
-    base_free(s->is_hidden);
+    for (int i = 0; i < s->part_count && s->cells; i++) base_free(s->cells[i].is_hidden);
+    base_free(s->cells);
     base_free(s->hashes);
     base_free(s->vertex_sums);
     base_free(s->hash_sums);
@@ -56,25 +75,31 @@ static void search_free(face_search *s)
     base_free(s->sizes);
 }
 
+/* The number of vertices. Those of a part without cells do not count: they may lack the ids that all others have. */
+static int64_t vertices_of(const part_cells *p)
+{
+    return p->grid->cell_count ? p->grid->vertex_count : 0;
+}
+
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
 /* Tells whether the face's i-th vertex is not there before. One that it has twice counts once: a quad with two corners
  * in one place is a triangle. */
-static inline bool is_new(const face_search *s, const session_face_loop *loop, int64_t i)
+static inline bool is_new(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
-    const uint64_t hash = s->hashes[session_face_vertex(loop, i)];
+    const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
     for (int64_t k = 0; k < i; k++)
-        if (s->hashes[session_face_vertex(loop, k)] == hash) return false;
+        if (p->hashes[session_face_vertex(loop, k)] == hash) return false;
     return true;
 }
 
 /* Makes a face's key; false where it has fewer than three vertices. */
-static bool make_key(const face_search *s, const session_face_loop *loop, session_key *key)
+static bool make_key(const part_cells *p, const session_face_loop *loop, session_key *key)
 {
     uint64_t sums[3] = {0, 0, 0}, vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
-        const uint64_t h = s->hashes[session_face_vertex(loop, i)];
-        if (!is_new(s, loop, i)) continue;
+        const uint64_t h = p->hashes[session_face_vertex(loop, i)];
+        if (!is_new(p, loop, i)) continue;
         vertices++;
         sums[0] += h;
         sums[1] += h * h;
@@ -85,23 +110,26 @@ static bool make_key(const face_search *s, const session_face_loop *loop, sessio
     return vertices >= 3;
 }
 
-/* ---- this rank's part ---------------------------------------------------------------------------------------- */
+/* ---- this rank's parts --------------------------------------------------------------------------------------- */
 
-static bool has_faces(const face_search *s, int64_t cell)
+static bool has_faces(const part_cells *p, int64_t cell)
 {
-    return !grid_is_ghost(&s->mesh->cells, cell) && !(s->is_hidden && s->is_hidden[cell]);
+    return !grid_is_ghost(p->grid, cell) && !(p->is_hidden && p->is_hidden[cell]);
 }
 
-static void hash_vertices(face_search *s, bool by_id)
+static void hash_vertices(const face_search *s, bool by_id)
 {
-    const int64_t count = s->mesh->cells.vertex_count;
 #pragma omp parallel num_threads(s->threads)
     {
         region_enter();
+        for (int part = 0; part < s->part_count; part++) {
+            const part_cells *p = &s->cells[part];
+            const int64_t count = vertices_of(p);
 #pragma omp for schedule(static) nowait
-        for (int64_t v = 0; v < count; v++) {
-            const session_key key = session_vertex_key(s->mesh, v, by_id);
-            s->hashes[v] = session_key_hash(&key);
+            for (int64_t v = 0; v < count; v++) {
+                const session_key key = session_vertex_key(s->parts[part].mesh, v, by_id);
+                p->hashes[v] = session_key_hash(&key);
+            }
         }
         region_leave();
     }
@@ -109,9 +137,9 @@ static void hash_vertices(face_search *s, bool by_id)
 
 /* The table to which a thread adds the hashes of faces. */
 typedef struct xor_table {
-    const face_search *search;
-    uint64_t *vertex_sums; /* one for each vertex */
-    bool is_shared;        /* other threads add to it at the same time */
+    const part_cells *part; /* whose faces are added */
+    uint64_t *vertex_sums;  /* one for each of its vertices */
+    bool is_shared;         /* other threads add to it at the same time */
 } xor_table;
 
 static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
@@ -127,17 +155,17 @@ static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
 /* Adds the face's hash to the sums of its vertices. */
 static void add_face(const xor_table *x, const session_face_loop *loop)
 {
-    const face_search *s = x->search;
+    const part_cells *p = x->part;
     uint64_t sum = 0;
     int64_t vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
-        if (!is_new(s, loop, i)) continue;
-        sum += s->hashes[session_face_vertex(loop, i)];
+        if (!is_new(p, loop, i)) continue;
+        sum += p->hashes[session_face_vertex(loop, i)];
         vertices++;
     }
     if (vertices < 3) return;
     for (int64_t i = 0; i < loop->size; i++)
-        if (is_new(s, loop, i)) add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
+        if (is_new(p, loop, i)) add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
 }
 
 /* Adds the hashes of all faces of a cell whose type has a table of faces. Returns false, and adds nothing, where two of
@@ -147,7 +175,7 @@ static inline bool add_cell(const xor_table *x, const session_face_table *table,
     uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
     bool has_twins = false;
     for (int i = 0; i < count; i++) {
-        hashes[i] = x->search->hashes[vertices[i]];
+        hashes[i] = x->part->hashes[vertices[i]];
         for (int k = 0; k < i; k++) has_twins |= hashes[k] == hashes[i];
     }
     if (has_twins) return false;
@@ -166,10 +194,10 @@ static inline bool add_cell(const xor_table *x, const session_face_table *table,
 /* Adds the hashes of the cell's faces. */
 static void add_faces(const xor_table *x, int64_t cell)
 {
-    const grid *g = &x->search->mesh->cells;
+    const grid *g = x->part->grid;
     const int type = grid_cell_type(g, cell);
     const session_face_table *table = session_faces_of_type(type);
-    if (!has_faces(x->search, cell)) return;
+    if (!has_faces(x->part, cell)) return;
     if (table->count) {
         int64_t vertices[GRID_MAX_CELL_VERTICES];
         const int count = grid_cell_vertices(g, cell, vertices);
@@ -184,29 +212,32 @@ static void add_faces(const xor_table *x, int64_t cell)
     }
 }
 
-/* Adds the vertex's sums in all tables to that of its hash. */
+/* Adds the vertex's sums in all tables to that of its hash. vertex: among those of all parts. */
 static void add_vertex(const face_search *s, int64_t vertex)
 {
     uint64_t sum = 0;
-    for (int i = 0; i < s->table_count; i++) sum ^= s->vertex_sums[i * s->mesh->cells.vertex_count + vertex];
+    for (int i = 0; i < s->table_count; i++) sum ^= s->vertex_sums[i * s->vertex_count + vertex];
     add_xor(&s->hash_sums[s->hashes[vertex] & s->mask], sum, s->threads > 1);
 }
 
 /* Finds the vertices whose sum of faces is not 0. */
-static void cancel_faces(face_search *s)
+static void cancel_faces(const face_search *s)
 {
-    const grid *g = &s->mesh->cells;
 #pragma omp parallel num_threads(s->threads)
     {
         region_enter();
-        const xor_table x = {s, s->vertex_sums + omp_get_thread_num() % s->table_count * g->vertex_count,
-                             omp_get_num_threads() > s->table_count};
-#pragma omp for schedule(static)
-        for (int64_t cell = 0; cell < g->cell_count; cell++) add_faces(&x, cell);
-#pragma omp for schedule(static)
-        for (int64_t v = 0; v < g->vertex_count; v++) add_vertex(s, v);
+        uint64_t *table = s->vertex_sums + omp_get_thread_num() % s->table_count * s->vertex_count;
+        for (int part = 0; part < s->part_count; part++) {
+            const part_cells *p = &s->cells[part];
+            const xor_table x = {p, table + p->first_vertex, omp_get_num_threads() > s->table_count};
 #pragma omp for schedule(static) nowait
-        for (int64_t v = 0; v < g->vertex_count; v++) s->is_open[v] = s->hash_sums[s->hashes[v] & s->mask] != 0;
+            for (int64_t cell = 0; cell < p->grid->cell_count; cell++) add_faces(&x, cell);
+        }
+#pragma omp barrier
+#pragma omp for schedule(static)
+        for (int64_t v = 0; v < s->vertex_count; v++) add_vertex(s, v);
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < s->vertex_count; v++) s->is_open[v] = s->hash_sums[s->hashes[v] & s->mask] != 0;
         region_leave();
     }
 }
@@ -214,7 +245,7 @@ static void cancel_faces(face_search *s)
 /* Faces of some of the cells. */
 typedef struct face_list {
     int64_t count, room;
-    session_face *faces;
+    found_face *faces;
     session_key *keys;
     bool is_lost; /* memory ran out */
 } face_list;
@@ -229,7 +260,7 @@ static bool face_list_reserve(face_list *list)
 {
     if (list->count < list->room) return true;
     const int64_t room = list->room * 2 + 1024;
-    session_face *faces = base_realloc(list->faces, (size_t)room * sizeof *faces);
+    found_face *faces = base_realloc(list->faces, (size_t)room * sizeof *faces);
     if (faces) list->faces = faces;
     session_key *keys = base_realloc(list->keys, (size_t)room * sizeof *keys);
     if (keys) list->keys = keys;
@@ -238,37 +269,49 @@ static bool face_list_reserve(face_list *list)
     return !list->is_lost;
 }
 
-static bool is_open_face(const face_search *s, const session_face_loop *loop)
+static bool is_open_face(const part_cells *p, const session_face_loop *loop)
 {
     for (int64_t i = 0; i < loop->size; i++)
-        if (!s->is_open[session_face_vertex(loop, i)]) return false;
+        if (!p->is_open[session_face_vertex(loop, i)]) return false;
     return true;
 }
 
 /* Tells whether the cell may have an outer face, as far as vertices tell. */
-static bool has_open_vertices(const face_search *s, int64_t cell)
+static bool has_open_vertices(const part_cells *p, int64_t cell)
 {
-    const grid *g = &s->mesh->cells;
+    const grid *g = p->grid;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     int open = 0;
     if (!session_faces_of_type(grid_cell_type(g, cell))->count) return true;
     const int count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < count; i++) open += s->is_open[vertices[i]];
+    for (int i = 0; i < count; i++) open += p->is_open[vertices[i]];
     return open >= 3;
 }
 
 /* Lists the cell's faces that may be outer ones. */
-static void take_faces(const face_search *s, int64_t cell, face_list *out)
+static void take_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
-    if (!has_faces(s, cell) || !has_open_vertices(s, cell)) return;
-    const session_cell_faces of_cell = session_faces_of_cell(&s->mesh->cells, cell);
+    const part_cells *p = &s->cells[part];
+    if (!has_faces(p, cell) || !has_open_vertices(p, cell)) return;
+    const session_cell_faces of_cell = session_faces_of_cell(p->grid, cell);
     for (int64_t f = 0; f < of_cell.count; f++) {
         const session_face_loop loop = session_face_of(&of_cell, f);
         session_key key;
-        if (!(of_cell.size || is_open_face(s, &loop)) || !make_key(s, &loop, &key)) continue;
+        if (!(of_cell.size || is_open_face(p, &loop)) || !make_key(p, &loop, &key)) continue;
         if (!face_list_reserve(out)) return;
-        out->faces[out->count] = (session_face){cell, f};
+        out->faces[out->count] = (found_face){{cell, f}, part};
         out->keys[out->count++] = key;
+    }
+}
+
+/* Lists the faces of cells first .. end - 1, among those of all parts. */
+static void take_share(const face_search *s, int64_t first, int64_t end, face_list *out)
+{
+    for (int part = 0; part < s->part_count; part++) {
+        const part_cells *p = &s->cells[part];
+        const int64_t from = first - p->first_cell, to = end - p->first_cell;
+        for (int64_t cell = from > 0 ? from : 0; cell < to && cell < p->grid->cell_count; cell++)
+            take_faces(s, part, cell, out);
     }
 }
 
@@ -294,21 +337,19 @@ static bool join_lists(face_search *s, const face_list *lists, int count)
 
 static bool collect_faces(face_search *s)
 {
-    const int64_t cells = s->mesh->cells.cell_count;
-    const int parts = s->threads;
-    face_list *lists = base_calloc((size_t)parts, sizeof *lists);
+    const int shares = s->threads;
+    face_list *lists = base_calloc((size_t)shares, sizeof *lists);
     if (!lists) return false;
 #pragma omp parallel num_threads(s->threads)
     {
         region_enter();
 #pragma omp for schedule(static, 1) nowait
-        for (int part = 0; part < parts; part++)
-            for (int64_t cell = cells * part / parts; cell < cells * (part + 1) / parts; cell++)
-                take_faces(s, cell, &lists[part]);
+        for (int i = 0; i < shares; i++)
+            take_share(s, s->cell_count * i / shares, s->cell_count * (i + 1) / shares, &lists[i]);
         region_leave();
     }
-    const bool is_done = join_lists(s, lists, parts);
-    for (int i = 0; i < parts; i++) face_list_free(&lists[i]);
+    const bool is_done = join_lists(s, lists, shares);
+    for (int i = 0; i < shares; i++) face_list_free(&lists[i]);
     base_free(lists);
     return is_done;
 }
@@ -328,9 +369,9 @@ static bool count_keys(const session_key *keys, int64_t count, int64_t **groups,
     return true;
 }
 
-static bool is_shell(const face_search *s, const session_face *face)
+static bool is_shell(const face_search *s, const found_face *face)
 {
-    return grid_is_shell_type(grid_cell_type(&s->mesh->cells, face->cell));
+    return grid_is_shell_type(grid_cell_type(s->cells[face->part].grid, face->face.cell));
 }
 
 static void keep_single_faces(face_search *s)
@@ -344,32 +385,57 @@ static void keep_single_faces(face_search *s)
     s->count = kept;
 }
 
-/* Searches this rank's faces. There are none if this rank has no part of the mesh, or a part without cells, which may
- * lack the ids that all cells' vertices have. */
-static insitu_status search_own(face_search *s, const session_outer *outer, bool by_id, base_error *error)
+/* Allocates what the search keeps of vertices, and gives each part its share. */
+static bool make_tables(face_search *s)
 {
-    if (!s->mesh || s->mesh->cells.cell_count == 0) return INSITU_OK;
-    if (outer->threshold.is_given) {
-        s->is_hidden = session_hidden_cells(s->mesh, &outer->threshold, s->threads);
-        if (!s->is_hidden) return session_no_memory(error, s->mesh->cells.cell_count, "cells of a threshold");
-    }
-    const grid *g = &s->mesh->cells;
     uint64_t slots = 1;
-    while (slots < (uint64_t)g->vertex_count) slots *= 2;
+    while (slots < (uint64_t)s->vertex_count) slots *= 2;
     s->mask = slots - 1;
-    s->hashes = base_alloc((size_t)g->vertex_count * sizeof *s->hashes);
+    s->hashes = base_alloc((size_t)s->vertex_count * sizeof *s->hashes);
     s->table_count = s->threads < MOST_TABLES ? s->threads : MOST_TABLES;
-    s->vertex_sums = base_calloc((size_t)(g->vertex_count * s->table_count), sizeof *s->vertex_sums);
+    s->vertex_sums = base_calloc((size_t)(s->vertex_count * s->table_count), sizeof *s->vertex_sums);
     s->hash_sums = base_calloc(slots, sizeof *s->hash_sums);
-    s->is_open = base_alloc((size_t)g->vertex_count);
-    bool is_done = s->hashes && s->vertex_sums && s->hash_sums && s->is_open;
+    s->is_open = base_alloc((size_t)s->vertex_count);
+    if (!s->hashes || !s->vertex_sums || !s->hash_sums || !s->is_open) return false;
+    for (int part = 0; part < s->part_count; part++) {
+        part_cells *p = &s->cells[part];
+        p->hashes = s->hashes + p->first_vertex;
+        p->is_open = s->is_open + p->first_vertex;
+    }
+    return true;
+}
+
+/* Numbers the cells and vertices of all parts, and finds those beyond thresholds. */
+static bool begin_parts(face_search *s)
+{
+    s->cells = base_calloc((size_t)s->part_count + 1, sizeof *s->cells);
+    if (!s->cells) return false;
+    for (int part = 0; part < s->part_count; part++) {
+        const session_face_part *of = &s->parts[part];
+        part_cells *p = &s->cells[part];
+        *p = (part_cells){.grid = &of->mesh->cells, .first_cell = s->cell_count, .first_vertex = s->vertex_count};
+        s->cell_count += p->grid->cell_count;
+        s->vertex_count += vertices_of(p);
+        if (!of->outer->threshold.is_given) continue;
+        p->is_hidden = session_hidden_cells(of->mesh, &of->outer->threshold, s->threads);
+        if (!p->is_hidden) return false;
+    }
+    return true;
+}
+
+static insitu_status search_own(face_search *s, bool by_id, base_error *error)
+{
+    bool is_done = begin_parts(s);
+    if (is_done && s->cell_count == 0) return INSITU_OK;
+    is_done = is_done && make_tables(s);
     if (is_done) {
         hash_vertices(s, by_id);
         cancel_faces(s);
     }
     is_done = is_done && collect_faces(s) && count_keys(s->keys, s->count, &s->groups, &s->sizes);
     if (!is_done)
-        return session_no_memory(error, g->vertex_count * (9 + 8 * s->table_count) + (int64_t)slots * 8, "outer faces");
+        return session_no_memory(error, s->vertex_count * (9 + 8 * s->table_count) + (int64_t)(s->mask + 1) * 8,
+                                 "outer faces");
     keep_single_faces(s);
     return INSITU_OK;
 }
@@ -380,21 +446,23 @@ enum { KEY_WORDS = 3 };
 
 /* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have it.
  * The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
-static int home_of(const face_search *s, const session_homes *homes, int64_t face)
+static int home_of(const face_search *s, const session_homes *homes, int64_t number)
 {
-    const session_cell_faces faces = session_faces_of_cell(&s->mesh->cells, s->faces[face].cell);
-    const session_face_loop loop = session_face_of(&faces, s->faces[face].face);
+    const found_face *face = &s->faces[number];
+    const part_cells *p = &s->cells[face->part];
+    const session_cell_faces faces = session_faces_of_cell(p->grid, face->face.cell);
+    const session_face_loop loop = session_face_of(&faces, face->face.face);
     int64_t first = session_face_vertex(&loop, 0);
     double point[1][3];
     for (int64_t i = 0; i < loop.size; i++) {
         const int64_t vertex = session_face_vertex(&loop, i);
-        grid_vertex(&s->mesh->cells, vertex, point[0]);
+        grid_vertex(p->grid, vertex, point[0]);
         if (!session_homes_share(homes, point[0])) return -1;
-        if (s->hashes[vertex] < s->hashes[first]) first = vertex;
+        if (p->hashes[vertex] < p->hashes[first]) first = vertex;
     }
-    grid_vertex(&s->mesh->cells, first, point[0]);
-    const session_key key = session_vertex_key(s->mesh, first, homes->by_id);
-    return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[face]), (int64_t)key.words[0]);
+    grid_vertex(p->grid, first, point[0]);
+    const session_key key = session_vertex_key(s->parts[face->part].mesh, first, homes->by_id);
+    return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]), (int64_t)key.words[0]);
 }
 
 /* Packs the keys of faces in other ranks' boxes by their homes. *order: the face of each key. */
@@ -452,9 +520,9 @@ static void drop_shared(face_search *s, const session_mail *answers, const int64
 {
     int64_t kept = 0;
     for (int64_t i = 0; i < answers->total; i++)
-        if (answers->words[i] > 1 && !is_shell(s, &s->faces[order[i]])) s->faces[order[i]].cell = -1;
+        if (answers->words[i] > 1 && !is_shell(s, &s->faces[order[i]])) s->faces[order[i]].part = -1;
     for (int64_t i = 0; i < s->count; i++)
-        if (s->faces[i].cell >= 0) s->faces[kept++] = s->faces[i];
+        if (s->faces[i].part >= 0) s->faces[kept++] = s->faces[i];
     s->count = kept;
 }
 
@@ -488,30 +556,45 @@ static insitu_status search_shared(face_search *s, const session_homes *homes, c
     return status;
 }
 
-static void mark_border(const face_search *s, unsigned char *is_border)
+static void mark_borders(const face_search *s)
 {
     for (int64_t i = 0; i < s->count; i++) {
-        const session_cell_faces faces = session_faces_of_cell(&s->mesh->cells, s->faces[i].cell);
-        const session_face_loop loop = session_face_of(&faces, s->faces[i].face);
+        const found_face *face = &s->faces[i];
+        unsigned char *is_border = s->parts[face->part].is_border;
+        if (!is_border) continue;
+        const session_cell_faces faces = session_faces_of_cell(s->cells[face->part].grid, face->face.cell);
+        const session_face_loop loop = session_face_of(&faces, face->face.face);
         for (int64_t k = 0; k < loop.size; k++) is_border[session_face_vertex(&loop, k)] = 1;
     }
 }
 
-insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, const session_homes *homes,
-                                       const session_team *team, unsigned char *is_border, base_error *error)
+/* Gives each part its faces. */
+static void keep_faces(const face_search *s, base_error *error)
 {
-    face_search search = {.mesh = mesh, .threads = team->threads};
-    search_own(&search, outer, homes->by_id, error);
-    if (is_border && !error->status) mark_border(&search, is_border);
+    int64_t at = 0;
+    for (int part = 0; part < s->part_count; part++) {
+        session_outer *outer = s->parts[part].outer;
+        int64_t end = at;
+        while (end < s->count && s->faces[end].part == part) end++;
+        session_drop_outer(outer, true);
+        outer->faces = base_alloc((size_t)(end - at + 1) * sizeof *outer->faces);
+        if (!outer->faces) session_no_memory(error, (end - at) * (int64_t)sizeof *outer->faces, "outer faces");
+        for (int64_t i = at; i < end && outer->faces; i++) outer->faces[i - at] = s->faces[i].face;
+        outer->face_count = outer->faces ? end - at : 0;
+        outer->are_faces_known = outer->faces != NULL;
+        at = end;
+    }
+}
+
+insitu_status session_find_outer_faces(const session_face_part *parts, int count, const session_homes *homes,
+                                       const session_team *team, base_error *error)
+{
+    face_search search = {.parts = parts, .part_count = count, .threads = team->threads};
+    search_own(&search, homes->by_id, error);
+    if (!error->status) mark_borders(&search);
     const insitu_status status =
         team->ranks > 1 ? search_shared(&search, homes, team, error) : session_agree(team->comm, error);
-    if (!status && mesh) {
-        session_drop_outer(outer, true);
-        outer->face_count = search.count;
-        outer->faces = search.faces;
-        outer->are_faces_known = true;
-        search.faces = NULL;
-    }
+    if (!status) keep_faces(&search, error);
     search_free(&search);
     return status;
 }

@@ -43,7 +43,7 @@ static insitu_status tell(const patch_faces *p, int patch, int64_t face, const c
     const long long number = given->connectivity.data ? face + p->mesh->given.index_base
                              : given->faces.data      ? grid_array_index(&faces, face)
                                                       : given->first_face + face;
-    return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": patch %d: %sface %lld %s", p->mesh->name,
+    return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": patch %d: %sface %lld %s", p->mesh->label,
                      p->field->given.name, patch, given->connectivity.data ? "its " : "", number, what);
 }
 

@@ -25,11 +25,11 @@ typedef struct border_vertex {
 
 typedef struct twin_search {
     const session_joint *joint;
-    const session_mesh *const *meshes;
+    const session_joint_parts *parts;
     const session_team *team;
     int64_t corner_count, vertex_count;
     face_corner *corners;    /* this rank's, then the received ones */
-    border_vertex *vertices; /* of all meshes, in the meshes' order */
+    border_vertex *vertices; /* of all parts, in the parts' order */
     double rounding;
     session_bins bins;
 } twin_search;
@@ -53,17 +53,14 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
     }
 }
 
-/* Adds the corners of a mesh's outer faces. */
+/* Adds the corners of a part's outer faces; there is room for them. */
 static bool add_corners(twin_search *s, const session_mesh *mesh, const session_border *border)
 {
     const grid *g = &mesh->cells;
     double *edges = base_alloc((size_t)(g->vertex_count + 1) * sizeof *edges);
-    face_corner *corners =
-        base_realloc(s->corners, (size_t)(s->corner_count + border->vertex_count + 1) * sizeof *corners);
-    if (corners) s->corners = corners;
-    for (int64_t v = 0; v < g->vertex_count && edges && corners; v++) edges[v] = (double)INFINITY;
-    for (int64_t i = 0; i < border->face_count && edges && corners; i++) measure_edges(g, &border->faces[i], edges);
-    for (int64_t i = 0; i < border->vertex_count && edges && corners; i++) {
+    for (int64_t v = 0; v < g->vertex_count && edges; v++) edges[v] = (double)INFINITY;
+    for (int64_t i = 0; i < border->face_count && edges; i++) measure_edges(g, &border->faces[i], edges);
+    for (int64_t i = 0; i < border->vertex_count && edges; i++) {
         const double edge = edges[border->vertices[i]];
         if (isinf(edge)) continue;
         face_corner *c = &s->corners[s->corner_count++];
@@ -71,23 +68,24 @@ static bool add_corners(twin_search *s, const session_mesh *mesh, const session_
         c->slack = fmin(fmax(1e-5 * edge, s->rounding), edge / 4);
     }
     base_free(edges);
-    return edges && corners;
+    return edges != NULL;
 }
 
 static bool list_own(twin_search *s)
 {
     const session_border *borders = s->joint->hanging.borders;
     int64_t count = 0;
-    for (int m = 0; m < s->joint->count; m++) count += borders[m].vertex_count;
+    for (int m = 0; m < s->parts->count; m++) count += borders[m].vertex_count;
     s->vertices = base_alloc((size_t)(count + 1) * sizeof *s->vertices);
-    if (!s->vertices) return false;
-    for (int m = 0; m < s->joint->count; m++) {
+    s->corners = base_alloc((size_t)(count + 1) * sizeof *s->corners);
+    if (!s->vertices || !s->corners) return false;
+    for (int m = 0; m < s->parts->count; m++) {
         for (int64_t i = 0; i < borders[m].vertex_count; i++) {
             border_vertex *v = &s->vertices[s->vertex_count++];
-            grid_vertex(&s->meshes[m]->cells, borders[m].vertices[i], v->place);
+            grid_vertex(&s->parts->items[m]->cells, borders[m].vertices[i], v->place);
             memcpy(v->least, v->place, sizeof v->least);
         }
-        if (s->meshes[m] && !add_corners(s, s->meshes[m], &borders[m])) return false;
+        if (!add_corners(s, s->parts->items[m], &borders[m])) return false;
     }
     return session_bins_create(&s->bins, s->vertices->place, (int64_t)sizeof *s->vertices, s->vertex_count);
 }
@@ -171,7 +169,7 @@ static bool keep_all(const twin_search *s)
 {
     bool is_done = true;
     int64_t first = 0;
-    for (int m = 0; m < s->joint->count && is_done; m++) {
+    for (int m = 0; m < s->parts->count && is_done; m++) {
         session_border *border = &s->joint->hanging.borders[m];
         is_done = keep_twins(s->vertices + first, border);
         first += border->vertex_count;
@@ -179,12 +177,12 @@ static bool keep_all(const twin_search *s)
     return is_done;
 }
 
-insitu_status session_find_twins(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+insitu_status session_find_twins(session_joint *joint, const session_joint_parts *parts, const session_team *team,
                                  base_error *error)
 {
-    twin_search s = {.joint = joint, .meshes = meshes, .team = team};
+    twin_search s = {.joint = joint, .parts = parts, .team = team};
     session_mail out = {0}, in = {0};
-    for (int m = 0; m < joint->count; m++) s.rounding = fmax(s.rounding, session_place_rounding(meshes[m]));
+    for (int i = 0; i < parts->count; i++) s.rounding = fmax(s.rounding, session_place_rounding(parts->items[i]));
     if (!error->status && (!list_own(&s) || !pack_corners(&s, &out)))
         session_no_memory(error, (s.corner_count + s.vertex_count) * 80, "vertices of several meshes");
     const insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);

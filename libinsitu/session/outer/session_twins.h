@@ -10,9 +10,9 @@
 #include "session_catalogue.h"
 #include "session_team.h"
 
-/* Finds the twins of the joint's vertices; its borders and homes must be up to date. meshes: those of the joint; NULL
- * if this rank has no part of one. Errors of this rank alone are stored in *error and not returned. Collective. */
-insitu_status session_find_twins(session_joint *joint, const session_mesh *const *meshes, const session_team *team,
+/* Finds the twins of the joint's vertices; its borders and homes must be up to date. parts: this rank's. Errors of this
+ * rank alone are stored in *error and not returned. Collective. */
+insitu_status session_find_twins(session_joint *joint, const session_joint_parts *parts, const session_team *team,
                                  base_error *error);
 
 #endif

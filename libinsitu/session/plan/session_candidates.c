@@ -181,7 +181,7 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
         for (int i = 0, wish = 0; i < mesh->scalar_count && !status; i++)
             if (mesh->scalars[i].wants_ranges) mesh->scalars[i].unusable = unusable[wish++];
     } else {
-        base_fail(error, status, "mesh \"%s\": no memory to plan its tree", mesh->name);
+        base_fail(error, status, "mesh \"%s\": no memory to plan its tree", mesh->label);
     }
     base_free(fields);
     base_free(wishes);

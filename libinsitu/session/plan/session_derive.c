@@ -46,14 +46,32 @@ static const session_catalogue_field *find_field(const derive_work *w, const ses
     return NULL;
 }
 
-/* Returns this rank's part of a mesh with the field, and stores the field's index there; NULL if this rank has no
- * part. */
-static session_mesh *find_part(const derive_work *w, const session_catalogue_mesh *mesh, int *index)
+/* Visits this rank's parts of a mesh with the field.
+ *
+ *     for (part_visit v = visit_parts(w, mesh); next_part(w, &v);) use(v.part, v.index);
+ */
+typedef struct part_visit {
+    session_parts parts;
+    int next;
+    session_mesh *part;
+    int index; /* of the field on it */
+} part_visit;
+
+static part_visit visit_parts(const derive_work *w, const session_catalogue_mesh *mesh)
 {
-    session_mesh *part = find_field(w, mesh) ? session_find_mesh(w->basis->meshes, mesh->name) : NULL;
-    if (!part || !part->is_given) return NULL;
-    *index = session_find_field(part, w->derived->name);
-    return *index < 0 ? NULL : part;
+    part_visit visit = {{0}, 0, NULL, 0};
+    if (find_field(w, mesh)) visit.parts = session_find_parts(w->basis->meshes, mesh->name);
+    return visit;
+}
+
+static bool next_part(const derive_work *w, part_visit *v)
+{
+    while (v->next < v->parts.count) {
+        v->part = v->parts.items[v->next++];
+        v->index = v->part->is_given ? session_find_field(v->part, w->derived->name) : -1;
+        if (v->index >= 0) return true;
+    }
+    return false;
 }
 
 /* Returns the input's component, as grid_field.component. */
@@ -76,12 +94,10 @@ static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *
 
 /* ---- cells' values, recentred to vertices ---------------------------------------------------------------------- */
 
-/* Adds a scalar for the recentred values to this rank's part of the mesh. */
-static bool add_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
-                          int component)
+/* Adds a scalar for the recentred values to one of this rank's parts of the mesh. */
+static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, const scene_field *input, int component)
 {
-    session_mesh *part = session_find_mesh(w->basis->meshes, mesh->name);
-    const int index = part && part->is_given ? session_find_field(part, input->name) : -1;
+    const int index = part->is_given ? session_find_field(part, input->name) : -1;
     const uint64_t joint = joint_of(mesh, input);
     if (index < 0 || session_find_recentred(part, input->name, component, joint)) return true;
     session_scalar *scalar = session_add_scalar(part);
@@ -91,6 +107,15 @@ static bool add_recentred(const derive_work *w, const session_catalogue_mesh *me
     scalar->is_recentred = true;
     scalar->joined = joint;
     scalar->own = session_given_field(part, index, component);
+    return true;
+}
+
+static bool add_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
+                          int component)
+{
+    const session_parts parts = session_find_parts(w->basis->meshes, mesh->name);
+    for (int i = 0; i < parts.count; i++)
+        if (!add_to_part(mesh, parts.items[i], input, component)) return false;
     return true;
 }
 
@@ -155,9 +180,9 @@ static insitu_status find_stale(derive_work *w, base_error *error)
     const session_catalogue *catalogue = w->basis->catalogue;
     const int count = catalogue->mesh_count;
     for (int m = 0; m < count; m++) {
-        int index = 0;
-        const session_mesh *part = find_part(w, &catalogue->meshes[m], &index);
-        w->stale[m] = part && part->fields[index].made_of != hash_sources(w, &catalogue->meshes[m], part);
+        w->stale[m] = 0;
+        for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_part(w, &v);)
+            if (v.part->fields[v.index].made_of != hash_sources(w, &catalogue->meshes[m], v.part)) w->stale[m] = 1;
     }
     w->stale[count] = error->status != INSITU_OK;
     const MPI_Comm comm = w->basis->team->comm;
@@ -319,10 +344,10 @@ static void make_expressions(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
     for (int m = 0; m < catalogue->mesh_count; m++) {
-        int index = 0;
-        session_mesh *part = w->stale[m] ? find_part(w, &catalogue->meshes[m], &index) : NULL;
-        if (part && !error->status && !make_expression(w, &catalogue->meshes[m], part, index))
-            session_no_memory(error, place_count(part, &part->fields[index]) * 8, "a derived field");
+        if (!w->stale[m]) continue;
+        for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_part(w, &v) && !error->status;)
+            if (!make_expression(w, &catalogue->meshes[m], v.part, v.index))
+                session_no_memory(error, place_count(v.part, &v.part->fields[v.index]) * 8, "a derived field");
     }
 }
 
@@ -410,18 +435,17 @@ static int count_scalars(const derive_work *w, const session_joint *joint)
 static insitu_status begin_sums(const derive_work *w, const session_joint *joint, session_vertex_sums *sums,
                                 base_error *error)
 {
-    sums->parts = base_calloc((size_t)joint->count, sizeof *sums->parts);
-    if (!sums->parts) return session_no_memory(error, joint->count * 100LL, "gradients at vertices");
-    sums->part_count = joint->count;
-    for (int i = 0; i < joint->count; i++) {
-        int index = 0;
-        session_sum_part *part = &sums->parts[i];
-        part->mesh = find_part(w, joint->meshes[i], &index);
-        part->of_shells = joint->meshes[i]->has_shells_alone;
-        if (part->mesh) list_scalars(w, joint->meshes[i], part->mesh, part->fields);
-        if (part->mesh && !make_room(w, part->mesh, &part->mesh->fields[index]))
-            return session_no_memory(error, part->mesh->cells.vertex_count * 8, "a derived field");
-    }
+    sums->parts = base_calloc((size_t)w->basis->meshes->count + 1, sizeof *sums->parts);
+    if (!sums->parts) return session_no_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
+    for (int m = 0; m < joint->count; m++)
+        for (part_visit v = visit_parts(w, joint->meshes[m]); next_part(w, &v);) {
+            session_sum_part *part = &sums->parts[sums->part_count++];
+            part->mesh = v.part;
+            part->of_shells = joint->meshes[m]->has_shells_alone;
+            list_scalars(w, joint->meshes[m], v.part, part->fields);
+            if (!make_room(w, v.part, &v.part->fields[v.index]))
+                return session_no_memory(error, v.part->cells.vertex_count * 8, "a derived field");
+        }
     return session_key_all_vertices(sums, error);
 }
 
@@ -432,13 +456,12 @@ static insitu_status derive_joint(const derive_work *w, const session_joint *joi
     session_vertex_sums sums = {.by_id = joint->by_id, .field_count = count_scalars(w, joint)};
     if (!error->status) begin_sums(w, joint, &sums, error);
     const insitu_status status = session_find_sums(joint->homes, w->basis->team, w->basis->extent, &sums, error);
-    for (int i = 0; i < sums.part_count && !status && !error->status; i++) {
-        int index = 0;
-        if (!find_part(w, joint->meshes[i], &index)) continue;
-        session_mesh *mesh = sums.parts[i].mesh;
-        store_gradients(w, &sums, &sums.parts[i], &mesh->fields[index]);
-        note_values(w, joint->meshes[i], mesh, index);
-    }
+    int at = 0;
+    for (int m = 0; m < joint->count && !status && !error->status; m++)
+        for (part_visit v = visit_parts(w, joint->meshes[m]); next_part(w, &v);) {
+            store_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.index]);
+            note_values(w, joint->meshes[m], v.part, v.index);
+        }
     session_vertex_sums_free(&sums);
     return status;
 }

@@ -248,8 +248,9 @@ insitu_status session_name_derived(const scene *scene, const char *scene_path, s
     if (catalogue->are_derived) return INSITU_OK;
     bool is_done = name_in_catalogue(scene, scene_path, catalogue);
     for (int m = 0; m < catalogue->mesh_count && is_done; m++) {
-        session_mesh *mesh = session_find_mesh(meshes, catalogue->meshes[m].name);
-        if (mesh && mesh->is_given) is_done = name_on_mesh(&catalogue->meshes[m], mesh);
+        const session_parts parts = session_find_parts(meshes, catalogue->meshes[m].name);
+        for (int i = 0; i < parts.count && is_done; i++)
+            if (parts.items[i]->is_given) is_done = name_on_mesh(&catalogue->meshes[m], parts.items[i]);
     }
     catalogue->are_joined = catalogue->are_joined && scene->derived_count == 0;
     if (!is_done) session_no_memory(error, scene->derived_count * 100LL, "the names of derived fields");

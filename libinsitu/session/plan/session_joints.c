@@ -21,7 +21,7 @@ static bool is_member(const session_catalogue_mesh *mesh, const join_wish *wish)
     }
     const session_catalogue_field *found =
         scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
-    return found && session_is_recentred(field, found->centring);
+    return found && session_is_recentred(field, found->centring, mesh->is_refined);
 }
 
 /* Adds an empty joint for up to count meshes. Returns NULL if memory runs out. */
@@ -93,16 +93,19 @@ static bool join_derived(session_catalogue *catalogue, scene *scene, int number)
     return is_done;
 }
 
-/* Adds meshes with ids as joints by themselves. */
+/* Adds meshes with ids as joints by themselves. Tells each part whether any block of its mesh is refined. */
 static void find_apart(session_catalogue *catalogue, const session_meshes *meshes)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        session_mesh *own = session_find_mesh(meshes, mesh->name);
+        const session_parts parts = session_find_parts(meshes, mesh->name);
         uint64_t hash = SESSION_HASH_BEGIN;
         session_hash_text(&hash, mesh->name);
         mesh->apart = mesh->has_ids ? hash | 1 : 0;
-        if (own) own->apart = mesh->apart;
+        for (int i = 0; i < parts.count; i++) {
+            parts.items[i]->apart = mesh->apart;
+            parts.items[i]->is_refined = mesh->is_refined;
+        }
     }
 }
 

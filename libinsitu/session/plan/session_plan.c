@@ -258,7 +258,7 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = find_shown(mesh, field);
-        const bool is_wished = shown && session_is_recentred(field, shown->centring);
+        const bool is_wished = shown && session_is_recentred(field, shown->centring, mesh->is_refined);
         session_joint *joint =
             is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joined)) : NULL;
         if (!joint) continue;
@@ -392,7 +392,7 @@ static void warn_of_apart(const session_catalogue *catalogue, const scene_image 
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = mesh->first_rank >= 0 ? find_shown(mesh, field) : NULL;
-        if (!shown || !session_is_recentred(field, shown->centring)) continue;
+        if (!shown || !session_is_recentred(field, shown->centring, mesh->is_refined)) continue;
         if (mesh->apart && !name) name = mesh->name;
         count++;
     }

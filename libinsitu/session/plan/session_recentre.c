@@ -1,6 +1,7 @@
-/* Recentring: the value at a vertex is the mean over its cells (or, for values at corners, over the corners there) on
- * all ranks, with the same bits for any partition. If the field has values on faces of the boundary, a vertex of such
- * faces gets the mean over these instead, even if all of them are on other ranks than its cells.
+/* Recentring: the value at a vertex is the mean over its cells (or, for values at corners, over the corners there; for
+ * values at vertices of refined blocks, over the vertices there) on all ranks, with the same bits for any partition. If
+ * the field has values on faces of the boundary, a vertex of such faces gets the mean over these instead, even if all
+ * of them are on other ranks than its cells.
  *
  * Sums depend on their order, so sums of ranks' partial sums would depend on the partition. Instead all ranks' single
  * values are gathered, and summed so that their order does not matter (sum_of()).
@@ -38,19 +39,20 @@ typedef struct value_groups {
     unsigned char *are_faces; /* count entries: the values are those of faces, else those of cells or corners */
 } value_groups;
 
-/* This rank's part of one of the meshes. */
+/* One of this rank's parts of the meshes. */
 typedef struct mesh_part {
-    session_scalar *scalar; /* NULL: the mesh does not have the field on this rank */
-    grid_field field;       /* the values to recentre */
+    session_scalar *scalar; /* NULL: the part does not have the field */
+    bool is_of_vertices;
+    grid_field field; /* the values to recentre */
 } mesh_part;
 
 /* One recentring on this rank. */
 typedef struct recentring {
     session_joint *joint;
-    mesh_part *parts;            /* one for each of the joint's meshes */
-    const session_mesh **meshes; /* likewise; NULL: this rank has no part of the mesh */
-    int64_t *starts;             /* of the values, if faces of the boundary have some; else joint->groups has them */
-    value_groups values;         /* of joint->groups */
+    session_joint_parts list;
+    mesh_part *parts;    /* one for each of the list */
+    int64_t *starts;     /* of the values, if faces of the boundary have some; else joint->groups has them */
+    value_groups values; /* of joint->groups */
 } recentring;
 
 /* ---- values by group ----------------------------------------------------------------------------------------- */
@@ -97,10 +99,16 @@ static double sum_of(const double *values, int64_t count, double largest, double
     return sums[0] + sums[1];
 }
 
+/* The mean of equal values is their value, to the bit. */
 static double mean_of(const double *values, int64_t count)
 {
     double largest = 0;
-    for (int64_t i = 0; i < count; i++) largest = fabs(values[i]) > largest ? fabs(values[i]) : largest;
+    bool are_equal = count > 0;
+    for (int64_t i = 0; i < count; i++) {
+        largest = fabs(values[i]) > largest ? fabs(values[i]) : largest;
+        are_equal = are_equal && values[i] == values[0];
+    }
+    if (are_equal) return values[0];
     const double scale = largest > 0x1p900 ? 0x1p-128 : 1; /* so that no sum overflows */
     return count ? sum_of(values, count, largest, scale) / (double)count / scale : NAN;
 }
@@ -158,7 +166,7 @@ static void give_cell(recentring *r, int part, int64_t cell, cell_groups *list, 
 {
     const grid_field *field = &r->parts[part].field;
     const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
-    grid_walk walk = grid_walk_cell(&r->meshes[part]->cells, cell);
+    grid_walk walk = grid_walk_cell(&r->list.items[part]->cells, cell);
     double value = field->is_cell_centred ? grid_field_value(field, cell) : 0;
     int64_t vertex;
     if (!isfinite(value)) return;
@@ -174,11 +182,26 @@ static void give_cell(recentring *r, int part, int64_t cell, cell_groups *list, 
     for (int64_t i = 0; i < list->count; i++) give_value(&r->values, list->groups[i], value, is_shared);
 }
 
+/* Gives the finite values at the vertices of drawn cells, each once. */
+static void give_vertices(recentring *r, int part)
+{
+    const grid_field *field = &r->parts[part].field;
+    const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
+    for (int64_t v = 0; v < r->list.items[part]->cells.vertex_count; v++) {
+        const double value = of_vertex[v] < 0 ? NAN : grid_field_value(field, v);
+        if (isfinite(value)) give_value(&r->values, of_vertex[v], value, false);
+    }
+}
+
 /* Gives the values of the part's cells; false where memory runs out. */
 static bool give_values(recentring *r, int part, int threads)
 {
-    const grid *g = &r->meshes[part]->cells;
+    const grid *g = &r->list.items[part]->cells;
     bool is_lost = false;
+    if (r->parts[part].is_of_vertices) {
+        give_vertices(r, part);
+        return true;
+    }
 #pragma omp parallel num_threads(threads) reduction(|| : is_lost)
     {
         region_enter();
@@ -207,18 +230,17 @@ static void give_face_values(const session_patch_values *faces, value_groups *va
 /* Lists this rank's parts of the item's meshes. */
 static bool list_parts(const session_recentring *item, const session_meshes *meshes, recentring *r)
 {
-    const int count = item->joint->count;
     r->joint = item->joint;
-    r->parts = base_calloc((size_t)count, sizeof *r->parts);
-    r->meshes = base_calloc((size_t)count, sizeof *r->meshes);
-    if (!r->parts || !r->meshes) return false;
-    for (int i = 0; i < count; i++) {
-        const session_mesh *mesh = session_find_mesh(meshes, item->joint->meshes[i]->name);
-        if (mesh && !mesh->is_given) mesh = NULL;
+    if (!session_list_joint_parts(item->joint, meshes, &r->list)) return false;
+    r->parts = base_calloc((size_t)r->list.count + 1, sizeof *r->parts);
+    if (!r->parts) return false;
+    for (int i = 0; i < r->list.count; i++) {
+        const session_mesh *mesh = r->list.items[i];
         mesh_part *part = &r->parts[i];
-        r->meshes[i] = mesh;
-        part->scalar = mesh ? session_find_recentred(mesh, item->field, item->component, item->joint->name) : NULL;
-        if (part->scalar) part->field = session_given_field(mesh, part->scalar->field, part->scalar->component);
+        part->scalar = session_find_recentred(mesh, item->field, item->component, item->joint->name);
+        if (!part->scalar) continue;
+        part->field = session_given_field(mesh, part->scalar->field, part->scalar->component);
+        part->is_of_vertices = mesh->fields[part->scalar->field].given.centring == INSITU_VERTEX;
     }
     return true;
 }
@@ -226,9 +248,9 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
 static bool update_groups(recentring *r, int ranks)
 {
     session_joint *joint = r->joint;
-    const session_vertex_groups_basis basis = {
-        joint->places, joint->count, r->meshes, joint->count > 1 ? joint->hanging.borders : NULL,
-        joint->homes,  joint->by_id, ranks};
+    const session_border *borders = session_has_twins(joint) ? joint->hanging.borders : NULL;
+    const session_vertex_groups_basis basis = {joint->places, r->list.count, r->list.items, borders,
+                                               joint->homes,  joint->by_id,  ranks};
     return session_update_vertex_groups(&basis, &joint->groups);
 }
 
@@ -236,11 +258,11 @@ static bool update_groups(recentring *r, int ranks)
 static void find_face_values(const recentring *r, session_patch_values *faces, base_error *error)
 {
     const session_vertex_groups *groups = &r->joint->groups;
-    for (int i = 0; i < r->joint->count && !error->status; i++) {
+    for (int i = 0; i < r->list.count && !error->status; i++) {
         const mesh_part *part = &r->parts[i];
         const session_vertex_numbers numbers = {&groups->keys, groups->of_vertex + groups->firsts[i], r->joint->by_id};
         if (part->scalar)
-            session_find_patch_values(r->meshes[i], part->scalar->field, part->scalar->component, &numbers, &faces[i],
+            session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers, &faces[i],
                                       error);
     }
 }
@@ -250,26 +272,26 @@ static bool make_values(recentring *r, const session_patch_values *faces)
 {
     const session_vertex_groups *groups = &r->joint->groups;
     int64_t count = 0, added = 0;
-    for (int i = 0; i < r->joint->count; i++) count += faces[i].count;
+    for (int i = 0; i < r->list.count; i++) count += faces[i].count;
     if (count == 0) return groups_create(&r->values, groups->count, groups->starts);
     r->starts = base_calloc((size_t)groups->count + 1, sizeof *r->starts);
     if (!r->starts) return false;
-    for (int i = 0; i < r->joint->count; i++)
+    for (int i = 0; i < r->list.count; i++)
         for (int64_t k = 0; k < faces[i].count; k++) r->starts[faces[i].groups[k] + 1]++;
     for (int64_t g = 1; g <= groups->count; g++) {
         added += r->starts[g];
         r->starts[g] = groups->starts[g] + added;
     }
     if (!groups_create(&r->values, groups->count, r->starts)) return false;
-    for (int i = 0; i < r->joint->count; i++) give_face_values(&faces[i], &r->values);
+    for (int i = 0; i < r->list.count; i++) give_face_values(&faces[i], &r->values);
     return true;
 }
 
 /* Finds the means over this rank's cells and faces. */
 static void average_own(recentring *r, const session_team *team, base_error *error)
 {
-    const int count = r->joint->count;
-    session_patch_values *faces = base_calloc((size_t)count, sizeof *faces);
+    const int count = r->list.count;
+    session_patch_values *faces = base_calloc((size_t)count + 1, sizeof *faces);
     bool is_done = faces && update_groups(r, team->ranks);
     if (is_done) find_face_values(r, faces, error);
     if (is_done && !error->status) is_done = make_values(r, faces);
@@ -427,7 +449,7 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
 static void spread_means(const recentring *r, int part, int threads)
 {
     const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
-    const int64_t count = r->meshes[part]->cells.vertex_count;
+    const int64_t count = r->list.items[part]->cells.vertex_count;
     const grid_field *own = &r->parts[part].field;
     double *values = r->parts[part].scalar->vertex_values;
 #pragma omp parallel num_threads(threads)
@@ -442,19 +464,20 @@ static void spread_means(const recentring *r, int part, int threads)
     }
 }
 
-/* Returns whether any of the meshes has values of cells. Values at corners are not constrained: codes that have them do
- * so themselves. */
-static bool is_of_cells(const session_recentring *item)
+/* Returns whether any of the meshes has values of cells, or of vertices some of which may hang. Values at corners are
+ * not constrained: codes that have them do so themselves. */
+static bool is_constrained(const session_recentring *item)
 {
     for (int i = 0; i < item->joint->count; i++)
-        if (session_catalogue_find(item->joint->meshes[i], item->field)->centring == INSITU_CELL) return true;
+        if (session_catalogue_find(item->joint->meshes[i], item->field)->centring != INSITU_CORNER) return true;
     return false;
 }
 
 static insitu_status constrain_hanging(const recentring *r, const session_team *team, base_error *error)
 {
     const session_vertex_groups *groups = &r->joint->groups;
-    const session_hanging_basis basis = {r->joint, r->meshes, groups->firsts, groups->of_vertex, groups->count};
+    const session_hanging_basis basis = {r->joint,       r->list.count,     r->list.items,
+                                         groups->firsts, groups->of_vertex, groups->count};
     const insitu_status status = session_update_hanging(&basis, team, error);
     return status ? status : session_constrain_hanging(&r->joint->hanging, team, r->values.means, error);
 }
@@ -462,10 +485,10 @@ static insitu_status constrain_hanging(const recentring *r, const session_team *
 /* Allocates the values of each part. */
 static void make_room(const recentring *r, base_error *error)
 {
-    for (int i = 0; i < r->joint->count; i++) {
+    for (int i = 0; i < r->list.count; i++) {
         session_scalar *scalar = r->parts[i].scalar;
         if (!scalar || scalar->vertex_values) continue;
-        const int64_t count = r->meshes[i]->cells.vertex_count;
+        const int64_t count = r->list.items[i]->cells.vertex_count;
         scalar->vertex_values = base_alloc((size_t)count * sizeof(double));
         if (!scalar->vertex_values) session_no_memory(error, count * (int64_t)sizeof(double), "recentred values");
     }
@@ -473,7 +496,7 @@ static void make_room(const recentring *r, base_error *error)
 
 static void keep_means(const recentring *r, int threads)
 {
-    for (int i = 0; i < r->joint->count; i++) {
+    for (int i = 0; i < r->list.count; i++) {
         session_scalar *scalar = r->parts[i].scalar;
         if (!scalar) continue;
         spread_means(r, i, threads);
@@ -491,27 +514,29 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     insitu_status status = INSITU_OK;
     const bool is_listed = list_parts(item, meshes, &r);
     if (!is_listed) session_no_memory(error, item->joint->count * 64LL, "values recentred to vertices");
-    if (item->joint->count > 1 || is_of_cells(item))
-        status = session_update_borders(item->joint, r.meshes, team, error);
+    if (item->joint->count > 1 || is_constrained(item))
+        status = session_update_borders(item->joint, &r.list, team, error);
     if (!status && is_listed) average_own(&r, team, error);
     if (!status && !error->status) make_room(&r, error);
     if (!status) status = team->ranks > 1 ? merge_shared(team, &r, error) : session_agree(team->comm, error);
-    if (!status && is_of_cells(item)) status = constrain_hanging(&r, team, error);
+    if (!status && is_constrained(item)) status = constrain_hanging(&r, team, error);
     if (!status && !error->status) keep_means(&r, team->threads);
     groups_free(&r.values);
     base_free(r.starts);
     base_free(r.parts);
-    base_free(r.meshes);
+    session_joint_parts_free(&r.list);
     return status;
 }
 
 static bool is_stale(const session_recentring *item, const session_meshes *meshes)
 {
-    for (int i = 0; i < item->joint->count; i++) {
-        const session_mesh *mesh = session_find_mesh(meshes, item->joint->meshes[i]->name);
-        const session_scalar *scalar =
-            mesh ? session_find_recentred(mesh, item->field, item->component, item->joint->name) : NULL;
-        if (scalar && (scalar->are_values_stale || scalar->of_places != item->joint->places)) return true;
+    for (int m = 0; m < item->joint->count; m++) {
+        const session_parts parts = session_find_parts(meshes, item->joint->meshes[m]->name);
+        for (int i = 0; i < parts.count; i++) {
+            const session_scalar *scalar =
+                session_find_recentred(parts.items[i], item->field, item->component, item->joint->name);
+            if (scalar && (scalar->are_values_stale || scalar->of_places != item->joint->places)) return true;
+        }
     }
     return false;
 }

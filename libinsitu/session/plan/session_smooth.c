@@ -29,7 +29,8 @@ typedef struct smooth_items {
 
 /* This rank's work on an item. */
 typedef struct smooth_work {
-    session_scalar *scalar; /* NULL: this rank has no part of it */
+    session_scalar **scalars; /* one per part */
+    mmbvh_selection *crossed; /* per part, the cells that the surface crosses */
     session_vertex_sums sums;
 } smooth_work;
 
@@ -55,7 +56,7 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
     if (layer->normals != SCENE_VERTEX || !field || !scene_field_is_on(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
-    const bool is_recentred = session_is_recentred(&layer->field, field->centring);
+    const bool is_recentred = session_is_recentred(&layer->field, field->centring, mesh->is_refined);
     const uint64_t joined = is_recentred ? session_joint_name(mesh, layer->field.joined) : 0;
     smooth_item *item = find_item(items, &(smooth_item){mesh, field, &layer->field, joined, component, 0, NULL});
     if (!item) return false;
@@ -98,43 +99,55 @@ bool session_is_smooth(const session_plan *plan)
 
 /* ---- vertices of crossed cells ------------------------------------------------------------------------------- */
 
-/* Adds the keys of the crossed cells' vertices. */
-static bool add_own_keys(const smooth_item *item, const mmbvh_selection *crossed, session_vertex_sums *sums)
+/* Marks the vertices of a part's crossed cells with 0, the others with -1. Returns how many are marked. */
+static int64_t mark_vertices(const mmbvh_selection *crossed, session_sum_part *part)
 {
-    const session_sum_part *part = sums->parts;
     const grid *g = &part->mesh->cells;
-    int64_t most = 0, vertex;
+    int64_t count = 0, vertex;
     for (int64_t v = 0; v < g->vertex_count; v++) part->entries[v] = -1;
     for (int64_t i = 0; i < crossed->count; i++) {
         grid_walk walk = grid_walk_cell(g, crossed->cells[i]);
         while (grid_walk_next(&walk, &vertex)) {
-            most += part->entries[vertex] < 0;
+            count += part->entries[vertex] < 0;
             part->entries[vertex] = 0;
         }
     }
+    return count;
+}
+
+/* Adds the keys of the marked vertices. */
+static bool add_own_keys(const smooth_item *item, int64_t most, session_vertex_sums *sums)
+{
     if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;
-    for (int64_t v = 0; v < g->vertex_count; v++)
-        if (part->entries[v] == 0) {
-            const session_key key = session_vertex_key(part->mesh, v, item->mesh->has_ids);
-            session_keys_add(&sums->keys, &key);
-        }
+    for (int i = 0; i < sums->part_count; i++) {
+        const session_sum_part *part = &sums->parts[i];
+        for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++)
+            if (part->entries[v] == 0) {
+                const session_key key = session_vertex_key(part->mesh, v, item->mesh->has_ids);
+                session_keys_add(&sums->keys, &key);
+            }
+    }
     sums->own_count = sums->keys.count;
     return true;
 }
 
-static insitu_status find_own_keys(const smooth_item *item, int threads, session_vertex_sums *sums, base_error *error)
+static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_work *work, base_error *error)
 {
-    session_sum_part *part = sums->parts;
-    const mmbvh_wish wish = {part->fields, item->value_count, item->values};
+    session_vertex_sums *sums = &work->sums;
     const mmbvh_options options = {.threads = threads};
-    const int64_t vertices = part->mesh->cells.vertex_count;
-    mmbvh_selection crossed;
-    int64_t unusable;
-    part->entries = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *part->entries);
-    if (!part->entries) return session_no_memory(error, vertices * 4, "gradients at vertices");
-    if (mmbvh_select(&part->mesh->cells, &wish, 1, &options, &crossed, &unusable, error)) return error->status;
-    if (!add_own_keys(item, &crossed, sums)) session_no_memory(error, vertices * 40, "gradients at vertices");
-    mmbvh_selection_free(&crossed);
+    int64_t most = 0;
+    for (int i = 0; i < sums->part_count; i++) {
+        session_sum_part *part = &sums->parts[i];
+        const mmbvh_wish wish = {part->fields, item->value_count, item->values};
+        const int64_t vertices = part->mesh->cells.vertex_count;
+        int64_t unusable;
+        part->entries = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *part->entries);
+        if (!part->entries) return session_no_memory(error, vertices * 4, "gradients at vertices");
+        if (mmbvh_select(&part->mesh->cells, &wish, 1, &options, &work->crossed[i], &unusable, error))
+            return error->status;
+        most += mark_vertices(&work->crossed[i], part);
+    }
+    if (!add_own_keys(item, most, sums)) session_no_memory(error, most * 40, "gradients at vertices");
     return error->status;
 }
 
@@ -142,47 +155,74 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, session
 static insitu_status begin_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
                                 base_error *error)
 {
-    session_mesh *mesh = session_find_mesh(meshes, item->mesh->name);
+    const session_parts parts = session_find_parts(meshes, item->mesh->name);
+    const size_t room = (size_t)parts.count + 1;
     session_vertex_sums *sums = &work->sums;
     *work = (smooth_work){.sums = {.by_id = item->mesh->has_ids, .field_count = 1}};
-    sums->parts = base_calloc(1, sizeof *sums->parts);
-    if (!sums->parts || !session_keys_create(&sums->keys, 0))
-        return session_no_memory(error, 64, "gradients at vertices");
-    sums->part_count = 1;
-    work->scalar = mesh && mesh->is_given ? session_find_scalar(mesh, item->scene_field) : NULL;
-    if (!work->scalar) return INSITU_OK;
-    session_keys_free(&sums->keys);
-    sums->parts->mesh = mesh;
-    sums->parts->fields[0] = session_scalar_field(mesh, work->scalar);
-    return find_own_keys(item, threads, sums, error);
+    sums->parts = base_calloc(room, sizeof *sums->parts);
+    work->scalars = base_calloc(room, sizeof *work->scalars);
+    work->crossed = base_calloc(room, sizeof *work->crossed);
+    if (!sums->parts || !work->scalars || !work->crossed)
+        return session_no_memory(error, parts.count * 100LL, "gradients at vertices");
+    for (int i = 0; i < parts.count; i++) {
+        session_mesh *part = parts.items[i];
+        session_scalar *scalar = part->is_given ? session_find_scalar(part, item->scene_field) : NULL;
+        if (!scalar) continue;
+        work->scalars[sums->part_count] = scalar;
+        sums->parts[sums->part_count].mesh = part;
+        sums->parts[sums->part_count++].fields[0] = session_scalar_field(part, scalar);
+    }
+    return find_own_keys(item, threads, work, error);
+}
+
+static void free_work(smooth_work *work)
+{
+    for (int i = 0; i < work->sums.part_count && work->crossed; i++) mmbvh_selection_free(&work->crossed[i]);
+    base_free(work->crossed);
+    base_free(work->scalars);
+    session_vertex_sums_free(&work->sums);
 }
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Stores the gradients. Vertices whose sums only other ranks need get no gradient here. The length of a gradient does
- * not matter, so it is scaled to near that of the scene, so that no unit of the values makes it too small for a
- * float. */
-static insitu_status end_work(smooth_work *work, base_error *error)
+/* Numbers the part's vertices that this rank has requested; the others have sums for other ranks only, or none. sum_of
+ * gets the sum of each number. */
+static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
-    session_scalar *scalar = work->scalar;
-    session_sum_part *part = work->sums.parts;
-    const int64_t count = work->sums.own_count, words = session_sum_words(1);
-    const session_gradient_bounds bounds = {1, work->sums.bounds.sharpness};
+    int64_t count = 0;
+    for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
+        const int32_t entry = part->entries[v];
+        part->entries[v] = -1;
+        if (entry < 0 || entry >= own_count) continue;
+        sum_of[count] = entry;
+        part->entries[v] = (int32_t)count++;
+    }
+    return count;
+}
+
+/* Keeps the gradients of a part. A gradient is kept to a scale that does not matter, near that of the scene, so that no
+ * unit of the values makes it too small for a float. */
+static bool keep_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
+{
+    const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);
+    const session_gradient_bounds bounds = {1, sums->bounds.sharpness};
     session_drop_gradients(scalar);
-    scalar->gradients = base_alloc((size_t)(count ? count : 1) * sizeof *scalar->gradients);
-    if (!scalar->gradients) return session_no_memory(error, count * 12, "gradients at vertices");
-    for (int64_t i = 0; i < count; i++) {
+    int32_t *sum_of = base_alloc((size_t)(vertices + 1) * sizeof *sum_of);
+    const int64_t count = sum_of ? number_gradients(part, sums->own_count, sum_of) : 0;
+    scalar->gradients = base_alloc((size_t)(count + 1) * sizeof *scalar->gradients);
+    for (int64_t i = 0; i < count && scalar->gradients; i++) {
         double gradient[1][3];
-        session_mean_gradients(work->sums.sums + i * words, 1, &bounds, 1, gradient);
+        session_mean_gradients(sums->sums + sum_of[i] * words, 1, &bounds, 1, gradient);
         for (int a = 0; a < 3; a++)
             scalar->gradients[i][a] = gradient[0][a] == gradient[0][a] ? (float)gradient[0][a] : 0;
     }
-    for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++)
-        if (part->entries[v] >= count) part->entries[v] = -1;
+    const bool is_done = sum_of && scalar->gradients;
+    base_free(sum_of);
+    if (!is_done) return false;
     scalar->gradient_count = count;
     scalar->gradient_entries = part->entries;
     part->entries = NULL;
-    return INSITU_OK;
+    return true;
 }
 
 static insitu_status smooth(const smooth_item *item, const session_meshes *meshes, const session_team *team,
@@ -191,8 +231,10 @@ static insitu_status smooth(const smooth_item *item, const session_meshes *meshe
     smooth_work work = {0};
     if (!error->status) begin_work(item, meshes, team->threads, &work, error);
     const insitu_status status = session_find_sums(&item->mesh->homes, team, extent, &work.sums, error);
-    if (!status && !error->status && work.scalar) end_work(&work, error);
-    session_vertex_sums_free(&work.sums);
+    for (int i = 0; i < work.sums.part_count && !status && !error->status; i++)
+        if (!keep_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
+            session_no_memory(error, work.sums.own_count * 12, "gradients at vertices");
+    free_work(&work);
     return status;
 }
 

@@ -4,6 +4,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_covers.h"
 #include "session_outer_faces.h"
 #include "session_outer_mesh.h"
 #include "session_thresholds.h"
@@ -14,11 +15,21 @@ typedef struct surface_wish {
     const scene_threshold *threshold;
 } surface_wish;
 
-/* Returns this rank's faces; NULL if it has no part of the mesh. */
-static session_outer *find_own(const session_meshes *meshes, const surface_wish *wish, session_mesh **mesh)
+/* Returns the part's faces; NULL if it has none. */
+static session_outer *find_own(const session_mesh *part, const surface_wish *wish)
 {
-    *mesh = session_find_mesh(meshes, wish->mesh->name);
-    return *mesh && (*mesh)->is_given ? session_find_outer(*mesh, wish->threshold) : NULL;
+    return part->is_given ? session_find_outer(part, wish->threshold) : NULL;
+}
+
+/* Tells whether faces are out of date on some of this rank's parts. */
+static bool is_stale(const session_meshes *meshes, const surface_wish *wish)
+{
+    const session_parts parts = session_find_parts(meshes, wish->mesh->name);
+    for (int i = 0; i < parts.count; i++) {
+        const session_outer *outer = find_own(parts.items[i], wish);
+        if (outer && session_is_outer_stale(parts.items[i], outer)) return true;
+    }
+    return false;
 }
 
 static bool is_same(const scene_threshold *a, const scene_threshold *b)
@@ -71,9 +82,7 @@ static insitu_status find_stale(const session_meshes *meshes, const surface_wish
     /* entries: this rank has failed; this rank has stale faces */
     int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
-        session_mesh *mesh;
-        const session_outer *outer = find_own(meshes, &wishes[i], &mesh);
-        stale[i] = outer && session_is_outer_stale(mesh, outer);
+        stale[i] = is_stale(meshes, &wishes[i]);
         own[1] = own[1] || stale[i];
     }
     insitu_status status =
@@ -87,12 +96,20 @@ static insitu_status find_stale(const session_meshes *meshes, const surface_wish
 static insitu_status find_faces(const session_meshes *meshes, const surface_wish *wish, const session_team *team,
                                 base_error *error)
 {
-    session_mesh *mesh;
-    session_outer *outer = find_own(meshes, wish, &mesh);
-    const insitu_status status =
-        session_find_outer_faces(outer ? mesh : NULL, outer, &wish->mesh->homes, team, NULL, error);
-    if (!status && outer) session_set_outer_fresh(mesh, outer);
-    return status;
+    const session_parts parts = session_find_parts(meshes, wish->mesh->name);
+    int count = 0;
+    session_face_part *of = base_calloc((size_t)parts.count + 1, sizeof *of);
+    if (!of) session_no_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
+    for (int i = 0; i < parts.count && of; i++) {
+        session_outer *outer = find_own(parts.items[i], wish);
+        if (outer) of[count++] = (session_face_part){parts.items[i], outer, NULL};
+    }
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) status = session_find_outer_faces(of, count, &wish->mesh->homes, team, error);
+    if (!status && !error->status) session_drop_faces_between_levels(meshes, of, count, error);
+    for (int i = 0; i < count && !status && !error->status; i++) session_set_outer_fresh(of[i].mesh, of[i].outer);
+    base_free(of);
+    return status ? status : session_agree(team->comm, error);
 }
 
 /* Prepares the mesh of outer faces for drawing. All of its cells have a drawn face. */

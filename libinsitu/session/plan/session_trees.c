@@ -147,7 +147,7 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
         const double start = MPI_Wtime();
         const insitu_status status = refit_scalar(mesh, scalar, &options);
         if (status)
-            return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->name,
+            return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->label,
                              session_scalar_name(mesh, scalar));
         scalar->are_ranges_stale = false;
         const double seconds = MPI_Wtime() - start;
@@ -197,7 +197,7 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     const insitu_status status =
         mmbvh_refit_visible_bounds(&mesh->tree, &mesh->cells, visible, count, &options, &is_whole);
     base_free(visible);
-    if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->name);
+    if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->label);
     u->trees->is_parent_stale = true;
     u->report->refit_ms += 1e3 * (MPI_Wtime() - start);
     mesh->is_geometry_stale = false;

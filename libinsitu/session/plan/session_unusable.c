@@ -26,8 +26,16 @@ static const scene_field *next_field(field_walk *walk)
 
 static int64_t unusable_of(const session_mesh *mesh, const scene_field *field)
 {
-    const session_scalar *scalar = mesh && mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+    const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
     return scalar ? scalar->unusable : 0;
+}
+
+static int64_t unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
+{
+    const session_parts parts = session_find_parts(meshes, name);
+    int64_t sum = 0;
+    for (int i = 0; i < parts.count; i++) sum += unusable_of(parts.items[i], field);
+    return sum;
 }
 
 uint64_t session_unusable_key(const session_plan *plan, const session_meshes *meshes)
@@ -64,8 +72,7 @@ insitu_status session_warn_of_unusable(const session_plan *plan, const session_c
     insitu_status status = session_agree(team->comm, error);
     field_walk walk = {.plan = plan};
     for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
-        for (int m = 0; m < mesh_count; m++)
-            counts[m] = unusable_of(session_find_mesh(meshes, catalogue->meshes[m].name), field);
+        for (int m = 0; m < mesh_count; m++) counts[m] = unusable_of_parts(meshes, catalogue->meshes[m].name, field);
         const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
         status = session_mpi(error, code, "MPI_Allreduce");
         for (int m = 0; m < mesh_count && !status; m++) warn(catalogue->meshes[m].name, field, counts[m], report);

@@ -19,12 +19,14 @@ static session_key key_of_place(const double place[3])
     return key;
 }
 
-/* Assigns groups to the vertices of a mesh's drawn cells. Until then of_vertex is -2 - i for the i-th twin. by_id:
- * vertex gets one vertex of each group. */
-static void group_mesh(const session_mesh *mesh, const session_border *border, bool by_id, session_vertex_groups *out,
-                       int64_t *of_vertex, int64_t *one_vertex)
+/* Assigns groups to the vertices of a part's drawn cells. Until then of_vertex is -2 - i for the i-th twin. one_vertex
+ * (not NULL by id) gets the number of one vertex of each group. */
+static void group_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
+    const session_mesh *mesh = basis->parts[part];
+    const session_border *border = basis->borders ? &basis->borders[part] : NULL;
     const grid *g = &mesh->cells;
+    int64_t *of_vertex = out->of_vertex + out->firsts[part];
     for (int64_t v = 0; v < g->vertex_count; v++) of_vertex[v] = -1;
     for (int64_t i = 0; border && i < border->twin_count; i++) of_vertex[border->twins[i].vertex] = -2 - i;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -35,32 +37,29 @@ static void group_mesh(const session_mesh *mesh, const session_border *border, b
             if (of_vertex[vertex] < 0) {
                 const int64_t twin = -2 - of_vertex[vertex];
                 const session_key key =
-                    twin >= 0 ? key_of_place(border->twins[twin].place) : session_vertex_key(mesh, vertex, by_id);
+                    twin >= 0 ? key_of_place(border->twins[twin].place) : session_vertex_key(mesh, vertex, basis->by_id);
                 of_vertex[vertex] = session_keys_add(&out->keys, &key);
-                if (by_id) one_vertex[of_vertex[vertex]] = vertex;
+                if (one_vertex) one_vertex[of_vertex[vertex]] = out->firsts[part] + vertex;
             }
             out->starts[of_vertex[vertex] + 1]++;
         }
     }
 }
 
-/* Groups the vertices of all meshes. *one_vertex: if they are grouped by id, one vertex of each group. */
+/* Groups the vertices of all parts. *one_vertex: if they are grouped by id, the number of one vertex of each group. */
 static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
 {
-    out->firsts = base_calloc((size_t)basis->mesh_count + 1, sizeof *out->firsts);
+    out->firsts = base_calloc((size_t)basis->part_count + 1, sizeof *out->firsts);
     if (!out->firsts) return false;
-    for (int i = 0; i < basis->mesh_count; i++)
-        out->firsts[i + 1] = out->firsts[i] + (basis->meshes[i] ? basis->meshes[i]->cells.vertex_count : 0);
-    const int64_t most = out->firsts[basis->mesh_count];
+    for (int i = 0; i < basis->part_count; i++)
+        out->firsts[i + 1] = out->firsts[i] + basis->parts[i]->cells.vertex_count;
+    const int64_t most = out->firsts[basis->part_count];
     *one_vertex = basis->by_id ? base_alloc((size_t)most * sizeof **one_vertex) : NULL;
     out->of_vertex = base_alloc((size_t)most * sizeof *out->of_vertex);
     out->starts = base_calloc((size_t)most + 1, sizeof *out->starts);
     if (!out->of_vertex || !out->starts || (basis->by_id && !*one_vertex) || !session_keys_create(&out->keys, most))
         return false;
-    for (int i = 0; i < basis->mesh_count; i++)
-        if (basis->meshes[i])
-            group_mesh(basis->meshes[i], basis->borders ? &basis->borders[i] : NULL, basis->by_id, out,
-                       out->of_vertex + out->firsts[i], *one_vertex);
+    for (int i = 0; i < basis->part_count; i++) group_part(basis, i, out, *one_vertex);
     out->count = out->keys.count;
     for (int64_t group = 0; group < out->count; group++) out->starts[group + 1] += out->starts[group];
     int64_t *starts = base_realloc(out->starts, (size_t)(out->count + 1) * sizeof *starts);
@@ -70,11 +69,25 @@ static bool group_vertices(const groups_basis *basis, session_vertex_groups *out
 
 /* ---- groups that other ranks may have -------------------------------------------------------------------------- */
 
+static void place_of_vertex(const groups_basis *basis, const session_vertex_groups *groups, int64_t number,
+                            double place[3])
+{
+    int part = 0, end = basis->part_count;
+    while (end - part > 1) {
+        const int middle = part + (end - part) / 2;
+        if (groups->firsts[middle] <= number)
+            part = middle;
+        else
+            end = middle;
+    }
+    grid_vertex(&basis->parts[part]->cells, number - groups->firsts[part], place);
+}
+
 static void place_of(const groups_basis *basis, const session_vertex_groups *groups, const int64_t *one_vertex,
                      int64_t group, double place[3])
 {
     if (one_vertex)
-        grid_vertex(&basis->meshes[0]->cells, one_vertex[group], place);
+        place_of_vertex(basis, groups, one_vertex[group], place);
     else
         memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
 }
@@ -125,9 +138,9 @@ static bool list_shared(const groups_basis *basis, const int64_t *one_vertex, se
 
 static bool has_patches(const groups_basis *basis)
 {
-    for (int i = 0; i < basis->mesh_count; i++)
-        for (int f = 0; basis->meshes[i] && f < basis->meshes[i]->field_count; f++)
-            if (basis->meshes[i]->fields[f].given.patch_count) return true;
+    for (int i = 0; i < basis->part_count; i++)
+        for (int f = 0; f < basis->parts[i]->field_count; f++)
+            if (basis->parts[i]->fields[f].given.patch_count) return true;
     return false;
 }
 

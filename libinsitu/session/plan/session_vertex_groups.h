@@ -12,9 +12,9 @@
 /* What they are made of. */
 typedef struct session_vertex_groups_basis {
     uint64_t places;
-    int mesh_count;
-    const session_mesh *const *meshes; /* NULL: this rank has no part of one */
-    const session_border *borders;     /* with twins, one per mesh; NULL: vertices have none */
+    int part_count;
+    const session_mesh *const *parts; /* this rank's, of all meshes of the joint */
+    const session_border *borders;    /* with twins, one per part; NULL: vertices have none */
     const session_homes *homes;
     bool by_id; /* the joint is one mesh, whose vertices are equal if their global ids are */
     int ranks;

@@ -39,7 +39,7 @@ static bool key_all_vertices(session_vertex_sums *sums)
     int64_t most = 0;
     for (int i = 0; i < sums->part_count; i++) {
         session_sum_part *part = &sums->parts[i];
-        const int64_t count = part->mesh ? part->mesh->cells.vertex_count : 0;
+        const int64_t count = part->mesh->cells.vertex_count;
         part->entries = base_alloc((size_t)count * sizeof *part->entries);
         if (!part->entries) return false;
         most += count;
@@ -47,7 +47,6 @@ static bool key_all_vertices(session_vertex_sums *sums)
     if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;
     for (int i = 0; i < sums->part_count; i++) {
         session_sum_part *part = &sums->parts[i];
-        if (!part->mesh) continue;
         mark_vertices(part);
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             if (part->entries[v] < 0) continue;
@@ -62,8 +61,7 @@ static bool key_all_vertices(session_vertex_sums *sums)
 static int64_t vertex_count(const session_vertex_sums *sums)
 {
     int64_t count = 0;
-    for (int i = 0; i < sums->part_count; i++)
-        count += sums->parts[i].mesh ? sums->parts[i].mesh->cells.vertex_count : 0;
+    for (int i = 0; i < sums->part_count; i++) count += sums->parts[i].mesh->cells.vertex_count;
     return count;
 }
 
@@ -101,7 +99,7 @@ static bool find_places(const session_vertex_sums *sums, double (**out)[3])
     if (!*out) return false;
     for (int i = 0; i < sums->part_count; i++) {
         const session_sum_part *part = &sums->parts[i];
-        for (int64_t v = 0; part->mesh && v < part->mesh->cells.vertex_count; v++) {
+        for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             if (part->entries[v] < 0) continue;
             int64_t number = part->entries[v];
             if (!sums->are_all) {
@@ -241,22 +239,28 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
 }
 
 /* Finds all vertices with one of the keys: this rank's own, which a crack may double, and the requested ones. */
-static bool find_entries(const session_vertex_sums *sums, const session_sum_part *part, int threads)
+static void find_entries(const session_vertex_sums *sums, const session_sum_part *part, const key_filter *filter,
+                         int threads)
 {
-    key_filter filter;
-    if (!filter_create(&sums->keys, &filter)) return false;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
-            const uint64_t bit = session_key_hash(&key) >> 32 & filter.mask;
-            const bool may_be = filter.bits[bit / 64] >> bit % 64 & 1;
+            const uint64_t bit = session_key_hash(&key) >> 32 & filter->mask;
+            const bool may_be = filter->bits[bit / 64] >> bit % 64 & 1;
             part->entries[v] = may_be ? (int32_t)session_keys_find(&sums->keys, &key) : -1;
         }
         region_leave();
     }
+}
+
+static bool find_all_entries(const session_vertex_sums *sums, int threads)
+{
+    key_filter filter;
+    if (!filter_create(&sums->keys, &filter)) return false;
+    for (int i = 0; i < sums->part_count; i++) find_entries(sums, &sums->parts[i], &filter, threads);
     base_free(filter.bits);
     return true;
 }
@@ -272,12 +276,10 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
     sums->sums = base_calloc(count, (size_t)session_sum_words(sums->field_count) * sizeof *sums->sums);
-    if (!sums->sums) return false;
+    if (!sums->sums || (!sums->are_all && sums->keys.count && !find_all_entries(sums, threads))) return false;
     for (int i = 0; i < sums->part_count && sums->keys.count; i++) {
         session_gradient_bounds own;
         const session_sum_part *part = &sums->parts[i];
-        if (!part->mesh) continue;
-        if (!sums->are_all && !find_entries(sums, part, threads)) return false;
         const session_gradient_basis basis = basis_of(sums, part, threads);
         if (!session_list_cells(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own)) return false;
         sums->bounds.rise = fmax(sums->bounds.rise, own.rise);
@@ -288,12 +290,15 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
 
 static bool add_sums(const session_vertex_sums *sums, const session_cell_list *lists, int threads)
 {
-    for (int i = 0; i < sums->part_count; i++) {
+    unsigned char *owners = session_sum_owners(sums->keys.count, threads);
+    bool is_done = owners != NULL;
+    for (int i = 0; i < sums->part_count && is_done; i++) {
         if (!lists[i].count) continue;
         const session_gradient_basis basis = basis_of(sums, &sums->parts[i], threads);
-        if (!session_add_gradients(&basis, &lists[i], &sums->bounds, sums->keys.count, sums->sums)) return false;
+        is_done = session_add_gradients(&basis, &lists[i], &sums->bounds, owners, sums->sums);
     }
-    return true;
+    base_free(owners);
+    return is_done;
 }
 
 /* Computes the sums, with the bounds of all ranks. If a rank has failed before, all return its error; an error after

@@ -7,15 +7,15 @@
 #include "session_gradients.h"
 #include "session_space.h"
 
-/* This rank's part of one mesh. */
+/* One of this rank's parts of the meshes. */
 typedef struct session_sum_part {
-    session_mesh *mesh; /* NULL: this rank has no part of it */
+    session_mesh *mesh;
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
     int32_t *entries; /* key of each vertex, or -1 */
 } session_sum_part;
 
-/* This rank's work on the sums of the same scalars of one mesh or several. */
+/* This rank's work on the sums of the same scalars of one mesh or several. part_count 0: it has none of them. */
 typedef struct session_vertex_sums {
     int part_count;
     session_sum_part *parts;
@@ -29,7 +29,7 @@ typedef struct session_vertex_sums {
     int64_t *sums; /* session_sum_words() per key */
 } session_vertex_sums;
 
-/* Gives a key to every vertex of a cell that is not a ghost. The parts' meshes must be set. Local. */
+/* Gives a key to every vertex of a cell that is not a ghost. Local. */
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
 
 /* Computes the sums of this rank's keys, over all ranks. Keys and entries must be set. A rank that has failed before

@@ -108,41 +108,64 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
 {
     if (session_is_distance(scalar)) return;
     const char *field = session_scalar_name(mesh, scalar);
-    const session_warning warning = {WARNING_UNSAID, field, mesh->name, scalar->component};
+    const session_warning warning = {WARNING_UNSAID, field, mesh->label, scalar->component};
     const bool has_changed = !scalar->is_suspect && scalar->has_checksum && scalar->sample != sample_of(mesh, scalar);
     session_warn_own(
         report, &warning, has_changed,
         "mesh \"%s\": field \"%s\" has other values than in the last picture, but was not set again, or with "
         "INSITU_CHANGED_NOTHING: set it with INSITU_CHANGED_VALUES, as such changes may be missed",
-        mesh->name, field);
+        mesh->label, field);
     scalar->is_suspect = scalar->is_suspect || has_changed;
 }
 
-static void compare(const session_mesh *mesh, session_scalar *scalar, int threads, session_report *report)
+/* Returns whether the values are those of the last picture. */
+static bool compare(const session_mesh *mesh, session_scalar *scalar, int threads)
 {
     const uint64_t checksum = checksum_of(mesh, scalar, threads);
     scalar->is_suspect = false;
     scalar->sample = sample_of(mesh, scalar);
-    if (scalar->has_checksum && scalar->checksum == checksum) {
-        session_text_add(&report->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
-                         mesh->name, session_scalar_name(mesh, scalar));
-        return;
-    }
+    if (scalar->has_checksum && scalar->checksum == checksum) return true;
     scalar->has_checksum = true;
     scalar->checksum = checksum;
     scalar->are_ranges_stale = true;
     scalar->version++;
     session_forget_extents(scalar);
+    return false;
+}
+
+/* Blocks are told of by their number alone. */
+static void tell_same(const session_mesh *mesh, const session_scalar *scalar, int64_t *blocks, session_report *report)
+{
+    if (mesh->block != SESSION_WHOLE)
+        (*blocks)++;
+    else
+        session_text_add(&report->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
+                         mesh->name, session_scalar_name(mesh, scalar));
+}
+
+static void compare_parts(const session_parts *parts, int threads, session_report *report)
+{
+    int64_t blocks = 0;
+    for (int i = 0; i < parts->count; i++) {
+        session_mesh *mesh = parts->items[i];
+        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
+            session_scalar *scalar = &mesh->scalars[k];
+            if (scalar->is_used) warn_of_change(mesh, scalar, report);
+            if (scalar->is_used && scalar->is_suspect && compare(mesh, scalar, threads))
+                tell_same(mesh, scalar, &blocks, report);
+        }
+    }
+    if (blocks)
+        session_text_add(&report->left_out,
+                         "mesh \"%s\": %lld fields of blocks have the values of the last picture: no ranges",
+                         parts->items[0]->name, (long long)blocks);
 }
 
 void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report)
 {
-    for (int i = 0; i < meshes->count; i++) {
-        session_mesh *mesh = meshes->items[i];
-        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
-            session_scalar *scalar = &mesh->scalars[k];
-            if (scalar->is_used) warn_of_change(mesh, scalar, report);
-            if (scalar->is_used && scalar->is_suspect) compare(mesh, scalar, threads, report);
-        }
+    for (int i = 0; i < meshes->count;) {
+        const session_parts parts = session_parts_at(meshes, i);
+        compare_parts(&parts, threads, report);
+        i += parts.count;
     }
 }

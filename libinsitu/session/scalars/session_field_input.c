@@ -342,7 +342,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     }
     field->problem = (base_error){0};
     field->is_problem_of_contents = false;
-    session_place_error(&field->problem, mesh->name, given->name, &what);
+    session_place_error(&field->problem, mesh->label, given->name, &what);
     *error = field->problem;
     return error->status;
 }
@@ -355,18 +355,38 @@ static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, co
         session_keep_pending(meshes, error, NULL, NULL);
         return error->status;
     }
-    return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->name);
+    return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->label);
 }
 
-insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error)
+/* The mesh or the block is not there; it may be there in the other way. */
+static void refuse_missing(const session_meshes *meshes, const char *name, int64_t block, const char *field,
+                           base_error *error)
 {
+    const session_parts parts = session_find_parts(meshes, name);
+    if (parts.count && block == SESSION_WHOLE)
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is of blocks: use insitu_set_block_field",
+                  field, name);
+    else if (parts.count && parts.items[0]->block == SESSION_WHOLE)
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not of blocks: use insitu_set_field",
+                  field, name);
+    else if (block == SESSION_WHOLE)
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field, name);
+    else
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": block %lld of its mesh \"%s\" is not set", field,
+                  (long long)block, name);
+}
+
+insitu_status session_set_field(session_meshes *meshes, const char *name, int64_t block, const insitu_field *field,
+                                base_error *error)
+{
+    const char *call = block == SESSION_WHOLE ? "insitu_set_field" : "insitu_set_block_field";
     *error = (base_error){0};
-    session_mesh *mesh = name ? session_find_mesh(meshes, name) : NULL;
+    session_mesh *mesh = name ? session_find_block(meshes, name, block) : NULL;
     const char *field_name = field ? field->name : NULL;
     if (!name || !field_name || !*field_name)
-        base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_field: no mesh, no field, or a field without a name");
+        base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no mesh, no field, or a field without a name", call);
     else if (!mesh)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field_name, name);
+        refuse_missing(meshes, name, block, field_name, error);
     else if (!mesh->is_given)
         return refuse_field(meshes, mesh, field_name, error);
     else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
@@ -394,7 +414,7 @@ insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_fi
     const insitu_field promised = field->given;
     base_error what = {0};
     if (check_filled(mesh, &promised, filled, &what) || !copy_tables(field, filled, &what))
-        return session_place_error(error, mesh->name, promised.name, &what);
+        return session_place_error(error, mesh->label, promised.name, &what);
     read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;

@@ -4,8 +4,10 @@
 
 #include "session_mesh.h"
 
-/* Implements insitu_set_field(). *error is cleared first. Local. */
-insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error);
+/* Implements insitu_set_field(), if block is SESSION_WHOLE, or insitu_set_block_field(). *error is cleared first.
+ * Local. */
+insitu_status session_set_field(session_meshes *meshes, const char *name, int64_t block, const insitu_field *field,
+                                base_error *error);
 
 /* Checks and stores a field's description after its fill function has set its values. The error names the mesh and the
  * field. Local. */

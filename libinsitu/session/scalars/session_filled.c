@@ -16,7 +16,7 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
 {
     *out = *given;
     out->changed = INSITU_CHANGED_ALL;
-    meshes->filling = (session_filling){.mesh = mesh->name, .field = given->name};
+    meshes->filling = (session_filling){.mesh = mesh->label, .field = given->name};
     const insitu_status status = given->fill(given->fill_data, out);
     meshes->filling.mesh = NULL;
     if (meshes->filling.refused.status) {
@@ -24,7 +24,7 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
         return error->status;
     }
     if (status == INSITU_OK) return status;
-    return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": its fill returned %d (%s)", mesh->name,
+    return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": its fill returned %d (%s)", mesh->label,
                      given->name, (int)status, insitu_status_name(status));
 }
 
@@ -45,18 +45,23 @@ static insitu_status fill_field(session_meshes *meshes, session_mesh *mesh, int 
     return status;
 }
 
+static void fill_part(session_meshes *meshes, session_mesh *part, const char *name, bool of_images, base_error *error)
+{
+    base_error own = {0};
+    const int index = part->is_given ? session_find_field(part, name) : -1;
+    if (index < 0 || !part->fields[index].given.fill || !is_needed(part, index, of_images)) return;
+    if (fill_field(meshes, part, index, &own)) session_keep_problem(&part->fields[index], &own, error);
+}
+
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *all = &catalogue->meshes[m];
-        session_mesh *mesh = session_find_mesh(meshes, all->name);
-        for (int f = 0; f < all->field_count && mesh && mesh->is_given; f++) {
-            base_error own = {0};
-            const int index = session_find_field(mesh, all->fields[f].name);
-            if (index < 0 || !mesh->fields[index].given.fill || !is_needed(mesh, index, of_images)) continue;
-            if (fill_field(meshes, mesh, index, &own)) session_keep_problem(&mesh->fields[index], &own, error);
-        }
+        const session_parts parts = session_find_parts(meshes, all->name);
+        for (int f = 0; f < all->field_count; f++)
+            for (int i = 0; i < parts.count; i++)
+                fill_part(meshes, parts.items[i], all->fields[f].name, of_images, error);
     }
     return error->status;
 }

@@ -487,22 +487,24 @@ bool session_bound_gradients(const session_gradient_basis *basis, const session_
     return give_all(&to, list, out);
 }
 
+unsigned char *session_sum_owners(int64_t sum_count, int threads)
+{
+    const size_t count = threads > 1 ? (size_t)sum_count : 0;
+    unsigned char *owners = base_alloc(count + 1);
+    /* More threads than an owner's byte can tell apart share all sums. */
+    if (owners) memset(owners, threads < NO_OWNER ? NO_OWNER : SHARED, count);
+    return owners;
+}
+
 bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list,
-                           const session_gradient_bounds *bounds, int64_t entry_count, int64_t *sums)
+                           const session_gradient_bounds *bounds, unsigned char *owners, int64_t *sums)
 {
     target to = {.basis = basis, .sums = sums, .scale = 1 / basis->length};
-    const size_t owner_count = basis->threads > 1 ? (size_t)entry_count : 0;
-    unsigned char *owners = base_alloc(owner_count);
     double units[2];
     session_gradient_bounds unused;
-    if (!owners) return false;
-    /* If there are more threads than a byte can number, all sums are shared. */
-    memset(owners, basis->threads < NO_OWNER ? NO_OWNER : SHARED, owner_count);
     if (basis->threads > 1) to.owners = owners;
     find_units(bounds, units);
     for (int i = 0; i < MOST_NUMBERS; i++)
         to.units[i / 2][i % 2] = i < 3 * basis->field_count ? units[0] : i == 3 * basis->field_count ? units[1] : 0;
-    const bool is_done = give_all(&to, list, &unused);
-    base_free(owners);
-    return is_done;
+    return give_all(&to, list, &unused);
 }

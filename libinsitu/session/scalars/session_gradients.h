@@ -51,10 +51,14 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                              session_gradient_bounds *out);
 
-/* Adds the cells' contributions. bounds: over all grids and ranks; sums: session_sum_words() for each of entry_count.
- * Returns false if memory ran out. Local. */
+/* Returns a byte per sum, in which threads note which of them adds to it, from base_alloc(); NULL if memory ran out.
+ * Local. */
+unsigned char *session_sum_owners(int64_t sum_count, int threads);
+
+/* Adds the cells' contributions. bounds: over all grids and ranks; owners: those of the sums, shared by all grids;
+ * sums: session_sum_words() for each. Returns false if memory ran out. Local. */
 bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list,
-                           const session_gradient_bounds *bounds, int64_t entry_count, int64_t *sums);
+                           const session_gradient_bounds *bounds, unsigned char *owners, int64_t *sums);
 
 /* Computes the mean gradients of a sum, in the units of values over those of coordinates; NaN if no cell contributed.
  * length: that of the basis. */

@@ -16,7 +16,7 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
-        const int index = scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
+        const int index = scene_field_is_on(field, mesh->label) ? session_find_field(mesh, field->name) : -1;
         if (index >= 0) mesh->fields[index].is_wanted = true;
     }
 }
@@ -92,7 +92,7 @@ static insitu_status describe_fault(const session_mesh *mesh, const session_fiel
     return base_fail(error, INSITU_ERROR_FIELD,
                      "mesh \"%s\": field \"%s\": the index of %s %lld is %lld, outside %lld..%lld (index_base is "
                      "%lld)",
-                     mesh->name, field->given.name, words[centring], number,
+                     mesh->label, field->given.name, words[centring], number,
                      (long long)grid_array_index(&v->index, entry) + base, base, v->count - 1 + base, base);
 }
 

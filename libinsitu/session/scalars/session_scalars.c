@@ -52,9 +52,13 @@ static int find_field(const session_mesh *mesh, const scene_field *field)
     return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
 }
 
-bool session_is_recentred(const scene_field *field, insitu_centring centring)
+bool session_is_recentred(const scene_field *field, insitu_centring centring, bool is_refined)
 {
-    return centring == INSITU_CELL ? field->at_vertices : centring == INSITU_CORNER && field->joins_corners;
+    switch (centring) {
+    case INSITU_CELL: return field->at_vertices;
+    case INSITU_CORNER: return field->joins_corners;
+    default: return is_refined && !field->is_as_given;
+    }
 }
 
 bool session_is_copied(const session_mesh *mesh, const session_field *field)
@@ -75,7 +79,7 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, session_resolve_component(field, given->component_count),
-                       session_is_recentred(field, given->centring), joined_on(mesh, field));
+                       session_is_recentred(field, given->centring, mesh->is_refined), joined_on(mesh, field));
 }
 
 grid_field session_given_field(const session_mesh *mesh, int index, int component)
@@ -147,7 +151,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         if (!scalar) return false;
         scalar->field = index;
         scalar->component = session_resolve_component(field, given->component_count);
-        scalar->is_recentred = session_is_recentred(field, given->centring);
+        scalar->is_recentred = session_is_recentred(field, given->centring, mesh->is_refined);
         scalar->joined = joined_on(mesh, field);
     }
     scalar->is_used = true;

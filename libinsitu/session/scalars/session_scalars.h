@@ -9,8 +9,9 @@
 /* Returns the component that a layer shows, as grid_field.component. */
 int session_resolve_component(const scene_field *field, int component_count);
 
-/* Returns whether a field of this centring is shown by means at vertices. */
-bool session_is_recentred(const scene_field *field, insitu_centring centring);
+/* Returns whether a field of this centring is shown by values at vertices that the session computes: by means, or, on a
+ * mesh with levels of refinement, by the given ones except at hanging vertices. */
+bool session_is_recentred(const scene_field *field, insitu_centring centring, bool is_refined);
 
 /* Records that an image of this step uses the layer's field on the mesh; *marked: NULL if the mesh does not have it.
  * Returns false if memory ran out. Local. */

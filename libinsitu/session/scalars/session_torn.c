@@ -52,7 +52,7 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
             return base_fail(error, INSITU_ERROR_FIELD,
                              "mesh \"%s\": a field has values at corners, and cell %lld is a polyhedron, whose corners "
                              "have no order",
-                             mesh->name, (long long)cell);
+                             mesh->label, (long long)cell);
     return INSITU_OK;
 }
 

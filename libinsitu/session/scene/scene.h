@@ -25,6 +25,7 @@ typedef struct scene_field {
     int component;      /* 0 .., or one of the above */
     bool at_vertices;   /* cell values are recentred to the vertices; else they are drawn as they are */
     bool joins_corners; /* values at cells' corners give way to their means at the vertices */
+    bool is_as_given;   /* hanging vertices keep the values that they were given */
     int line;           /* line in the scene file, for messages about the field */
     int mesh_count;     /* 0: on the meshes that have the field */
     char **meshes;      /* a name stands for the meshes below it too: "a" for "a/0" */

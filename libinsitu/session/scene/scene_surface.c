@@ -18,7 +18,7 @@ static insitu_status convert_threshold(const scene_document *d, const char *laye
     char path[SCENE_PATH_SIZE];
     if (!in) return INSITU_OK;
     snprintf(path, sizeof path, "%s.threshold", layer);
-    out->is_given = true;
+    out->is_given = out->field.is_as_given = true;
     out->low = in->from ? *in->from : -(double)INFINITY;
     out->high = in->to ? *in->to : (double)INFINITY;
     if (!in->from && !in->to) return scene_bad(d, path, "", "has no bounds, expected from, to or both");

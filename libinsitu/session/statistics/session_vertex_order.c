@@ -10,7 +10,7 @@
 #include "session_tally.h"
 #include "session_topology.h"
 
-enum { ORDERS = 3, SAMPLES = 256 /* number of a mesh's cells that a rank samples */ };
+enum { ORDERS = 3, SAMPLES = 256 /* number of a mesh's cells that a rank samples, or a few more */ };
 
 /* The types in which the orders differ. Each is judged separately: if few cells are hexes, these may be wrong all the
  * same. */
@@ -49,9 +49,10 @@ static int64_t *sums_of(const session_mesh *mesh, int64_t cell, int64_t sums[CEL
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 
-static void sum_orders(const session_mesh *mesh, int64_t sums[CELL_SUMS])
+/* share: the number of parts that the samples are of, at least one each. */
+static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
 {
-    const int64_t step = mesh->cells.cell_count / SAMPLES + 1;
+    const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell += step) {
         const int type = grid_cell_type(&mesh->cells, cell);
         int64_t *of_type = sums_of(mesh, cell, sums);
@@ -65,13 +66,16 @@ static void sum_orders(const session_mesh *mesh, int64_t sums[CELL_SUMS])
 
 static void sum_cells(const session_meshes *meshes, const char *name, int64_t sums[CELL_SUMS])
 {
-    const session_mesh *mesh = session_find_mesh(meshes, name);
-    if (!mesh || !mesh->is_given) return;
-    sums[DRAWN] = mesh->drawn_count - mesh->shell_count;
-    sums[FLAT] = mesh->flat_count - mesh->shell_count;
-    sums[INVERTED] = mesh->cells.lattice ? 0 : mesh->inverted_count; /* axes may run either way */
-    sums[SHELLS] = mesh->shell_count;
-    sum_orders(mesh, sums);
+    const session_parts parts = session_find_parts(meshes, name);
+    for (int i = 0; i < parts.count; i++) {
+        const session_mesh *part = parts.items[i];
+        if (!part->is_given) continue;
+        sums[DRAWN] += part->drawn_count - part->shell_count;
+        sums[FLAT] += part->flat_count - part->shell_count;
+        sums[INVERTED] += part->cells.lattice ? 0 : part->inverted_count; /* axes may run either way */
+        sums[SHELLS] += part->shell_count;
+        sum_orders(part, parts.count, sums);
+    }
 }
 
 /* Returns whether most cells of a type have corners of both signs. */
@@ -159,9 +163,10 @@ insitu_status session_check_vertex_order(const session_meshes *meshes, session_c
                              "MPI_Allreduce");
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const int64_t *of_mesh = sums + m * CELL_SUMS;
-        session_mesh *own = session_find_mesh(meshes, catalogue->meshes[m].name);
-        catalogue->meshes[m].has_shells_alone = of_mesh[DRAWN] == 0 && of_mesh[SHELLS] > 0;
-        if (own) own->has_shells_alone = catalogue->meshes[m].has_shells_alone;
+        const session_parts parts = session_find_parts(meshes, catalogue->meshes[m].name);
+        const bool has_shells_alone = of_mesh[DRAWN] == 0 && of_mesh[SHELLS] > 0;
+        catalogue->meshes[m].has_shells_alone = has_shells_alone;
+        for (int i = 0; i < parts.count; i++) parts.items[i]->has_shells_alone = has_shells_alone;
         warn_of_order(report, catalogue->meshes[m].name, of_mesh);
     }
     base_free(sums);

@@ -1,0 +1,397 @@
+/* Each rank tells the ranks near it of its blocks' boxes: those whose own blocks' common box, in cells of the coarsest
+ * level, meets the box. Boxes are binned by their middles, so that the work grows with the number of blocks and of
+ * those that cover each. They are kept, for the faces between levels. */
+#include "session_covers.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_bins.h"
+#include "session_cell_faces.h"
+#include "session_conform.h"
+#include "session_exchange.h"
+#include "session_hash.h"
+#include "session_homes.h"
+#include "session_lattice.h"
+#include "session_topology.h"
+
+enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
+
+/* Boxes in bins by their middles, in cells of the coarsest level. */
+typedef struct box_bins {
+    int64_t count;
+    int64_t *boxes; /* numbers of boxes */
+    double (*middles)[3];
+    double widest; /* half the largest side of any */
+    session_bins bins;
+} box_bins;
+
+typedef struct cover_search {
+    const session_team *team;
+    int64_t count;
+    session_level_box *boxes; /* this rank's, then received ones */
+    box_bins finer;           /* those that may cover cells */
+} cover_search;
+
+static void bins_free(box_bins *bins)
+{
+    base_free(bins->boxes);
+    base_free(bins->middles);
+    session_bins_free(&bins->bins);
+}
+
+static void search_free(cover_search *s)
+{
+    base_free(s->boxes);
+    bins_free(&s->finer);
+}
+
+/* ---- boxes ------------------------------------------------------------------------------------------------------ */
+
+static session_level_box box_of(const session_mesh *mesh, int rank)
+{
+    const insitu_lattice *l = mesh->given.lattice;
+    const grid_lattice *cells = &mesh->lattice.cells;
+    session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
+    session_hash_text(&out.mesh, mesh->name);
+    for (int axis = 0; axis < 3; axis++) {
+        if (!l->cells[axis]) continue; /* quads lie beside each other, whatever their place along it */
+        out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
+        out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
+        out.refinement[axis] = l->refinement[axis];
+    }
+    return out;
+}
+
+static bool is_coarsest(const session_level_box *box)
+{
+    return box->refinement[0] == 1 && box->refinement[1] == 1 && box->refinement[2] == 1;
+}
+
+/* Finer along some axis, and coarser along none. */
+static bool is_finer(const session_level_box *a, const session_level_box *b)
+{
+    bool is_any = false;
+    for (int axis = 0; axis < 3; axis++) {
+        if (a->refinement[axis] < b->refinement[axis]) return false;
+        is_any = is_any || a->refinement[axis] > b->refinement[axis];
+    }
+    return is_any;
+}
+
+static void place(const session_level_box *box, double lower[3], double upper[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = (double)box->lower[axis] / (double)box->refinement[axis];
+        upper[axis] = (double)box->upper[axis] / (double)box->refinement[axis];
+    }
+}
+
+static bool is_level(const session_mesh *mesh)
+{
+    return mesh->is_given && session_has_levels(&mesh->given) && mesh->cells.lattice;
+}
+
+/* The common box of this rank's refined blocks, widened by far more than it may be rounded. */
+static session_box common_box(const session_meshes *meshes)
+{
+    session_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (int i = 0; i < meshes->count; i++) {
+        double lower[3], upper[3];
+        if (!is_level(meshes->items[i])) continue;
+        const session_level_box box = box_of(meshes->items[i], 0);
+        place(&box, lower, upper);
+        for (int axis = 0; axis < 3; axis++) {
+            out.lower[axis] = fmin(out.lower[axis], lower[axis] - 1);
+            out.upper[axis] = fmax(out.upper[axis], upper[axis] + 1);
+        }
+    }
+    return out;
+}
+
+static bool list_own(const session_meshes *meshes, cover_search *s)
+{
+    s->boxes = base_alloc((size_t)(meshes->count + 1) * sizeof *s->boxes);
+    for (int i = 0; i < meshes->count && s->boxes; i++) {
+        if (!is_level(meshes->items[i])) continue;
+        s->boxes[s->count++] = box_of(meshes->items[i], s->team->rank);
+    }
+    return s->boxes != NULL;
+}
+
+/* ---- what ranks tell each other --------------------------------------------------------------------------------- */
+
+static bool does_meet(const session_level_box *box, const session_box *common)
+{
+    double lower[3], upper[3];
+    place(box, lower, upper);
+    for (int axis = 0; axis < 3; axis++)
+        if (!(lower[axis] <= common->upper[axis] && common->lower[axis] <= upper[axis])) return false;
+    return true;
+}
+
+/* Lists the boxes for each rank whose common box they meet; counts words where there is no room. */
+static void send_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
+{
+    mail->total = 0;
+    for (int rank = 0; rank < s->team->ranks; rank++) {
+        const int64_t first = mail->total;
+        for (int64_t i = 0; i < s->count && rank != s->team->rank; i++) {
+            if (!does_meet(&s->boxes[i], &commons[rank])) continue;
+            if (mail->words) memcpy(mail->words + mail->total, &s->boxes[i], sizeof s->boxes[i]);
+            mail->total += BOX_WORDS;
+        }
+        mail->counts[rank] = mail->total - first;
+    }
+}
+
+static bool pack_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
+{
+    mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
+    if (!mail->counts) return false;
+    send_boxes(s, commons, mail);
+    mail->words = base_alloc((size_t)mail->total * sizeof *mail->words);
+    if (mail->words) send_boxes(s, commons, mail);
+    return mail->words != NULL;
+}
+
+static bool take_boxes(cover_search *s, const session_mail *in)
+{
+    const int64_t count = in->total / BOX_WORDS;
+    session_level_box *boxes = base_realloc(s->boxes, (size_t)(s->count + count + 1) * sizeof *boxes);
+    if (!boxes) return false;
+    s->boxes = boxes;
+    if (count) memcpy(boxes + s->count, in->words, (size_t)count * sizeof *boxes);
+    s->count += count;
+    return true;
+}
+
+static insitu_status share_boxes(cover_search *s, const session_meshes *meshes, base_error *error)
+{
+    session_mail out = {0}, in = {0};
+    const session_box own = common_box(meshes);
+    session_box *commons = base_alloc((size_t)s->team->ranks * sizeof *commons);
+    if (!commons) session_no_memory(error, s->team->ranks * (int64_t)sizeof *commons, "boxes of blocks");
+    insitu_status status = session_agree(s->team->comm, error);
+    if (!status)
+        status =
+            session_mpi(error, MPI_Allgather(&own, sizeof own, MPI_BYTE, commons, sizeof own, MPI_BYTE, s->team->comm),
+                        "MPI_Allgather");
+    if (!status && !pack_boxes(s, commons, &out))
+        session_no_memory(error, s->count * (int64_t)sizeof *s->boxes, "boxes of blocks");
+    if (!status) status = session_mail_exchange(s->team->comm, &out, &in, error);
+    if (!status && !take_boxes(s, &in)) session_no_memory(error, in.total * 8, "boxes of blocks");
+    session_mail_free(&out);
+    session_mail_free(&in);
+    base_free(commons);
+    return status;
+}
+
+/* ---- which cells ------------------------------------------------------------------------------------------------ */
+
+/* Those of the coarsest level cover no cell. */
+static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_coarsest, box_bins *out)
+{
+    out->boxes = base_alloc((size_t)(count + 1) * sizeof *out->boxes);
+    out->middles = base_alloc((size_t)(count + 1) * sizeof *out->middles);
+    if (!out->boxes || !out->middles) return false;
+    for (int64_t i = 0; i < count; i++) {
+        double lower[3], upper[3];
+        if (!with_coarsest && is_coarsest(&boxes[i])) continue;
+        place(&boxes[i], lower, upper);
+        for (int axis = 0; axis < 3; axis++) {
+            out->middles[out->count][axis] = 0.5 * (lower[axis] + upper[axis]);
+            out->widest = fmax(out->widest, 0.5 * (upper[axis] - lower[axis]));
+        }
+        out->boxes[out->count++] = i;
+    }
+    return session_bins_create(&out->bins, out->middles[0], (int64_t)sizeof *out->middles, out->count);
+}
+
+/* Rounds down. */
+static int64_t quotient(int64_t a, int64_t b)
+{
+    const int64_t q = a / b;
+    return a % b < 0 ? q - 1 : q;
+}
+
+/* Finds the cells of the coarse box that the fine one covers, in the indices of the coarse level; false where there are
+ * none. misfit: the axis along which the fine box ends within a cell; -1: it does not. */
+static bool find_covered(const session_level_box *coarse, const session_level_box *fine, int64_t lower[3],
+                         int64_t upper[3], int *misfit)
+{
+    *misfit = -1;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
+        const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by; /* in cells of of x by levels */
+        lower[axis] = quotient(begin, of);
+        upper[axis] = -quotient(-end, of);
+        if (lower[axis] * of != begin || upper[axis] * of != end) *misfit = axis;
+        if (lower[axis] < coarse->lower[axis]) lower[axis] = coarse->lower[axis];
+        if (upper[axis] > coarse->upper[axis]) upper[axis] = coarse->upper[axis];
+        if (lower[axis] >= upper[axis]) return false;
+    }
+    return true;
+}
+
+static void mark_cells(const session_mesh *mesh, const int64_t lower[3], const int64_t upper[3], unsigned char *covered)
+{
+    const insitu_lattice *l = mesh->given.lattice;
+    const int64_t *strides = mesh->lattice.cells.by_cell.stride;
+    int64_t from[3], to[3];
+    for (int axis = 0; axis < 3; axis++) {
+        from[axis] = lower[axis] - (l->cells[axis] ? l->first[axis] : 0);
+        to[axis] = upper[axis] - (l->cells[axis] ? l->first[axis] : 0);
+    }
+    for (int64_t k = from[2]; k < to[2]; k++)
+        for (int64_t j = from[1]; j < to[1]; j++)
+            for (int64_t i = from[0]; i < to[0]; i++) covered[i * strides[0] + j * strides[1] + k * strides[2]] = 1;
+}
+
+/* Makes a byte a cell, if some are covered, else *out is NULL. */
+static bool cover(const cover_search *s, session_mesh *mesh, unsigned char **out)
+{
+    const session_level_box box = box_of(mesh, s->team->rank);
+    double lower[3], upper[3];
+    int64_t near, first[3], end[3];
+    place(&box, lower, upper);
+    *out = NULL;
+    mesh->misfit = (session_misfit){.is_any = false};
+    session_bin_walk walk = session_walk_bins(&s->finer.bins, lower, upper, s->finer.widest);
+    while (session_next_binned(&walk, &near)) {
+        const session_level_box *fine = &s->boxes[s->finer.boxes[near]];
+        int misfit;
+        if (fine->mesh != box.mesh || !is_finer(fine, &box) || !find_covered(&box, fine, first, end, &misfit)) continue;
+        if (misfit >= 0)
+            mesh->misfit = (session_misfit){true, misfit, fine->block, fine->refinement[misfit], (int)fine->rank};
+        if (!*out) *out = base_calloc((size_t)mesh->given.cell_count + 1, 1);
+        if (!*out) return false;
+        mark_cells(mesh, first, end, *out);
+    }
+    return true;
+}
+
+/* Adds the caller's own flags. They may be read from a copy, which is not filled yet. */
+static void add_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
+{
+    const insitu_array *ghosts = &mesh->given.ghosts;
+    if (!ghosts->data) return;
+    session_fill_conformed(mesh, threads);
+    const grid_array flags = session_grid_array(ghosts);
+    const grid g = {
+        .ghosts = flags.data, .ghosts_stride = flags.stride, .ghosts_bytes = (int)session_type_size(ghosts->type)};
+    for (int64_t cell = 0; cell < mesh->given.cell_count; cell++)
+        if (grid_is_flagged(&g, cell)) covered[cell] = 1;
+}
+
+static bool update_block(const cover_search *s, session_meshes *meshes, session_mesh *mesh)
+{
+    unsigned char *covered;
+    if (!cover(s, mesh, &covered)) return false;
+    if (covered) add_ghosts(mesh, s->team->threads, covered);
+    const bool is_same =
+        !covered == !mesh->covered && (!covered || memcmp(covered, mesh->covered, (size_t)mesh->given.cell_count) == 0);
+    if (!is_same) session_renew_cells(meshes, mesh);
+    base_free(mesh->covered);
+    mesh->covered = covered;
+    session_read_topology(mesh);
+    if (mesh->misfit.is_any) mesh->is_check_stale = true;
+    return true;
+}
+
+insitu_status session_update_covers(session_meshes *meshes, const session_team *team, base_error *error)
+{
+    cover_search s = {.team = team};
+    if (!list_own(meshes, &s)) session_no_memory(error, meshes->count * (int64_t)sizeof *s.boxes, "boxes of blocks");
+    insitu_status status = share_boxes(&s, meshes, error);
+    bool is_done = !status && !error->status && bin_boxes(s.boxes, s.count, false, &s.finer);
+    for (int i = 0; i < meshes->count && is_done; i++)
+        if (is_level(meshes->items[i])) is_done = update_block(&s, meshes, meshes->items[i]);
+    if (!status && !error->status && !is_done) session_no_memory(error, s.count * 100, "cells that finer blocks cover");
+    if (is_done) {
+        base_free(meshes->level_boxes);
+        meshes->level_boxes = s.boxes;
+        meshes->level_box_count = s.count;
+        s.boxes = NULL;
+    }
+    search_free(&s);
+    if (!status) status = session_agree(team->comm, error);
+    if (!status) meshes->are_levels_changed = false;
+    return status;
+}
+
+/* ---- faces between levels --------------------------------------------------------------------------------------- */
+
+/* Finds the middle of the place beside the face, as wide as the face's cell, in cells of the coarsest level. */
+static void place_beside(const session_mesh *mesh, const session_level_box *box, const session_face *face,
+                         double out[3])
+{
+    const grid_lattice *l = &mesh->lattice.cells;
+    const insitu_lattice *given = mesh->given.lattice;
+    const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
+    const session_face_loop loop = session_face_of(&faces, face->face);
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t index = grid_index_along(&l->by_cell, axis, face->cell);
+        int64_t least = INT64_MAX, most = 0;
+        for (int64_t i = 0; i < loop.size; i++) {
+            const int64_t at = grid_index_along(&l->by_vertex, axis, session_face_vertex(&loop, i));
+            least = at < least ? at : least;
+            most = at > most ? at : most;
+        }
+        const double beyond = least < most ? 0 : least > index ? 1 : -1;
+        out[axis] = given->cells[axis]
+                        ? ((double)(given->first[axis] + index) + 0.5 + beyond) / (double)box->refinement[axis]
+                        : 0.5;
+    }
+}
+
+/* Finds the finest box of the mesh that has the place; NULL: there is none. */
+static const session_level_box *find_finest(const session_meshes *meshes, const box_bins *bins, uint64_t mesh,
+                                            const double at[3])
+{
+    const session_level_box *finest = NULL;
+    session_bin_walk walk = session_walk_bins(&bins->bins, at, at, bins->widest);
+    int64_t near;
+    while (session_next_binned(&walk, &near)) {
+        const session_level_box *box = &meshes->level_boxes[bins->boxes[near]];
+        double lower[3], upper[3];
+        bool is_in = box->mesh == mesh && (!finest || is_finer(box, finest));
+        place(box, lower, upper);
+        for (int axis = 0; axis < 3; axis++) is_in = is_in && lower[axis] < at[axis] && at[axis] < upper[axis];
+        if (is_in) finest = box;
+    }
+    return finest;
+}
+
+static void drop_inner_faces(const session_meshes *meshes, const box_bins *bins, const session_mesh *mesh,
+                             session_outer *outer)
+{
+    const session_level_box own = box_of(mesh, 0);
+    int64_t kept = 0;
+    for (int64_t i = 0; i < outer->face_count; i++) {
+        double at[3];
+        place_beside(mesh, &own, &outer->faces[i], at);
+        const session_level_box *beside = find_finest(meshes, bins, own.mesh, at);
+        if (!beside || memcmp(beside->refinement, own.refinement, sizeof own.refinement) == 0)
+            outer->faces[kept++] = outer->faces[i];
+    }
+    outer->face_count = kept;
+}
+
+insitu_status session_drop_faces_between_levels(const session_meshes *meshes, const session_face_part *parts, int count,
+                                                base_error *error)
+{
+    box_bins bins = {.count = 0};
+    bool has_levels = false;
+    for (int i = 0; i < count; i++) has_levels = has_levels || is_level(parts[i].mesh);
+    if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
+        session_no_memory(error, meshes->level_box_count * 32, "faces between levels");
+    for (int i = 0; i < count && has_levels && !error->status; i++)
+        if (is_level(parts[i].mesh) && !session_is_plane(parts[i].mesh->given.lattice) &&
+            !parts[i].outer->threshold.is_given)
+            drop_inner_faces(meshes, &bins, parts[i].mesh, parts[i].outer);
+    bins_free(&bins);
+    return error->status;
+}

@@ -1,0 +1,638 @@
+/* Levels of refinement in blocks of one mesh: which cells finer blocks cover, and the values at hanging vertices,
+ * against brute force on whole numbers; a sphere without slits, the same to the bit on any ranks, also on such as have
+ * nothing of a level; and blocks that come and go. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIZE = 200, PIXELS = SIZE * SIZE, SIDE = 8, LEVELS = 3, MOST_BLOCKS = 64, GRIDS = 3 };
+
+/* Looked at along z from z = 5; a pixel is 1/100 wide. */
+static const char scene_text[] =
+    "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "
+    "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2}\n    layers:\n"
+    "      - isosurface: {field: f, values: [0.72]}\n    outputs: [{path: a.exr}]\n";
+
+/* ---- the levels ---------------------------------------------------------------------------------------------------
+ */
+
+/* A block, in cells of the coarsest level. */
+typedef struct box {
+    int level, lower[3], upper[3];
+} box;
+
+/* How blocks of a mesh are laid out and dealt out. */
+typedef struct levels {
+    int refinement[LEVELS]; /* of each level */
+    int grid;               /* which boxes */
+    bool is_of_cells;
+    bool is_by_level; /* each rank has blocks of one level alone */
+    bool has_layers;  /* some blocks have ghost layers */
+    bool is_mixed;    /* every other block is given by its vertices' coordinates, */
+    double off;       /* which are larger by this share */
+    int rank, ranks;
+    int count;
+    box boxes[MOST_BLOCKS];
+} levels;
+
+static void add_box(levels *l, int level, const int lower[3], const int upper[3])
+{
+    box *b = &l->boxes[l->count++];
+    assert_true(l->count <= MOST_BLOCKS);
+    b->level = level;
+    memcpy(b->lower, lower, sizeof b->lower);
+    memcpy(b->upper, upper, sizeof b->upper);
+}
+
+/* Adds a box in two blocks. */
+static void add_halves(levels *l, int level, const int lower[3], const int upper[3], int axis)
+{
+    int middle[3], low[3];
+    memcpy(middle, upper, sizeof middle);
+    memcpy(low, lower, sizeof low);
+    middle[axis] = low[axis] = (lower[axis] + upper[axis]) / 2;
+    add_box(l, level, lower, middle);
+    add_box(l, level, low, upper);
+}
+
+/* Level 2 lies beside level 1, beside level 0 and at the border of the domain. */
+static void make_levels(levels *l)
+{
+    static const int fine[GRIDS][4][2][3] = {
+        {{{4, 0, 0}, {8, 8, 4}}, {{0, 4, 2}, {4, 8, 6}}, {{5, 2, 1}, {8, 6, 4}}, {{1, 5, 3}, {4, 8, 5}}},
+        {{{0, 0, 2}, {5, 6, 8}}, {{5, 3, 4}, {8, 6, 8}}, {{1, 1, 3}, {4, 5, 8}}, {{6, 3, 5}, {7, 5, 8}}},
+        {{{2, 2, 2}, {6, 6, 8}}, {{0, 0, 0}, {2, 2, 8}}, {{2, 3, 5}, {5, 5, 8}}, {{0, 0, 4}, {2, 1, 6}}}};
+    l->count = 0;
+    for (int i = 0; i < 8; i++) {
+        const int lower[3] = {i % 2 * 4, i / 2 % 2 * 4, i / 4 * 4};
+        add_box(l, 0, lower, (const int[]){lower[0] + 4, lower[1] + 4, lower[2] + 4});
+    }
+    for (int i = 0; i < 4; i++) add_halves(l, 1 + i / 2, fine[l->grid][i][0], fine[l->grid][i][1], (i + l->grid) % 3);
+}
+
+static int owner_of(const levels *l, int block)
+{
+    if (l->is_by_level) return l->boxes[block].level % l->ranks;
+    return (int)(test_uniform((uint64_t)(block + 100 * l->grid), 8) * l->ranks);
+}
+
+/* ---- brute force, on the lattice of the finest level's cells -------------------------------------------------------
+ */
+
+static int finest(const levels *l)
+{
+    return l->refinement[LEVELS - 1];
+}
+
+/* The distance from the middle of the domain, [-1, 1]^3; at twice a place, so that middles of cells are whole. */
+static double distance_at(const levels *l, const int twice[3])
+{
+    double square = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const double x = twice[axis] / (double)(SIDE * finest(l)) - 1;
+        square += x * x;
+    }
+    return sqrt(square);
+}
+
+/* The finest level of a box that has the place, of twice the coordinates, within; -1: none. */
+static int level_at(const levels *l, const int twice[3])
+{
+    int level = -1;
+    for (int i = 0; i < l->count; i++) {
+        const box *b = &l->boxes[i];
+        bool is_in = b->level > level;
+        for (int axis = 0; axis < 3; axis++)
+            is_in =
+                is_in && 2 * b->lower[axis] * finest(l) < twice[axis] && twice[axis] < 2 * b->upper[axis] * finest(l);
+        if (is_in) level = b->level;
+    }
+    return level;
+}
+
+/* The cell of a level, by its least corner, around a place beside the vertex, in the direction of the bits; false where
+ * no drawn cell of that level is there. */
+static bool cell_beside(const levels *l, int level, const int vertex[3], int bits, int lower[3])
+{
+    const int width = finest(l) / l->refinement[level];
+    int middle[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const int up = bits >> axis & 1, rest = vertex[axis] % width;
+        lower[axis] = rest ? vertex[axis] - rest : vertex[axis] - (up ? 0 : width);
+        middle[axis] = 2 * lower[axis] + width;
+    }
+    return level_at(l, middle) == level;
+}
+
+static bool is_corner(const int vertex[3], const int lower[3], int width)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (vertex[axis] != lower[axis] && vertex[axis] != lower[axis] + width) return false;
+    return true;
+}
+
+static double mean_around(const levels *l, const int vertex[3])
+{
+    double sum = 0;
+    int count = 0;
+    for (int bits = 0; bits < 8; bits++)
+        for (int level = 0; level < LEVELS; level++) {
+            const int width = finest(l) / l->refinement[level];
+            int lower[3];
+            if (!cell_beside(l, level, vertex, bits, lower) || !is_corner(vertex, lower, width)) continue;
+            sum += distance_at(l, (const int[]){2 * lower[0] + width, 2 * lower[1] + width, 2 * lower[2] + width});
+            count++;
+        }
+    return sum / count;
+}
+
+/* Finds the largest drawn cell that has the vertex on its border, but not as a corner; false where there is none. */
+static bool hangs(const levels *l, const int vertex[3], int *width, int lower[3])
+{
+    for (int level = 0; level < LEVELS; level++)
+        for (int bits = 0; bits < 8; bits++) {
+            *width = finest(l) / l->refinement[level];
+            if (cell_beside(l, level, vertex, bits, lower) && !is_corner(vertex, lower, *width)) return true;
+        }
+    return false;
+}
+
+/* The value at a vertex: what is interpolated in the cell that it hangs on, else the vertex's own. */
+static double value_at(const levels *l, const int vertex[3])
+{
+    const int twice[3] = {2 * vertex[0], 2 * vertex[1], 2 * vertex[2]};
+    int width, lower[3];
+    double value = 0;
+    if (!hangs(l, vertex, &width, lower)) return l->is_of_cells ? mean_around(l, vertex) : distance_at(l, twice);
+    for (int corner = 0; corner < 8; corner++) {
+        double weight = 1;
+        int at[3];
+        for (int axis = 0; axis < 3; axis++) {
+            const double share = (vertex[axis] - lower[axis]) / (double)width;
+            weight *= corner >> axis & 1 ? share : 1 - share;
+            at[axis] = lower[axis] + (corner >> axis & 1) * width;
+        }
+        if (weight > 0) value += weight * value_at(l, at);
+    }
+    return value;
+}
+
+/* How far the library's value at a vertex may be off: sums of at most 64 products of weights and values below 2, of up
+ * to three levels, by less than 200 roundings of 2; the mean of equal values, which all blocks have at a vertex that
+ * does not hang, not at all. */
+static double error_at(const levels *l, const int vertex[3])
+{
+    int width, lower[3];
+    return l->is_of_cells || hangs(l, vertex, &width, lower) ? 1e-13 : 0;
+}
+
+/* ---- blocks -------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct block {
+    insitu_lattice lattice;
+    int64_t vertex_count, cell_count;
+    double *values, (*places)[3]; /* places NULL: it is uniform */
+    int16_t *flags;               /* of cells; NULL: none */
+} block;
+
+typedef enum layer_kind { NO_LAYER, OUTSIDE_INTERIOR, FLAGGED } layer_kind;
+
+/* The ghost layer of a block, a cell wide. Finer blocks cover what their flagged cells lie over, so that only those of
+ * the coarsest level are flagged. */
+static layer_kind layer_of(const levels *l, int number)
+{
+    const layer_kind kind = (layer_kind)(number % 3);
+    return !l->has_layers || (kind == FLAGGED && l->boxes[number].level) ? NO_LAYER : kind;
+}
+
+/* Tells whether a cell (is_vertex: a vertex) with these indices is of the block without its layer. */
+static bool is_inner(const block *b, int layer, const int at[3], bool is_vertex)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (at[axis] < layer || at[axis] >= (int)b->lattice.cells[axis] - layer + is_vertex) return false;
+    return true;
+}
+
+static void make_flags(block *b)
+{
+    b->flags = calloc((size_t)b->cell_count, sizeof *b->flags);
+    assert_non_null(b->flags);
+    const int wide[2] = {(int)b->lattice.cells[0], (int)b->lattice.cells[1]};
+    for (int i = 0; i < (int)b->cell_count; i++)
+        b->flags[i] =
+            is_inner(b, 1, (const int[]){i % wide[0], i / wide[0] % wide[1], i / wide[0] / wide[1]}, false) ? 0 : 256;
+}
+
+/* The coordinates that the uniform block has, but for a share of them. */
+static void make_places(block *b, double off)
+{
+    const insitu_lattice *l = &b->lattice;
+    const int64_t wide[2] = {l->cells[0] + 1, l->cells[1] + 1};
+    b->places = malloc((size_t)b->vertex_count * sizeof *b->places);
+    assert_non_null(b->places);
+    for (int64_t v = 0; v < b->vertex_count; v++) {
+        const int64_t at[3] = {v % wide[0], v / wide[0] % wide[1], v / wide[0] / wide[1]};
+        for (int axis = 0; axis < 3; axis++)
+            b->places[v][axis] = (l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + at[axis])) * (1 + off);
+    }
+    for (int axis = 0; axis < 3; axis++) b->lattice.origin[axis] = b->lattice.spacing[axis] = 0;
+}
+
+/* Values in ghost layers are wrong. */
+static void make_block(const levels *l, int number, block *out)
+{
+    const box *b = &l->boxes[number];
+    const layer_kind kind = layer_of(l, number);
+    const int of = l->refinement[b->level], step = finest(l) / of, layer = kind != NO_LAYER;
+    *out = (block){.vertex_count = 1, .cell_count = 1};
+    for (int axis = 0; axis < 3; axis++) {
+        out->lattice.cells[axis] = (b->upper[axis] - b->lower[axis]) * of + 2 * layer;
+        out->lattice.first[axis] = (int64_t)b->lower[axis] * of - layer;
+        if (kind == OUTSIDE_INTERIOR) {
+            out->lattice.interior_first[axis] = 1;
+            out->lattice.interior_end[axis] = out->lattice.cells[axis] - 1;
+        }
+        out->lattice.refinement[axis] = of;
+        out->lattice.origin[axis] = -1;
+        out->lattice.spacing[axis] = 2.0 / (SIDE * of);
+        out->cell_count *= out->lattice.cells[axis];
+        out->vertex_count *= out->lattice.cells[axis] + 1;
+    }
+    const int more = l->is_of_cells ? 0 : 1;
+    const int64_t count = l->is_of_cells ? out->cell_count : out->vertex_count;
+    const int wide[2] = {(int)out->lattice.cells[0] + more, (int)out->lattice.cells[1] + more};
+    out->values = malloc((size_t)count * sizeof *out->values);
+    assert_non_null(out->values);
+    for (int i = 0; i < (int)count; i++) {
+        const int at[3] = {i % wide[0], i / wide[0] % wide[1], i / wide[0] / wide[1]};
+        int twice[3];
+        for (int axis = 0; axis < 3; axis++)
+            twice[axis] = 2 * ((int)out->lattice.first[axis] + at[axis]) * step + (l->is_of_cells ? step : 0);
+        out->values[i] = is_inner(out, layer, at, more) ? distance_at(l, twice) : -40;
+    }
+    if (kind == FLAGGED) make_flags(out);
+    if (l->is_mixed && number % 2) make_places(out, l->off);
+}
+
+static bool set_block(insitu_session *session, int number, const levels *l, const block *b, bool is_new)
+{
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = b->vertex_count;
+    mesh.cell_count = b->cell_count;
+    mesh.lattice = &b->lattice;
+    if (b->places) insitu_mesh_interleaved(&mesh, b->places, INSITU_FLOAT64);
+    if (b->flags) mesh.ghosts = (insitu_array){b->flags, INSITU_INT16, 0};
+    if (!is_new) mesh.changed = INSITU_CHANGED_NOTHING;
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.centring = l->is_of_cells ? INSITU_CELL : INSITU_VERTEX;
+    field.count = l->is_of_cells ? b->cell_count : b->vertex_count;
+    field.values = (insitu_array){b->values, INSITU_FLOAT64, 0};
+    return insitu_set_block(session, "m", number, &mesh) == INSITU_OK &&
+           insitu_set_block_field(session, "m", number, &field) == INSITU_OK;
+}
+
+/* Arrays of all blocks; of other ranks' they are not made. */
+static void make_blocks(const levels *l, block blocks[MOST_BLOCKS])
+{
+    for (int i = 0; i < l->count; i++) {
+        blocks[i] = (block){.values = NULL};
+        if (owner_of(l, i) == l->rank) make_block(l, i, &blocks[i]);
+    }
+}
+
+static void free_blocks(const levels *l, block blocks[MOST_BLOCKS])
+{
+    for (int i = 0; i < l->count; i++) {
+        free(blocks[i].values);
+        free(blocks[i].places);
+        free(blocks[i].flags);
+    }
+}
+
+static bool hand_levels(insitu_session *session, const levels *l, const block blocks[MOST_BLOCKS])
+{
+    bool is_set = true;
+    for (int i = 0; i < l->count && is_set; i++)
+        if (blocks[i].values) is_set = set_block(session, i, l, &blocks[i], true);
+    return is_set;
+}
+
+/* ---- what is drawn ------------------------------------------------------------------------------------------------
+ */
+
+/* Compares the values that are drawn with brute force. */
+static bool are_values_true(const insitu_session *session, const levels *l)
+{
+    const session_parts parts = session_find_parts(&session->meshes, "m");
+    for (int i = 0; i < parts.count; i++) {
+        const session_mesh *part = parts.items[i];
+        const box *b = &l->boxes[part->block];
+        const int step = finest(l) / l->refinement[b->level];
+        const int wide[2] = {(int)part->given.lattice->cells[0] + 1, (int)part->given.lattice->cells[1] + 1};
+        const double *values = part->scalar_count == 1 ? part->scalars[0].vertex_values : NULL;
+        if (!values && part->drawn_count) return false;
+        for (int64_t cell = 0; cell < part->cells.cell_count; cell++) {
+            int64_t vertices[GRID_MAX_CELL_VERTICES];
+            if (grid_is_ghost(&part->cells, cell)) continue;
+            grid_cell_vertices(&part->cells, cell, vertices);
+            for (int k = 0; k < 8; k++) {
+                const int v = (int)vertices[k];
+                const int index[3] = {v % wide[0], v / wide[0] % wide[1], v / wide[0] / wide[1]};
+                int vertex[3];
+                for (int axis = 0; axis < 3; axis++)
+                    vertex[axis] = ((int)part->given.lattice->first[axis] + index[axis]) * step;
+                const double expected = value_at(l, vertex);
+                if (fabs(values[v] - expected) <= error_at(l, vertex)) continue;
+                fprintf(stderr, "block %d, level %d, vertex %d %d %d of the finest: %.17g, expected %.17g\n",
+                        (int)part->block, b->level, vertex[0], vertex[1], vertex[2], values[v], expected);
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static int64_t count_covered(const levels *l, const box *b)
+{
+    const int of = l->refinement[b->level], step = finest(l) / of;
+    const int wide[3] = {(b->upper[0] - b->lower[0]) * of, (b->upper[1] - b->lower[1]) * of,
+                         (b->upper[2] - b->lower[2]) * of};
+    int64_t count = 0;
+    for (int cell = 0; cell < wide[0] * wide[1] * wide[2]; cell++) {
+        const int at[3] = {cell % wide[0], cell / wide[0] % wide[1], cell / wide[0] / wide[1]};
+        int twice[3];
+        for (int axis = 0; axis < 3; axis++) twice[axis] = 2 * (b->lower[axis] * finest(l) + at[axis] * step) + step;
+        count += level_at(l, twice) > b->level;
+    }
+    return count;
+}
+
+/* Counts the cells that are not drawn: covered ones, and those of ghost layers. */
+static int64_t count_ghosts(const levels *l)
+{
+    int64_t count = 0;
+    for (int i = 0; i < l->count; i++) {
+        int64_t inner = 1, all = 1;
+        for (int axis = 0; axis < 3; axis++) {
+            const int wide = (l->boxes[i].upper[axis] - l->boxes[i].lower[axis]) * l->refinement[l->boxes[i].level];
+            inner *= wide;
+            all *= wide + 2;
+        }
+        count += count_covered(l, &l->boxes[i]);
+        if (layer_of(l, i) != NO_LAYER) count += all - inner;
+    }
+    return count;
+}
+
+/* Pixels at which the front of the sphere is not seen. The surface in a cell is off the sphere by at most half the
+ * largest cell's diagonal, 0.217; inside of 0.6 the front and the back are 0.8 apart. */
+static int count_slits(const caught_picture *picture)
+{
+    int slits = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const double x = (pixel % SIZE + 0.5) / 100 - 1, y = 1 - (pixel / SIZE + 0.5) / 100, square = x * x + y * y;
+        if (square > 0.6 * 0.6) continue;
+        const double front = 5 - sqrt(0.72 * 0.72 - square);
+        slits += !(picture->rgba[4 * pixel + 3] > 0 && fabs((double)picture->depth[pixel] - front) < 0.22);
+    }
+    return slits;
+}
+
+static caught_picture take_step(insitu_session *session, int cycle)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, cycle);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    return take_caught();
+}
+
+/* Draws the levels in a session of their own. */
+static caught_picture draw(MPI_Comm comm, const char *scene, const levels *l, bool *is_true)
+{
+    block blocks[MOST_BLOCKS];
+    insitu_session *session = open_session(comm, scene);
+    make_blocks(l, blocks);
+    assert_true(hand_levels(session, l, blocks));
+    const caught_picture picture = take_step(session, 0);
+    int64_t ghosts = insitu_last_report(session)->cells_ghost;
+    MPI_Allreduce(MPI_IN_PLACE, &ghosts, 1, MPI_INT64_T, MPI_SUM, comm);
+    *is_true = are_values_true(session, l) && ghosts == count_ghosts(l);
+    insitu_destroy(&session);
+    free_blocks(l, blocks);
+    return picture;
+}
+
+static void check(levels l)
+{
+    const char *scene = write_scene(scene_text);
+    bool is_true = true, is_alone_true = true, is_well = true;
+    levels whole = l;
+    caught_picture alone = {0};
+    make_levels(&l);
+    whole.rank = 0;
+    whole.ranks = 1;
+    make_levels(&whole);
+    l.rank = own_rank;
+    l.ranks = rank_count;
+    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, &is_alone_true);
+    caught_picture ours = draw(MPI_COMM_WORLD, scene, &l, &is_true);
+    if (own_rank == 0) {
+        is_well = count_slits(&alone) == 0 && same_pictures(&ours, &alone);
+        if (!is_well)
+            fprintf(stderr, "levels of %d, %d, grid %d%s: %d pixels torn; %s\n", l.refinement[1], l.refinement[2],
+                    l.grid, l.is_of_cells ? ", values of cells" : "", count_slits(&alone),
+                    same_pictures(&ours, &alone) ? "the same" : "another picture on ranks");
+    }
+    free_caught(&ours);
+    free_caught(&alone);
+    everywhere(is_well && is_true && is_alone_true);
+}
+
+/* ---- tests --------------------------------------------------------------------------------------------------------
+ */
+
+/* With the ratio of 3, vertices of every other block differ from those at the same places in their last bits. */
+static void a_sphere_goes_on_over_levels(void **state)
+{
+    static const int refinements[][LEVELS] = {{1, 2, 4}, {1, 4, 8}, {1, 2, 8}, {1, 3, 6}};
+    (void)state;
+    for (int i = 0; i < 4; i++)
+        for (int of_cells = 0; of_cells < 2; of_cells++) {
+            levels l = {.grid = i % GRIDS,
+                        .is_of_cells = of_cells,
+                        .is_by_level = i == 1,
+                        .has_layers = i != 2,
+                        .is_mixed = i > 1,
+                        .off = i == 3 ? DBL_EPSILON : 0};
+            memcpy(l.refinement, refinements[i], sizeof l.refinement);
+            check(l);
+        }
+}
+
+static const char walls_text[] =
+    "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [3, 2, 5], "
+    "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 4}\n    layers:\n"
+    "      - surface: {colour: [1, 0.5, 0.25], opacity: 0.3}\n    outputs: [{path: a.exr}]\n";
+
+/* A transparent surface of levels is that of one block of the domain: its planes are the same but for rounding, which
+ * no colour depends on, and a wall would show in it. */
+static void outer_surfaces_have_no_wall_between_levels(void **state)
+{
+    static const int domain[2][3] = {{0, 0, 0}, {SIDE, SIDE, SIDE}};
+    const char *scene = write_scene(walls_text);
+    (void)state;
+    for (int grid = 0; grid < GRIDS; grid++) {
+        levels l = {.refinement = {1, 2, 4}, .grid = grid, .is_of_cells = true, .rank = own_rank, .ranks = rank_count};
+        levels plain = {.refinement = {1, 1, 1}, .ranks = 1};
+        block blocks[MOST_BLOCKS];
+        make_levels(&l);
+        add_box(&plain, 0, domain[0], domain[1]);
+        plain.rank = own_rank;
+        insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+        make_blocks(&l, blocks);
+        everywhere(hand_levels(session, &l, blocks));
+        caught_picture ours = take_step(session, 0);
+        insitu_destroy(&session);
+        free_blocks(&l, blocks);
+        session = open_session(MPI_COMM_WORLD, scene);
+        make_blocks(&plain, blocks);
+        everywhere(hand_levels(session, &plain, blocks));
+        caught_picture expected = take_step(session, 0);
+        insitu_destroy(&session);
+        free_blocks(&plain, blocks);
+        everywhere(own_rank || colour_difference(&ours, &expected) < 1e-5);
+        free_caught(&ours);
+        free_caught(&expected);
+    }
+}
+
+/* At every step some blocks of another grid of levels take the place of the last one's, on other ranks. */
+static void levels_come_and_go(void **state)
+{
+    const char *scene = write_scene(scene_text);
+    levels last = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
+    block held[MOST_BLOCKS] = {{.values = NULL}};
+    (void)state;
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    for (int cycle = 0; cycle < 4; cycle++) {
+        levels l = last, whole;
+        block blocks[MOST_BLOCKS];
+        bool is_true = true, is_set = true;
+        caught_picture alone = {0};
+        l.grid = cycle % GRIDS;
+        make_levels(&l);
+        make_blocks(&l, blocks);
+        for (int i = 0; i < MOST_BLOCKS && cycle; i++)
+            if (i < last.count && held[i].values && !(i < l.count && blocks[i].values))
+                is_set = is_set && !insitu_set_block(session, "m", i, NULL);
+        is_set = is_set && hand_levels(session, &l, blocks);
+        everywhere(is_set);
+        free_blocks(&last, held);
+        memcpy(held, blocks, sizeof held);
+        last = l;
+        caught_picture ours = take_step(session, cycle);
+        everywhere(are_values_true(session, &l));
+        whole = l;
+        whole.rank = 0;
+        whole.ranks = 1;
+        if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, &is_true);
+        everywhere(is_true && (own_rank || same_pictures(&ours, &alone)));
+        free_caught(&ours);
+        free_caught(&alone);
+    }
+    insitu_destroy(&session);
+    free_blocks(&last, held);
+}
+
+/* A block of the finest level goes: blocks whose covered cells stay are not made anew, and keep their trees. */
+static void blocks_beside_a_change_stay(void **state)
+{
+    levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count}, rest;
+    block blocks[MOST_BLOCKS];
+    int64_t stamps[MOST_BLOCKS] = {0};
+    int kept = 0, renewed = 0;
+    (void)state;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    make_levels(&l);
+    make_blocks(&l, blocks);
+    const int gone = l.count - 1;
+    rest = l;
+    rest.count = gone;
+    everywhere(hand_levels(session, &l, blocks));
+    caught_picture picture = take_step(session, 0);
+    free_caught(&picture);
+    for (int i = 0; i < gone; i++)
+        if (blocks[i].values) stamps[i] = session_find_block(&session->meshes, "m", i)->cells_stamp;
+    everywhere(!blocks[gone].values || !insitu_set_block(session, "m", gone, NULL));
+    picture = take_step(session, 1);
+    free_caught(&picture);
+    bool is_well = true;
+    for (int i = 0; i < gone; i++) {
+        if (!blocks[i].values) continue;
+        const session_mesh *part = session_find_block(&session->meshes, "m", i);
+        const bool is_uncovered = count_covered(&rest, &l.boxes[i]) < count_covered(&l, &l.boxes[i]);
+        is_well = is_well && (part->cells_stamp != stamps[i]) == is_uncovered;
+        renewed += is_uncovered;
+        kept += !is_uncovered;
+    }
+    everywhere(is_well && (rank_count > 1 || (renewed && kept)));
+    insitu_destroy(&session);
+    free_blocks(&l, blocks);
+}
+
+/* Level 1 ends within a cell of level 0. */
+static void blocks_that_do_not_fit_are_told(void **state)
+{
+    levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
+    block blocks[MOST_BLOCKS];
+    (void)state;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    make_levels(&l);
+    make_blocks(&l, blocks);
+    for (int i = 0; i < l.count; i++)
+        if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]++;
+    everywhere(hand_levels(session, &l, blocks));
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
+                    "begin and end at borders of coarser cells");
+    for (int i = 0; i < l.count; i++)
+        if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
+    everywhere(hand_levels(session, &l, blocks));
+    caught_picture picture = take_step(session, 1);
+    everywhere(own_rank || count_slits(&picture) == 0);
+    free_caught(&picture);
+    blocks[0].lattice.refinement[2] = 0;
+    if (blocks[0].values) {
+        everywhere(!set_block(session, 0, &l, &blocks[0], true));
+    } else {
+        everywhere(true);
+    }
+    told_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
+                    "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
+    insitu_destroy(&session);
+    free_blocks(&l, blocks);
+}
+
+static int begin_tests(void **state)
+{
+    (void)state;
+    return enter_folder("levels") ? 0 : 1;
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sphere_goes_on_over_levels), cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
+        cmocka_unit_test(levels_come_and_go), cmocka_unit_test(blocks_beside_a_change_stay),
+        cmocka_unit_test(blocks_that_do_not_fit_are_told)};
+    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+}
