@@ -12,10 +12,10 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
 #include "session_conform.h"
 #include "session_lattice.h"
+#include "session_region.h"
 #include "session_tally.h"
 #include "session_topology.h"
 
@@ -391,7 +391,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
     const tally_run run = tally_choose(mesh);
     int64_t first_bad = count;
     if (tally_axes(mesh, tally)) return count;
-#pragma omp parallel num_threads(threads) reduction(min : first_bad)
+#pragma omp parallel num_threads(session_region_threads(threads, count)) reduction(min : first_bad)
     {
         region_enter();
         mesh_tally mine = tally_empty();
@@ -476,7 +476,7 @@ static bool is_far(const mesh_tally *tally)
 static void find_flat(const grid *g, int threads, uint64_t *flat)
 {
     const int64_t words = (g->cell_count + 63) / 64;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

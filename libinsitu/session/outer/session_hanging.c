@@ -4,11 +4,11 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
 #include "session_bins.h"
 #include "session_coarse_face.h"
 #include "session_outer_faces.h"
+#include "session_region.h"
 #include "session_twins.h"
 #include "vector3.h"
 
@@ -295,7 +295,7 @@ static bool read_faces(hanging_search *s, bool is_hit)
     bool is_done = true;
     for (int m = 0; m < s->basis->part_count; m++) {
         const session_border *border = &borders[m];
-#pragma omp parallel num_threads(border->face_count > REGION_ITEMS ? s->team->threads : 1)
+#pragma omp parallel num_threads(session_region_threads(s->team->threads, border->face_count))
         {
             region_enter();
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait

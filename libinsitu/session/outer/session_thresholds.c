@@ -2,7 +2,7 @@
 
 #include "memory.h"
 #include "mmbvh_fetch.h"
-#include "region.h"
+#include "session_region.h"
 #include "session_scalars.h"
 
 static session_threshold resolve(const session_mesh *mesh, const scene_threshold *in)
@@ -95,7 +95,7 @@ unsigned char *session_hidden_cells(const session_mesh *mesh, const session_thre
     unsigned char *is_hidden = base_alloc((size_t)(count ? count : 1));
     if (!is_hidden) return NULL;
     const grid_field field = scalar ? session_scalar_field(mesh, scalar) : (grid_field){0};
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

@@ -14,12 +14,12 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
 #include "session_derived.h"
 #include "session_field_input.h"
 #include "session_hash.h"
 #include "session_recentre.h"
+#include "session_region.h"
 #include "session_scalars.h"
 #include "session_tensor.h"
 #include "session_vertex_sums.h"
@@ -303,7 +303,7 @@ static void evaluate(const scene_derived *derived, const grid_field *inputs, con
                      const session_field *field, int64_t count, int threads)
 {
     const int64_t blocks = (count + SCENE_BLOCK - 1) / SCENE_BLOCK;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
         const block_room *room = &rooms[omp_get_thread_num()];
@@ -386,7 +386,7 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
                             const session_field *field)
 {
     const int words = session_sum_words(sums->field_count);
-#pragma omp parallel num_threads(w->basis->team->threads)
+#pragma omp parallel num_threads(session_region_threads(w->basis->team->threads, part->mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait

@@ -9,9 +9,9 @@
 #include <string.h>
 
 #include "mmbvh_fetch.h"
-#include "region.h"
 #include "session_agree.h"
 #include "session_distances.h"
+#include "session_region.h"
 #include "session_scalars.h"
 
 /* ---- minimum and maximum --------------------------------------------------------------------------------------- */
@@ -118,7 +118,7 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
 {
     const grid *g = &mesh->cells;
     const grid_field field = session_scalar_field(mesh, scalar);
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : counts[:2 * DIGITS]) nowait

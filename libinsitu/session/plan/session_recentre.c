@@ -20,11 +20,11 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
 #include "session_exchange.h"
 #include "session_hanging.h"
 #include "session_patches.h"
+#include "session_region.h"
 #include "session_scalars.h"
 #include "session_vertex_groups.h"
 
@@ -202,7 +202,7 @@ static bool give_values(recentring *r, int part, int threads)
         give_vertices(r, part);
         return true;
     }
-#pragma omp parallel num_threads(threads) reduction(|| : is_lost)
+#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count)) reduction(|| : is_lost)
     {
         region_enter();
         cell_groups list = {0};
@@ -452,7 +452,7 @@ static void spread_means(const recentring *r, int part, int threads)
     const int64_t count = r->list.items[part]->cells.vertex_count;
     const grid_field *own = &r->parts[part].field;
     double *values = r->parts[part].scalar->vertex_values;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

@@ -15,7 +15,11 @@
  * used longer after all. */
 #include "session_trees.h"
 
+#include <math.h>
+#include <omp.h>
+
 #include "memory.h"
+#include "region.h"
 #include "session_agree.h"
 #include "session_candidates.h"
 #include "session_scalars.h"
@@ -94,7 +98,7 @@ static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_select
 static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const mmbvh_selection *selection,
                                 base_error *error)
 {
-    const double start = MPI_Wtime();
+    const double start = omp_get_wtime();
     mmbvh_options options = options_of(u);
     options.selection = selection;
     options.builder = choose_builder(mesh, selection);
@@ -114,7 +118,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     mesh->built_surface = surface_of(mesh);
     if (!selection) mesh->full_tree_steps = 0;
     if (!selection) own->unusable = mesh->tree.unusable_cells;
-    const double seconds = MPI_Wtime() - start;
+    const double seconds = omp_get_wtime() - start;
     measure(&u->trees->rates.build, seconds, mesh->tree.cell_count);
     u->report->build_ms += 1e3 * seconds;
     return INSITU_OK;
@@ -144,13 +148,13 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (!scalar->wants_ranges || !scalar->are_ranges_stale) continue;
-        const double start = MPI_Wtime();
+        const double start = omp_get_wtime();
         const insitu_status status = refit_scalar(mesh, scalar, &options);
         if (status)
             return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->label,
                              session_scalar_name(mesh, scalar));
         scalar->are_ranges_stale = false;
-        const double seconds = MPI_Wtime() - start;
+        const double seconds = omp_get_wtime() - start;
         measure(&u->trees->rates.refit, seconds, mesh->tree.cell_count);
         u->report->refit_ms += 1e3 * seconds;
     }
@@ -188,7 +192,7 @@ static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
 /* Refits all bounds, or only those of visible nodes. */
 static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool all, base_error *error)
 {
-    const double start = MPI_Wtime();
+    const double start = omp_get_wtime();
     const mmbvh_options options = options_of(u);
     bool is_whole;
     mmbvh_visible *visible = base_alloc((size_t)(mesh->scalar_count + 1) * sizeof *visible);
@@ -199,7 +203,7 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     base_free(visible);
     if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->label);
     u->trees->is_parent_stale = true;
-    u->report->refit_ms += 1e3 * (MPI_Wtime() - start);
+    u->report->refit_ms += 1e3 * (omp_get_wtime() - start);
     mesh->is_geometry_stale = false;
     mesh->are_bounds_partial = !is_whole;
     return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
@@ -262,7 +266,7 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
     u->trees->parent_key = key;
     u->trees->is_parent_stale = false;
     if (count < 2) return INSITU_OK;
-    const double start = MPI_Wtime();
+    const double start = omp_get_wtime();
     u->trees->is_parent_stale = true;
     float *boxes = base_alloc((size_t)count * 8 * sizeof *boxes);
     if (!boxes) return session_no_memory(error, count * 32, "boxes of meshes");
@@ -272,7 +276,7 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
                                                    &options, &u->trees->parent, error);
     base_free(boxes);
     u->trees->is_parent_stale = status != INSITU_OK;
-    u->report->build_ms += 1e3 * (MPI_Wtime() - start);
+    u->report->build_ms += 1e3 * (omp_get_wtime() - start);
     return status;
 }
 
@@ -314,11 +318,11 @@ static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
 static insitu_status update_partial(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
     if (is_partial_fresh(mesh, key)) return INSITU_OK;
-    const double start = MPI_Wtime();
+    const double start = omp_get_wtime();
     mmbvh_selection selection;
     insitu_status status = session_select_candidates(mesh, u->threads, &selection, error);
     if (status) return status;
-    const double seconds = MPI_Wtime() - start;
+    const double seconds = omp_get_wtime() - start;
     measure(&u->trees->rates.select, seconds, mesh->given.cell_count);
     u->report->build_ms += 1e3 * seconds;
     /* The full tree is built if the partial one would cost half of its price or more. */
@@ -327,7 +331,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     status = build_tree(u, mesh, is_partial ? &selection : NULL, error);
     mmbvh_selection_free(&selection);
     mesh->candidates_key = key;
-    mesh->rent += MPI_Wtime() - start;
+    mesh->rent += omp_get_wtime() - start;
     mesh->rent -= rate_of(u->trees->rates.refit, first_rates.refit, u->threads) * (double)mesh->drawn_count;
     return status;
 }
@@ -354,15 +358,80 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
     return status;
 }
 
+/* A thread's update of some of the parts. Blocks are many and small: a region for each would cost more than it saves.
+ * So if there are several parts per thread, one thread updates each. The rates are not learnt from them. */
+typedef struct thread_update {
+    tree_update update;
+    session_trees trees;
+    insitu_report report;
+    base_error error;
+} thread_update;
+
+enum { PARTS_A_THREAD = 4 };
+
+static void merge_threads(const tree_update *u, const thread_update *each, base_error *error)
+{
+    double build_ms = 0, refit_ms = 0;
+    for (int t = 0; t < u->threads; t++) {
+        build_ms = fmax(build_ms, each[t].report.build_ms);
+        refit_ms = fmax(refit_ms, each[t].report.refit_ms);
+        u->trees->is_parent_stale = u->trees->is_parent_stale || each[t].trees.is_parent_stale;
+        if (!error->status) *error = each[t].error;
+    }
+    u->report->build_ms += build_ms;
+    u->report->refit_ms += refit_ms;
+}
+
+static insitu_status update_apart(const tree_update *u, session_mesh *const *parts, int count, base_error *error)
+{
+    thread_update *each = base_calloc((size_t)u->threads, sizeof *each);
+    if (!each) return session_no_memory(error, u->threads * (int64_t)sizeof *each, "trees of blocks");
+    for (int t = 0; t < u->threads; t++) {
+        each[t].trees.rates = u->trees->rates;
+        each[t].update = *u;
+        each[t].update.trees = &each[t].trees;
+        each[t].update.report = &each[t].report;
+        each[t].update.threads = 1;
+    }
+#pragma omp parallel num_threads(u->threads)
+    {
+        region_enter();
+        thread_update *own = &each[omp_get_thread_num()];
+#pragma omp for schedule(dynamic) nowait
+        for (int i = 0; i < count; i++)
+            if (!own->error.status) update_tree(&own->update, parts[i], &own->error);
+        region_leave();
+    }
+    merge_threads(u, each, error);
+    base_free(each);
+    return error->status;
+}
+
+/* Lists the needed parts, or only counts them if parts is NULL. */
+static int list_needed(const session_meshes *meshes, session_mesh **parts)
+{
+    int count = 0;
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        if (!walk.part->is_needed) continue;
+        if (parts) parts[count] = walk.part;
+        count++;
+    }
+    return count;
+}
+
 static insitu_status update_all(const tree_update *u, const session_meshes *meshes, base_error *error)
 {
-    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
-        session_mesh *mesh = walk.part;
-        if (!mesh->is_needed) continue;
-        const insitu_status status = update_tree(u, mesh, error);
-        if (status) return status;
-    }
-    return update_parent(u, meshes, error);
+    const int count = list_needed(meshes, NULL);
+    session_mesh **parts = base_alloc((size_t)(count + 1) * sizeof *parts);
+    if (!parts) return session_no_memory(error, count * (int64_t)sizeof(session_mesh *), "trees");
+    list_needed(meshes, parts);
+    insitu_status status = INSITU_OK;
+    if (u->threads > 1 && count >= PARTS_A_THREAD * u->threads)
+        status = update_apart(u, parts, count, error);
+    else
+        for (int i = 0; i < count && !status; i++) status = update_tree(u, parts[i], error);
+    base_free(parts);
+    return status ? status : update_parent(u, meshes, error);
 }
 
 insitu_status session_update_trees(session_trees *trees, const session_meshes *meshes, const session_space *space,

@@ -13,9 +13,9 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
 #include "session_neighbours.h"
+#include "session_region.h"
 
 enum { KEY_WORDS = 3 };
 
@@ -242,7 +242,7 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
 static void find_entries(const session_vertex_sums *sums, const session_sum_part *part, const key_filter *filter,
                          int threads)
 {
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, part->mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "region.h"
+#include "session_region.h"
 #include "session_scalars.h"
 
 enum { BLOCK_VALUES = 1 << 14, LANES = 4 };
@@ -44,7 +44,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
 {
     const int64_t size = grid_element_bytes(a), blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
     uint64_t sum = 0;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sum) nowait

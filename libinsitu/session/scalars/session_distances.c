@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
+#include "session_region.h"
 #include "session_scalars.h"
 
 /* ---- planes -------------------------------------------------------------------------------------------------- */
@@ -92,7 +92,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 static void compute(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
 {
     const double *n = plane->normal, *p = plane->point;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

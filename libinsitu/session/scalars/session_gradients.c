@@ -25,7 +25,7 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
+#include "session_region.h"
 #include "vector3.h"
 
 enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
@@ -386,7 +386,7 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
     uint64_t *bits = base_calloc((size_t)blocks * (BLOCK / 64) + 1, sizeof *bits);
     *out = (session_cell_list){0};
     if (!starts || !bits) goto done;
-#pragma omp parallel num_threads(basis->threads)
+#pragma omp parallel num_threads(session_region_threads(basis->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(dynamic) nowait
@@ -402,7 +402,7 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
     out->cells = base_alloc((size_t)(starts[blocks] ? starts[blocks] : 1) * sizeof *out->cells);
     if (!out->cells) goto done;
     out->count = starts[blocks];
-#pragma omp parallel num_threads(basis->threads)
+#pragma omp parallel num_threads(session_region_threads(basis->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(dynamic) nowait
@@ -456,9 +456,10 @@ static void own_sums(const target *to, int64_t cell)
 /* Adds the corners of all cells. Both loops distribute the cells among the threads in the same way. */
 static bool give_all(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
+    const int threads = session_region_threads(like->basis->threads, list->count);
     double rise = 0, sharpness = 0;
     bool is_out_of_memory = false;
-#pragma omp parallel num_threads(like->basis->threads) reduction(max : rise, sharpness) reduction(|| : is_out_of_memory)
+#pragma omp parallel num_threads(threads) reduction(max : rise, sharpness) reduction(|| : is_out_of_memory)
     {
         region_enter();
         target to = *like;

@@ -4,7 +4,7 @@
 
 #include "memory.h"
 #include "mmbvh_fetch.h"
-#include "region.h"
+#include "session_region.h"
 
 int session_resolve_component(const scene_field *field, int component_count)
 {
@@ -179,7 +179,7 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
                                     bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "memory.h"
-#include "region.h"
 #include "session_agree.h"
+#include "session_region.h"
 #include "session_scalars.h"
 #include "session_volume.h"
 
@@ -102,7 +102,7 @@ typedef struct statistics_pass {
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
 {
-#pragma omp parallel num_threads(p->team->threads)
+#pragma omp parallel num_threads(session_region_threads(p->team->threads, p->g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
@@ -120,7 +120,7 @@ enum { ENDS = 3, KINDS = 2 };
 
 static void find_ends(const statistics_pass *p, double ends[KINDS * ENDS])
 {
-#pragma omp parallel num_threads(p->team->threads)
+#pragma omp parallel num_threads(session_region_threads(p->team->threads, p->g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
