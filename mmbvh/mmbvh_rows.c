@@ -49,7 +49,7 @@ bool rows_fit(const grid *g, const grid_field *field)
         } else {                                                                                                       \
             UNITE_ROWS(number, &of, rows, stride, count)                                                               \
         }                                                                                                              \
-        memset(out->is_finite, 0, sizeof out->is_finite);                                                              \
+        memset(out->is_finite, 0, (size_t)(out->count + 7) & ~(size_t)7);                                              \
         for (int64_t n = 0; n < out->count; n++) {                                                                     \
             out->low[n] = (float)LESS(of.low[n], of.low[n + 1]);                                                       \
             out->high[n] = (float)MORE(of.high[n], of.high[n + 1]);                                                    \
@@ -58,6 +58,51 @@ bool rows_fit(const grid *g, const grid_field *field)
     }
 DEFINE_RANGES(float_ranges, float, row_floats)
 DEFINE_RANGES(double_ranges, double, row_places)
+
+enum { EXTENT_LANES = 16 };
+
+/* Poison is 0 where all numbers are finite, else not a number. */
+#define DEFINE_EXTENT(name, number)                                                                                    \
+    static bool name(const char *data, int64_t count, float *low, float *high)                                         \
+    {                                                                                                                  \
+        const number *v = (const number *)(const void *)data;                                                          \
+        number least[EXTENT_LANES], most[EXTENT_LANES], poison[EXTENT_LANES];                                          \
+        for (int k = 0; k < EXTENT_LANES; k++) {                                                                       \
+            least[k] = most[k] = v[0];                                                                                 \
+            poison[k] = v[0] - v[0];                                                                                   \
+        }                                                                                                              \
+        int64_t n = 0;                                                                                                 \
+        for (; n + EXTENT_LANES <= count; n += EXTENT_LANES)                                                           \
+            for (int k = 0; k < EXTENT_LANES; k++) {                                                                   \
+                least[k] = LESS(v[n + k], least[k]);                                                                   \
+                most[k] = MORE(v[n + k], most[k]);                                                                     \
+                poison[k] += v[n + k] - v[n + k];                                                                      \
+            }                                                                                                          \
+        for (; n < count; n++) {                                                                                       \
+            least[0] = LESS(v[n], least[0]);                                                                           \
+            most[0] = MORE(v[n], most[0]);                                                                             \
+            poison[0] += v[n] - v[n];                                                                                  \
+        }                                                                                                              \
+        for (int k = 1; k < EXTENT_LANES; k++) {                                                                       \
+            least[0] = LESS(least[k], least[0]);                                                                       \
+            most[0] = MORE(most[k], most[0]);                                                                          \
+            poison[0] += poison[k];                                                                                    \
+        }                                                                                                              \
+        *low = (float)least[0];                                                                                        \
+        *high = (float)most[0];                                                                                        \
+        return poison[0] == 0;                                                                                         \
+    }
+DEFINE_EXTENT(float_extent, float)
+DEFINE_EXTENT(double_extent, double)
+
+bool rows_extent(const grid *g, const grid_field *field, float *low, float *high)
+{
+    const int64_t size = field->values.is_wide ? sizeof(double) : sizeof(float);
+    const char *data = field->values.data + field->component * field->component_stride;
+    if (field->values.stride != size || g->vertex_count == 0) return false;
+    return field->values.is_wide ? double_extent(data, g->vertex_count, low, high)
+                                 : float_extent(data, g->vertex_count, low, high);
+}
 
 /* Finds the next drawn cell from number from on, and how many follow it in its row; returns false where there is none
  * before end. */

@@ -234,11 +234,12 @@ static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
     return mark(s, begin, end, find_any, false);
 }
 
-/* A bit for each byte, which is 0 or 1. The product has the eight bits of a word in its last byte. */
-static uint64_t packed_bits(const unsigned char bytes[ROWS_CELLS])
+/* A bit for each of so many bytes, which are 0 or 1, as are those up to the next eight. The product has the eight bits
+ * of a word in its last byte. */
+static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
 {
     uint64_t bits = 0, eight;
-    for (int n = 0; n < ROWS_CELLS; n += 8) {
+    for (int64_t n = 0; n < count; n += 8) {
         memcpy(&eight, bytes + n, sizeof eight);
         bits |= (eight * UINT64_C(0x0102040810204080) >> 56) << n;
     }
@@ -254,7 +255,7 @@ static uint64_t row_bits(const selector *s, const rows_ranges *r)
         for (int64_t n = 0; n < r->count; n++)
             meets[n] = (unsigned char)(meets[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
     }
-    return packed_bits(meets);
+    return packed_bits(meets, r->count);
 }
 
 /* A lattice's cells, row by row. The two words that a row's bits may lie in are in one block of a thread's. */
@@ -264,7 +265,7 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
     rows_ranges r;
     int64_t unusable = 0;
     for (int64_t from = begin; rows_read(g, s->wish->field, from, end, &r); from = r.first + r.count) {
-        uint64_t meeting = row_bits(s, &r), finite = packed_bits(r.is_finite), drawn = 0;
+        uint64_t meeting = row_bits(s, &r), finite = packed_bits(r.is_finite, r.count), drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
             drawn |= (uint64_t) !((g->ghosts && grid_is_flagged(g, cell)) || grid_is_flat(g, cell)) << n;
@@ -293,8 +294,21 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     return s;
 }
 
+/* Cells of a lattice whose values are read twice: a block is soon read, and may have no cell that shows. */
+enum { MOST_READ_TWICE = 1 << 16 };
+
+/* Tells whether no cell of a small lattice can show, and all are usable, by the range of all values. */
+static bool shows_nothing(const selector *s)
+{
+    float low, high;
+    if (s->run != mark_rows || s->g->cell_count > MOST_READ_TWICE || !rows_extent(s->g, s->wish->field, &low, &high))
+        return false;
+    return !find_range(s, (fetch_range){.low = (double)low, .high = (double)high, .is_finite = true}).meets;
+}
+
 static int64_t mark_wish(const selector *s, int threads)
 {
+    if (shows_nothing(s)) return 0;
     const int64_t block = (int64_t)WORD_CELLS * BLOCK_WORDS, cells = s->g->cell_count;
     int64_t unusable = 0;
 #pragma omp parallel num_threads(threads)
