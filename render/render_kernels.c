@@ -182,11 +182,25 @@ typedef struct kernel_pending {
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_pending;
 
+/* Sorts pending cells by their part, and leaves them in order of depth within each: a batch holds cells of one part, and
+ * those of blocks alternate in depth. */
+static void kernel_pending_sort(kernel_pending *w)
+{
+    for (int n = 1; n < w->count; n++) {
+        const kernel_tile_candidate *item = w->items[n];
+        const uint32_t part = item->source / RENDER_MAX_ISOVALUES;
+        int at = n;
+        for (; at > 0 && w->items[at - 1]->source / RENDER_MAX_ISOVALUES > part; at--) w->items[at] = w->items[at - 1];
+        w->items[at] = item;
+    }
+}
+
 /* Prefetches the vertices of all pending cells, then queues them for tracing. */
 static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
                                                                kernel_pending *w)
 {
     kernel_batch *b = &m->batch;
+    kernel_pending_sort(w);
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);

@@ -27,6 +27,14 @@ typedef struct kernel_cells {
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
 
+/* Empties the lanes; their contents are set cell by cell. */
+static inline void kernel_cells_begin(kernel_cells *c, int type)
+{
+    c->type = type;
+    c->vertices = grid_type_vertices(type);
+    c->count = 0;
+}
+
 /* Fills the lanes from `count` on with copies of the first cell. */
 SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
 {
@@ -103,8 +111,10 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->queued_count = 0;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
         const int type = kernel_lane_types[i];
-        s->pending[i] = (kernel_cells){.type = type, .vertices = grid_type_vertices(type)};
-        if (!kernel_is_linear(type)) s->crossed[i] = (kernel_crossed){.cells = s->pending[i]};
+        kernel_cells_begin(&s->pending[i], type);
+        if (kernel_is_linear(type)) continue;
+        kernel_cells_begin(&s->crossed[i].cells, type);
+        s->crossed[i].value = 0;
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     memset(&s->picture, 0, sizeof s->picture);

@@ -6,7 +6,15 @@
 #include "memory.h"
 #include "mmbvh.h"
 
-enum { SUBTREES = 128 };
+/* Most subtrees of a tree, and about the fewest cells of a subtree: each search of one begins anew, and ends with lanes
+ * that are not full, so that small trees, as those of blocks, are left whole. */
+enum { SUBTREES = 128, SUBTREE_CELLS = 512 };
+
+static int64_t most_subtrees(const mmbvh *tree)
+{
+    const int64_t most = 1 + tree->cell_count / SUBTREE_CELLS;
+    return most < SUBTREES ? most : SUBTREES;
+}
 
 bool render_subtrees_begin(render_subtrees *list, int64_t trees)
 {
@@ -17,9 +25,9 @@ bool render_subtrees_begin(render_subtrees *list, int64_t trees)
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part)
 {
     const mmbvh *tree = frame->job->parts[part].tree;
-    const int64_t first = list->count;
+    const int64_t first = list->count, most = most_subtrees(tree);
     list->items[list->count++] = (kernel_subtree){.surface = surface, .part = part};
-    for (int64_t next = first; next < list->count && list->count - first < SUBTREES;) {
+    for (int64_t next = first; next < list->count && list->count - first < most;) {
         const int64_t node = list->items[next].node;
         if (mmbvh_node_count(tree, node)) {
             next++;
