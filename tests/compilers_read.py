@@ -46,7 +46,8 @@ def entries(build, is_wanted):
             continue
         words = shlex.split(entry["command"])
         at = words.index("-o")
-        flags = [w for w in words[1:at] + words[at + 2 :] if w not in ("-c", entry["file"]) and not w.endswith("_EXPORTS")]
+        passed_over = ("-c", entry["file"], "-fpeel-loops")  # gcc's own option
+        flags = [w for w in words[1:at] + words[at + 2 :] if w not in passed_over and not w.endswith("_EXPORTS")]
         seen.setdefault((source, *(f for f in flags if f.startswith(("-D", "-m")))), (entry["directory"], source, flags))
     return seen.values()
 

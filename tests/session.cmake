@@ -31,7 +31,7 @@ insitu_session_program(test_session_blocks)
 insitu_add_mpi_test(session_blocks test_session_blocks 1 3 WHOLE 2 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_levels)
-insitu_add_mpi_test(session_levels test_session_levels 1 3 WHOLE 2 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_levels test_session_levels 1 3 WHOLE 1 2 3 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_slices)
 insitu_add_mpi_test(session_slices test_session_slices 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
