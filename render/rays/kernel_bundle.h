@@ -17,15 +17,16 @@
 enum { KERNEL_BUNDLE_RAYS = 64 };
 
 typedef struct kernel_bundle {
-    kernel_tile tile; /* centre and radius; the tile's own rays are not used */
+    kernel_tile tile; /* Only the tile's centre and radius are used; the bundle has its own rays. */
     int count;
-    /* bits of the rays that are not blocked yet: those to trace, and in the end those that are unblocked */
+    /* One bit per ray: set while the ray is not blocked. Only these rays are traced; in the end they are the unblocked
+     * ones. */
     uint64_t open;
-    /* Rays in tile space, from t_near to t_far. */
+    /* The rays in tile space. Each is traced from depth t_near to t_far. */
     float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
     float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
     float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];
-    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* rays in tree space */
+    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* The same rays in tree space, against which clips are tested. */
 } kernel_bundle;
 
 SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
@@ -35,7 +36,7 @@ SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
     return vf_load(lanes);
 }
 
-/* Makes a packet of the open rays from number `first` on. */
+/* Makes a packet of the bundle's rays `first` to `first` + SIMD_WIDTH - 1; only unblocked rays are active. */
 static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
                                         const kernel_bundle *b, int first)
 {

@@ -30,7 +30,7 @@ static inline double kernel_clip_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Returns the scaled distance from the ray's point at t = 0 to the plane. */
+/* Returns the scaled distance from the ray's point at t = 0 to the clip plane. */
 static inline double kernel_clip_left(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     return (c->distance - kernel_clip_dot(c->normal, s->origin)) * s->scale - kernel_clip_dot(c->normal, ray->base);
@@ -72,7 +72,7 @@ static inline kernel_ray_part kernel_clip_sphere(const render_clip *c, const ren
     return (kernel_ray_part){nearest - half, nearest + half};
 }
 
-/* Returns the interval of the ray within the body. */
+/* Returns the interval of the ray that lies within the clip's half space, box or sphere. */
 static inline kernel_ray_part kernel_clip_body(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     switch (c->kind) {
@@ -83,7 +83,8 @@ static inline kernel_ray_part kernel_clip_body(const render_clip *c, const rende
     return KERNEL_NO_PART;
 }
 
-/* Inserts a hole, sorted by begin; returns the new number of holes. */
+/* Inserts a hole (an interval that a clip removes) into the list, which is sorted by begin. Returns the new number of
+ * holes. */
 static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel_ray_part hole)
 {
     int at = count;
@@ -93,7 +94,8 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* Returns the n-th interval, from 0, that a set of clips leaves of a ray behind the depth `begin`. */
+/* Returns interval `number`, counted from 0, of those that a set of clips keeps of a ray behind the depth `begin`;
+ * KERNEL_NO_PART if there are fewer. clips: one bit per clip of the job. */
 static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
                                                double begin, int number)
 {
@@ -132,7 +134,7 @@ static inline bool kernel_clip_has(const render_clip *c, const render_space *s, 
     return c->kind == RENDER_CLIP_BOX ? is_within : square <= c->radius * c->radius;
 }
 
-/* Returns whether the ray's point at t is kept by all of the clips. */
+/* Returns whether all of the clips keep the ray's point at t. clips: one bit per clip of the job. */
 static inline bool kernel_clip_keeps(const render_job *job, uint32_t clips, const kernel_clip_ray *ray, double t)
 {
     for (; clips; clips &= clips - 1) {

@@ -1,4 +1,4 @@
-/* Colours: transfer functions, opacity of samples, and shading. */
+/* Computes colours and opacities from transfer functions, and shades surfaces. */
 #ifndef RENDER_KERNEL_COLOUR_H
 #define RENDER_KERNEL_COLOUR_H
 
@@ -16,7 +16,7 @@
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 {
     const vf clear = 1.0f - opacity;
-    /* 1 - opacity was rounded by at most half a unit; the error is corrected to first order. */
+    /* Rounding 1 - opacity loses at most half a unit in the last place; `rest` restores it to first order. */
     const vf rest = (1.0f - clear) - opacity;
     const vf safe = vf_max(clear, vf_set(1.2e-38f));
     const vf log = vf_select(vf_le(clear, vf_set(0)), vf_set(-1e30f), vf_log2(safe) + rest / safe * 1.4426950f);
@@ -40,7 +40,8 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     return vf_select(small, 1.0f - series, power);
 }
 
-/* Returns the position in the colour table by a nonlinear scale: render_scaled(), with a relative error of 3e-7. */
+/* Returns the position in the colour table, with 0 and 1 as its ends, of a value on a logarithmic or symlog scale. The
+ * result is that of render_scaled(), mapped to the table, with a relative error of 3e-7. */
 static __attribute__((noinline)) vf kernel_scaled_place(const kernel_scale *s, vf x)
 {
     const vf threshold = vf_set(s->threshold), size = vf_max(vf_abs(x), threshold);
@@ -63,7 +64,7 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;
     int32_t at[SIMD_WIDTH];
-    vf first[4], last[4]; /* the six numbers of two entries */
+    vf first[4], last[4]; /* three colour numbers of each of two neighbouring table entries */
     vi_store(at, index);
     vf_gather_rows(t->colours, at, first);
     vf_gather_rows(t->colours + 2, at, last);
@@ -72,7 +73,8 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
     out[2] = first[2] + part * (last[3] - first[2]);
 }
 
-/* Computes the colour of x, which is in the transfer function's domain; NaN gives the colour at 0. */
+/* Computes the colour of a value x, which is given in the transfer function's domain; NaN gives the table's first
+ * colour. */
 SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
     kernel_table_at(t, kernel_colour_place(t, x), out);
@@ -96,7 +98,7 @@ SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
 {
-    /* The vector is first scaled by its largest component: gradients of fields of 1e30 or 1e-30 must not overflow. */
+    /* Scaling the vector by its largest component first prevents overflow for gradients of fields of 1e30 or 1e-30. */
     const vf largest = vf_max(vf_abs(v[0]), vf_max(vf_abs(v[1]), vf_abs(v[2])));
     *is_zero = vm_not(vf_lt(vf_set(0), largest));
     const vf scale = 1.0f / vf_select(*is_zero, vf_set(1), largest);
@@ -104,7 +106,8 @@ SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
     return scale / vf_sqrt((a * a + b * b) + c * c);
 }
 
-/* Shades a colour by Blinn-Phong (render.h). n: any vector along the gradient, in camera axes. */
+/* Shades a colour by the Blinn-Phong model (render.h). n is any vector along the gradient, of any length, in camera
+ * axes. */
 SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, const vf n[3], vf colour[3])
 {
     const render_job *job = p->frame->job;
@@ -141,12 +144,12 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
-/* A fragment per ray. kind is added to the kind that all of them have in common. */
+/* One fragment per ray. The lane's `kind` is an offset that is added to the kind given to kernel_emit(). */
 typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;
 
-/* Returns fragment_shows() for each ray. */
+/* Returns which rays have a visible fragment: one that absorbs light or is not black (fragment_shows()). */
 SIMD_INLINE vm kernel_shows(const vf colour[3], vf transmittance)
 {
     const vf zero = vf_set(0);
@@ -182,7 +185,8 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const ker
     }
 }
 
-/* Computes colours of banded tables, or of tables with their own colours for values outside the range. */
+/* Computes colours from tables with bands of constant colour, or with separate colours for values outside the range and
+ * NaN. */
 static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);

@@ -25,7 +25,7 @@ SIMD_INLINE vf vf_exp2(vf x)
 SIMD_INLINE vf vf_log2(vf x)
 {
     const vi bits = vi_from_bits(x);
-    const vi shifted = bits - 0x3f3504f3; /* bits of sqrt(1/2) */
+    const vi shifted = bits - 0x3f3504f3; /* 0x3f3504f3 has the bits of the float sqrt(1/2). */
     const vi exponent = shifted >> 23;
     const vf m = vf_from_bits(bits - (exponent << 23));
     const vf s = (m - 1.0f) / (m + 1.0f);

@@ -1,4 +1,4 @@
-/* A packet's hits on surfaces: the nearest opaque ones, and the crossings of transparent ones. */
+/* Stores a packet's hits on surfaces: the nearest opaque hit of each ray, and its crossings of transparent surfaces. */
 #ifndef RENDER_KERNEL_HITS_H
 #define RENDER_KERNEL_HITS_H
 
@@ -9,23 +9,24 @@
 /* Maximum number of crossings of transparent surfaces stored per ray; volume fragments are split at them. */
 enum { KERNEL_MAX_CUTS = 32 };
 
-/* The cells that rays hit. part: -1 if the cell is not needed again. */
+/* The cell that each ray has hit: mesh part and index in it. A part of -1 means that the cell is not needed again. */
 typedef struct kernel_hit_cells {
     vi part, index;
 } kernel_hit_cells;
 
 typedef struct kernel_hits {
     vm found;
-    /* direction of the gradient in camera axes, any length; with RENDER_VERTEX, until the tile ends, the reference
-     * coordinates in the cell */
+    /* Direction of the gradient in camera axes, of any length. With normals from vertices (RENDER_VERTEX) it holds the
+     * hit's reference coordinates in its cell until the tile ends. */
     vf normal[3];
-    kernel_hit_cells cells; /* only with RENDER_VERTEX */
-    vf colour[3];           /* unlit colour */
-    vf reach;               /* distance of the samples for differences; only if these are used */
+    kernel_hit_cells cells; /* set only with normals from vertices (RENDER_VERTEX) */
+    vf colour[3];           /* colour of each hit before lighting */
+    /* distance from the hit at which central differences take samples; set only if normals come from differences */
+    vf reach;
     vf kind;
     int cut_count;           /* number of rows in `cut` */
     vf cut[KERNEL_MAX_CUTS]; /* row n holds the n-th crossing found of each ray, unsorted; +inf if a ray has fewer */
-    vm crowded;              /* rays with more crossings than fit */
+    vm crowded;              /* rays with more than KERNEL_MAX_CUTS crossings */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)
@@ -37,8 +38,8 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 
-/* Adds crossings. Each ray fills its own rows in order, so that the positions where fragments are cut depend neither on
- * the traversal nor on the other rays of the packet. */
+/* Adds a crossing at t to each ray in `hit`. Each ray fills its own rows in order, so that the positions where
+ * fragments are split depend neither on the traversal nor on the other rays of the packet. */
 SIMD_INLINE void kernel_hits_cut(kernel_hits *hits, vm hit, vf t)
 {
     for (int n = 0; vm_any(hit); n++) {

@@ -1,4 +1,4 @@
-/* Tests whether the values of a node or a cell meet the visible ones. */
+/* Tests whether the range of values of a node or a cell contains a visible value. */
 #ifndef RENDER_KERNEL_INTEREST_H
 #define RENDER_KERNEL_INTEREST_H
 
@@ -15,7 +15,7 @@ SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float lo
     return false;
 }
 
-/* Tests as kernel_interest_meets() does, one range per lane. */
+/* Tests one range of values per lane against the visible intervals; returns the lanes that meet one. */
 SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf low, vf high)
 {
     vm meets = vm_none();
@@ -24,7 +24,8 @@ SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf l
     return meets;
 }
 
-/* Tests as kernel_interest_meets() does, one cell per lane, of `count` values each. */
+/* Tests one cell per lane, each with `count` vertex values, against the visible intervals; returns the lanes that meet
+ * one. */
 SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf *v, int count)
 {
     vf low = v[0], high = v[0];

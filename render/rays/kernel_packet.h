@@ -1,4 +1,5 @@
-/* A packet: SIMD_WIDTH rays of one tile. It uses two coordinate systems. */
+/* A packet is SIMD_WIDTH rays of one tile. It stores its rays in two coordinate systems: tile space for cells, and tree
+ * space for boxes of nodes. */
 #ifndef RENDER_KERNEL_PACKET_H
 #define RENDER_KERNEL_PACKET_H
 
@@ -15,44 +16,44 @@ typedef struct kernel_packet {
     const kernel_frame *frame;
     const kernel_tile *tile;
     kernel_thread *thread;
-    int x0, y0; /* upper left pixel */
+    int x0, y0; /* column and row of the packet's upper left pixel */
     vm active;
-    bool is_nearer; /* t_far has changed since this flag was last cleared */
+    bool is_nearer; /* set when t_far of some ray has decreased since the flag was last cleared */
     bool has_view;
-    /* tile space */
+    /* the rays in tile space: at depth Z they are at origin + slope * Z */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* The rays are the tile's own primary rays. They differ only in (u, v): their slopes, or, if the camera is
-     * orthographic, their origins (kernel_cell.h). */
+    /* Set if these are the tile's own primary rays. They then differ only in (u, v), which is their slope or, if the
+     * camera is orthographic, their origin (kernel_cell.h). */
     bool is_pencil;
     vf u, v;
-    vf t_near; /* depth of the eye's plane, or clip_in if that is farther */
-    vf t_far;  /* nearest opaque hit so far; initially +inf or clip_out */
+    vf t_near; /* depth at which the rays begin: that of the eye's plane, or clip_in if that is farther */
+    vf t_far;  /* depth of the nearest opaque hit so far; initially +inf or clip_out */
     uint32_t pixel[SIMD_WIDTH];
-    /* unit vector to the eye in camera space, for shading; valid if has_view */
+    /* unit vector from the scene to the eye in camera axes, for shading; valid if has_view is set */
     vf view[3];
-    /* The rest is set up if rays of the packet traverse trees on their own (kernel_packet_complete()). Tree space: the
-     * ray meets a plane at t = plane * inverse - shift. */
+    /* Members from here on are set by kernel_packet_complete(), only if rays of the packet traverse trees on their own.
+     * In tree space the ray meets a plane at t = plane * inverse - shift. */
     vf inverse[3], shift[3];
     float pad; /* margin by which boxes are extended: more than all rounding in the box test */
     float centre_direction[3];
     /* samples are at t = sample_base + m * sample_step for integers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The interval that clips leave of the ray for volumes; -inf and +inf without clips. */
+    /* The interval of the ray's depths that clips keep for volumes; -inf and +inf without clips. */
     vf clip_in, clip_out;
-    /* length of that interval in double, over clip_out - clip_in: if a ray grazes a sphere, rounding both ends may
-     * change the length much */
+    /* Exact length of that interval, divided by the rounded one, clip_out - clip_in. The two differ much if a ray
+     * grazes a sphere. */
     vf clip_stretch;
-    /* The interval that surfaces leave of the rays, saved if volumes have clips of their own. */
+    /* The active rays and the interval that surfaces leave of them, saved while volumes are traced with clips of their
+     * own. */
     vm all_active;
     vf surface_near, surface_far;
 } kernel_packet;
 
-/* Packets cover rectangles: 4 × 4, 4 × 2 or 2 × 2 pixels. */
+/* A packet covers a rectangle of 4 × 4, 4 × 2 or 2 × 2 pixels, for vectors of 16, 8 or 4 lanes. */
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
 
-/* Computes the base point at t = 0 and the direction per t, in tree space, of the ray with column and row parameters
- * (px, py). */
+/* Computes the ray with column and row parameters (px, py) in tree space: its point at t is base + t * direction. */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
 {
     const render_camera *c = &f->job->camera;
@@ -66,7 +67,8 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-/* Lanes of a packet under construction: plain arrays, with one loop per quantity, which compilers vectorize. */
+/* Per-lane values of a packet that is being set up, in plain arrays with one loop per quantity: compilers vectorize
+ * these. */
 typedef struct kernel_lanes {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float value[SIMD_WIDTH];
@@ -98,7 +100,7 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* Sets the rays in tree space, axis by axis: position = base + t * direction. */
+/* Sets the packet's rays in tree space, axis by axis: the ray meets a plane at t = plane * inverse - shift. */
 static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
 {
     const render_camera *c = &p->frame->job->camera;
@@ -126,7 +128,7 @@ static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
     p->pad = 16 * 6e-8f * ((float)size + 2);
 }
 
-/* Computes the directions to the eye; must be called before kernel_shade(). */
+/* Computes the directions to the eye, if that has not been done; kernel_shade() needs them. */
 static inline void kernel_packet_view(kernel_packet *p)
 {
     if (p->has_view) return;
@@ -176,7 +178,8 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* Sets the n-th interval (n = number) that the clips leave of each of the packet's rays in front of the eye. */
+/* Sets clip_in and clip_out to interval `number`, counted from 0, of those that the clips keep of each ray in front of
+ * the eye. */
 static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p, uint32_t clips, int number)
 {
     const kernel_frame *f = p->frame;
@@ -198,7 +201,7 @@ static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p,
     p->clip_stretch = vf_load(stretch);
 }
 
-/* Applies the clips that all layers have in common. */
+/* Cuts the packet's rays at the clips that all layers have in common. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
     kernel_packet_part(p, p->frame->common_clips, 0);
@@ -207,7 +210,7 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Applies the clips of volumes: the packet gets the interval with the turn's number. All surfaces must have been
+/* Sets the packet's rays to interval number `turn` of those that the clips of volumes keep. All surfaces must have been
  * traced. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
@@ -222,7 +225,7 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
 }
 
-/* Sets up the rays for tracing in cells. The tile's rays must be set. */
+/* Sets up the packet at pixel (x0, y0) for tracing in cells. The tile's rays must have been set. */
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
@@ -257,7 +260,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     if (f->common_clips) kernel_packet_clip(p);
 }
 
-/* Sets up the additional data with which rays traverse trees on their own, and those for volumes. */
+/* Adds what rays need to traverse trees on their own, and the positions of samples for volumes. */
 static inline void kernel_packet_complete(kernel_packet *p)
 {
     const kernel_frame *f = p->frame;
@@ -288,17 +291,17 @@ SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh *tree, int64_t nod
     return vf_le(low, high);
 }
 
-/* Rays in tile space. */
+/* One ray per lane in tile space: x = origin_x + slope_x * Z, and likewise y. */
 typedef struct kernel_rays {
     vf origin_x, origin_y, slope_x, slope_y;
 } kernel_rays;
 
-/* A point of each ray in a cell: its depth, the field there, and the cell's own coordinates. */
+/* A point of each ray in its cell: its depth t, the field's value there, and its reference coordinates r. */
 typedef struct kernel_point {
     vf t, value, r[3];
 } kernel_point;
 
-/* Copies the points of the rays in the mask. */
+/* Copies the points of the rays in the mask; other lanes of *to are unchanged. */
 SIMD_INLINE void kernel_point_move(vm mask, const kernel_point *from, kernel_point *to)
 {
     to->t = vf_select(mask, from->t, to->t);
@@ -306,7 +309,7 @@ SIMD_INLINE void kernel_point_move(vm mask, const kernel_point *from, kernel_poi
     for (int a = 0; a < 3; a++) to->r[a] = vf_select(mask, from->r[a], to->r[a]);
 }
 
-/* Puts the nearer point of each ray first. */
+/* Exchanges the two points of each ray whose second point is the nearer one. */
 SIMD_INLINE void kernel_points_order(kernel_point ends[2])
 {
     const vm swap = vf_lt(ends[1].t, ends[0].t);

@@ -1,19 +1,19 @@
-/* A tile's blocks, and which of them a body may meet. A tile of 16 × 16 pixels has 4 × 4 blocks of 4 × 4 pixels, for
- * every instruction set; a block has one or more packets:
+/* Classifies bodies by the blocks of a tile that they may meet. A tile of 16 × 16 pixels has 4 × 4 blocks of 4 × 4
+ * pixels, for every instruction set; a block has one or more packets:
  *
  *     border     0     1     2     3     4
  *          0     +-----+-----+-----+-----+
- *                |     |     |     |     |      Five borders between columns of pixels and five between rows, half a
- *          1     +-----+-----+-----+-----+      pixel from the rays: each is a plane, through the eye where the camera
- *                |     |     |     |     |      is a perspective one. A convex body that lies on both sides of a
- *          2     +-----+-----+-----+-----+      border, or on the side of a column, for every column that it may
- *                                               touch; columns and rows together give a mask of blocks.
+ *                |     |     |     |     |      Five borders lie between columns of pixels and five between rows, half
+ *          1     +-----+-----+-----+-----+      a pixel from the rays. Each is a plane; with a perspective camera it
+ *                |     |     |     |     |      passes through the eye. A convex body that lies on both sides of a
+ *          2     +-----+-----+-----+-----+      border may touch the columns on both sides. The masks of columns and
+ *                                               of rows together give a mask of blocks.
  *
- * All planes are lanes of vectors, together with the depth and the direction along the tile: a body is classified
- * against all of them at once. Planes through the eye are right for bodies in front of the eye; everything else lies
- * behind the rays' begin. A body that straddles the eye's plane is on both sides of the borders that it may meet:
- * nothing is lost. Masks are never too small, as bodies are extended by more than all rounding: masks only select where
- * to test, never the result. */
+ * Each plane is one lane of a vector, and so are the depth and the distance along the tile's direction: a body is
+ * classified against all of them at once. Planes through the eye classify only bodies in front of the eye; everything
+ * else lies before the rays begin. A body that straddles the eye's plane is on both sides of the borders that it may
+ * meet, so it is not lost. Bodies are extended by more than all rounding, so masks are never too small. Masks only
+ * select where to test; they never change the result. */
 #ifndef RENDER_KERNEL_TILE_H
 #define RENDER_KERNEL_TILE_H
 
@@ -39,7 +39,7 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->radius = (float)(0.5 * KERNEL_TILE * widest);
 }
 
-/* Returns the factor from a slope to the origin at Z = 0. */
+/* Returns the factor by which a ray's slope is multiplied to get its origin at Z = 0 in tile space. */
 static inline double kernel_reach(const kernel_frame *f)
 {
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
@@ -73,19 +73,20 @@ enum {
     KERNEL_LANE_VECTORS = KERNEL_LANES / SIMD_WIDTH
 };
 
-/* A plane per lane: normal · position + offset. size: absolute values of the normal; error: bound of the rounding at
- * positions near the scene. */
+/* One plane per lane: the signed distance is normal · position + offset. `size` is the normal's absolute values;
+ * `error` bounds the rounding of the distance at positions near the scene. */
 typedef struct kernel_planes {
     vf normal[3][KERNEL_LANE_VECTORS], size[3][KERNEL_LANE_VECTORS];
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
 } kernel_planes;
 
-/* The sides of the planes on which a body lies, one bit per lane. */
+/* The sides of the planes on which a body lies: one bit per plane's lane. */
 typedef struct kernel_sides {
-    unsigned below, above; /* at least partly on the negative or zero side; on the positive or zero side */
+    /* Set if part of the body has a distance <= 0 (below), >= 0 (above); a body across a plane sets both. */
+    unsigned below, above;
 } kernel_sides;
 
-/* Planes before conversion to float, one per lane: normals in camera axes. */
+/* Planes in double before conversion to float, one per lane; normals are in camera axes. */
 typedef struct kernel_plane_lanes {
     double right[KERNEL_LANES], up[KERNEL_LANES], forward[KERNEL_LANES], offset[KERNEL_LANES];
 } kernel_plane_lanes;
@@ -95,7 +96,8 @@ SIMD_INLINE vf kernel_lanes_load(const float *lanes, int v)
     return vf_load(lanes + v * SIMD_WIDTH);
 }
 
-/* Returns the slope (perspective) or offset (orthographic) of border n, relative to the tile's centre. */
+/* Returns the slope (perspective) or offset (orthographic) of border n between columns of blocks, relative to the
+ * tile's centre. */
 static inline double kernel_border_x(const kernel_frame *f, const kernel_tile *tile, int n)
 {
     return kernel_column(f, tile->x0 + n * KERNEL_BLOCK - 0.5) - tile->centre_x;
@@ -105,7 +107,7 @@ static inline double kernel_border_y(const kernel_frame *f, const kernel_tile *t
     return kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5) - tile->centre_y;
 }
 
-/* Slopes or offsets of all borders, and of the direction along the tile. */
+/* Slopes (perspective) or offsets (orthographic) of all borders and of the tile's central direction. */
 typedef struct kernel_borders {
     double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
     double centre_x, centre_y;
@@ -121,7 +123,8 @@ static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f,
     b->centre_y = tile->centre_y;
 }
 
-/* Sets the borders so that a body is in the first block if it is in the picture. */
+/* Replaces the tile's borders by those of the whole picture: a body that may be in the picture is then reported in
+ * block 0. */
 static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
@@ -131,7 +134,7 @@ static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame 
     b->centre_x = b->centre_y = 0;
 }
 
-/* Computes the planes relative to the eye: positive on the side of greater columns and rows. */
+/* Computes the planes relative to the eye. Their positive side is that of greater columns and rows. */
 static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_frame *f, const kernel_borders *b)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -189,8 +192,8 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
     }
 }
 
-/* Computes the planes in tile space, for cells: X - slope Z - origin, and likewise for Y. The lane along the direction
- * is not used. */
+/* Computes the planes in tile space, against which cells are tested: X - slope * Z - origin for columns, and likewise Y
+ * for rows. The lane of the distance along the direction is not used. */
 static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -224,21 +227,22 @@ SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
     return kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
-/* Adds the bits of the lanes with low <= 0 to below, with high >= 0 to above. */
+/* Adds one vector of planes to the sides: `low` and `high` are the body's least and greatest distance to each plane. */
 SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
 {
     s->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
     s->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
 }
 
-/* A body's placement: the blocks that it may meet, its least and greatest depth, and its position along the tile's
- * axis. */
+/* The result of classifying a body: the blocks that it may meet, its least and greatest depth, and its position along
+ * the tile's direction, by which bodies are sorted. */
 typedef struct kernel_placement {
     unsigned blocks;
     float near, far, along;
 } kernel_placement;
 
-/* Computes the sides on which a node's box lies, and its placement except for the blocks. */
+/* Returns the sides of the planes on which a node's box lies. Also sets the placement's depths and position, but not
+ * its blocks. */
 SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node,
                                           kernel_placement *placement)
 {
@@ -268,8 +272,8 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
     return placement;
 }
 
-/* Maximum number of points of an outline, in tile space. */
-enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two points on each line between two of them */
+/* An outline is a set of points in tile space whose convex hull contains a cell. It has at most this many points: */
+enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two points on each of the 28 lines between two of them */
 
 typedef struct kernel_outline {
     int count;
@@ -277,7 +281,8 @@ typedef struct kernel_outline {
     float size[3]; /* largest |X|, |Y|, |Z| of the cell's vertices */
 } kernel_outline;
 
-/* Relative margin of an outline's extent: rays that hit only by rounding stay within it. */
+/* Relative margin that is added to an outline's extent, so that rays that hit the cell only by rounding stay within
+ * it. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
 SIMD_INLINE kernel_placement kernel_outline_placement(const kernel_planes *q, const kernel_outline *o)

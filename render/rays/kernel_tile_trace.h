@@ -1,5 +1,6 @@
-/* The tile that is traced: its rays, its blocks' nearest hits, its traversal of a tree, and lists of pixels of several
- * cells side by side. A block's packets are set up when the first cell meets the block. */
+/* The state of the tile that is being traced: its rays, the nearest hits of its blocks, its traversal of a tree, and
+ * lists of pixels of several cells that are processed side by side. A block's packets are set up when the first cell
+ * meets the block. */
 #ifndef RENDER_KERNEL_TILE_TRACE_H
 #define RENDER_KERNEL_TILE_TRACE_H
 
@@ -20,24 +21,25 @@ typedef struct kernel_tile_trace {
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
-    unsigned wanted;        /* blocks with pixels to trace */
-    unsigned begun;         /* blocks whose packets are set up */
-    int turn;               /* number of the interval of each ray on which volumes are traced (kernel_clip.h) */
+    unsigned wanted;        /* mask of the blocks with pixels to trace */
+    unsigned begun;         /* mask of the blocks whose packets have been set up */
+    int turn;               /* number of the interval of each ray on which volumes are being traced (kernel_clip.h) */
     int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     float t_near;
-    vf far[KERNEL_BLOCKS / SIMD_WIDTH];         /* farthest t_far of each block's rays */
-    float pixel_far[KERNEL_TILE * KERNEL_TILE]; /* t_far of each pixel, if the tile traverses the trees for surfaces */
-    /* of the current surface: */
+    vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* farthest t_far of the rays of each block, one block per lane */
+    /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
+    float pixel_far[KERNEL_TILE * KERNEL_TILE];
+    /* The surface layer that is being traced: */
     const kernel_surface *surface;
     int layer;
     struct kernel_cell *cell;
     struct kernel_curved *curved;
-    struct kernel_tile_finder *search;          /* for the search of cells in trees */
-    kernel_packet packets[KERNEL_TILE_PACKETS]; /* in the order of blocks */
+    struct kernel_tile_finder *search;          /* state of the tile's search for cells in trees */
+    kernel_packet packets[KERNEL_TILE_PACKETS]; /* packets of all blocks, block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
 
-/* Returns the blocks in which some ray has no hit nearer than this depth. */
+/* Returns the mask of blocks in which some ray has no hit nearer than this depth. */
 SIMD_INLINE unsigned kernel_blocks_beyond(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
@@ -74,7 +76,7 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
     return vf_reduce_max(far);
 }
 
-/* Updates the block's farthest t_far, and its pixels', after new hits. */
+/* Updates the farthest t_far of the block and of its pixels after new hits. */
 SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
 {
     t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
@@ -92,7 +94,8 @@ SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
     }
 }
 
-/* Returns whether some pixel of the box (kernel_types.h) has no hit nearer than this depth. */
+/* Returns whether some pixel of the box has no hit nearer than this depth. The box has four bits each for first and
+ * last column, first and last row. */
 SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, float near)
 {
     const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
@@ -106,7 +109,8 @@ SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, 
     return false;
 }
 
-/* Returns those of the blocks in which a body with this outline may be visible. */
+/* Returns those of the given blocks in which a body with this outline may be visible: it meets the block, and is not
+ * hidden by nearer hits. */
 SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
 {
     const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
@@ -114,7 +118,7 @@ SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_o
     return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
 
-/* Returns the farthest t_far of all wanted blocks. */
+/* Returns the farthest t_far of all rays in blocks that are traced. */
 SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
 {
     const unsigned lanes = (1u << SIMD_WIDTH) - 1;
@@ -162,13 +166,13 @@ typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *c
 struct kernel_cell;
 struct kernel_map;
 
-/* Callback for a cell that is ready for tracing; for a polyhedron only the index is set. map: NULL if the cell needs
- * none. */
+/* Callback for a cell that is ready for tracing; for a polyhedron only the cell's index is set. map is NULL if the cell
+ * needs no inverse map. */
 typedef void kernel_tile_take(kernel_tile_trace *t, int part, const struct kernel_cell *c, const struct kernel_map *map,
                               unsigned blocks);
 
-/* Returns those of the blocks that may meet the node, none if its values are invisible. interest: NULL if all values
- * are visible. */
+/* Returns the node's placement with those of the given blocks that it may meet; none if its values are invisible.
+ * interest is NULL if all values are visible. */
 SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
                                               const kernel_interest *interest, int64_t node, unsigned blocks)
 {
@@ -177,7 +181,7 @@ SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const 
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {
-        /* Prefetches the data that are read next: a leaf's cells, or an inner node's children. */
+        /* Prefetches what is read next: a leaf's cells, or an inner node's children. */
         const int64_t ref = mmbvh_node_ref(tree, node);
         if (mmbvh_node_count(tree, node)) {
             __builtin_prefetch(tree->cells + ref);
@@ -217,11 +221,11 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
     }
 }
 
-/* ---- vectors of pixels of several cells ---- */
+/* ---- lists of rays of several cells ---- */
 
 enum { KERNEL_LIST_PIXELS = 512, KERNEL_LIST_ROOM = KERNEL_LIST_PIXELS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
 
-/* A list of rays: for each its pixel in the tile, row by row, and its cell's lane. */
+/* A list of rays, each with its pixel in the tile (16 * row + column) and the lane that holds its cell. */
 typedef struct kernel_pixel_list {
     int count;
     uint8_t pixel[KERNEL_LIST_ROOM], lane[KERNEL_LIST_ROOM];
@@ -233,7 +237,7 @@ SIMD_INLINE int kernel_box_pixels(unsigned box)
     return columns * ((int)(box >> 12) - (int)(box >> 8 & 15) + 1);
 }
 
-/* Lists a ray for each pixel of a box, row by row, for the cell in the given lane. */
+/* Appends a ray for each pixel of the box, row by row. lane: the lane that holds the rays' cell. */
 SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box, int lane)
 {
     static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -250,7 +254,7 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
     }
 }
 
-/* Pads the list, so that whole vectors can be read. */
+/* Pads the list with zeros, so that whole vectors can be read at its end. */
 SIMD_INLINE void kernel_pixel_list_close(kernel_pixel_list *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
@@ -265,13 +269,13 @@ SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* Returns a tile's entries at the given columns or rows. */
+/* Returns entries[index] for each lane, where `entries` belong to the tile's columns or rows. */
 SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
 }
 
-/* Returns the index of a pixel among the tile's packets: packet * SIMD_WIDTH + lane. */
+/* Returns the position of a pixel among the tile's packets, which is packet * SIMD_WIDTH + lane. */
 SIMD_INLINE vi kernel_batch_at(vi column, vi row)
 {
     const vi block = (row & ~3) + (column >> 2);
@@ -313,7 +317,7 @@ typedef struct kernel_lane_rays {
     vf far;  /* nearest hit so far; set only by surfaces */
 } kernel_lane_rays;
 
-/* Loads up to SIMD_WIDTH rays of the list, beginning with ray `first`. */
+/* Loads up to SIMD_WIDTH rays of the list, from ray `first` on; missing rays are inactive. */
 SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile_trace *t,
                                         const kernel_pixel_list *rays, int first)
 {
@@ -336,11 +340,12 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
     t->surface = &t->frame->surfaces[layer];
 }
 
-/* Returns whether rays of the current layer can be accepted by kernel_ray_accept(). */
+/* Returns whether the current layer's hits can be accepted for rays in lanes, each with its own cell
+ * (kernel_ray_accept()). */
 SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
-    /* Clipped rays begin at different depths, which only packets store. */
+    /* Rays with clips begin at different depths, which only packets store. */
     if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
     if (l->lines && l->lines->is_alone) return false;
     return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;

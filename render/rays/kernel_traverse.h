@@ -27,7 +27,7 @@ SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, i
 /* Parameters of a traversal. leaf() is called for each visible leaf that a ray enters between t_low and *t_high; it may
  * lower *t_high. */
 typedef struct kernel_descent {
-    const kernel_interest *interest; /* NULL: all values are visible */
+    const kernel_interest *interest; /* intervals of visible values; NULL if all values are visible */
     vf t_low;
     const vf *t_high;
     kernel_leaf *leaf;

@@ -13,7 +13,7 @@ typedef vd kernel_half;
 typedef int64_t kernel_half_mask __attribute__((vector_size(8 * KERNEL_HALF)));
 typedef float kernel_half_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
-/* Takes each ray's number, that of its cell's lane. */
+/* Returns of[lane] for each ray, where `lane` is the lane that holds the ray's cell. */
 SIMD_INLINE vf kernel_take(const float *of, vi lane)
 {
     return vf_permute(vf_load(of), lane);
@@ -29,7 +29,7 @@ SIMD_INLINE kernel_half_floats kernel_half_narrow(kernel_half v)
     return __builtin_convertvector(v, kernel_half_floats);
 }
 
-/* Returns the first or the second half of a mask. */
+/* Returns the first half (0) or the second half (1) of a mask's lanes. */
 SIMD_INLINE kernel_half_mask kernel_half_of_mask(vm m, int half)
 {
     typedef int32_t kernel_half_ints __attribute__((vector_size(4 * KERNEL_HALF)));
@@ -46,7 +46,7 @@ SIMD_INLINE kernel_half kernel_half_select(kernel_half_mask m, kernel_half a, ke
     return (kernel_half)(((kernel_half_mask)a & m) | ((kernel_half_mask)b & ~m));
 }
 
-/* Returns the first or the second half of v's lanes, as doubles. */
+/* Returns the first half (0) or the second half (1) of v's lanes, converted to double. */
 SIMD_INLINE kernel_half kernel_half_of(const vf *v, int half)
 {
     kernel_half_floats f;
@@ -79,7 +79,7 @@ SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
     return kernel_half_select((kernel_half_mask)(b < a), a, b);
 }
 
-/* Returns v clamped to -limit .. limit. */
+/* Returns v with each lane clamped to the interval [-limit, limit]. */
 SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
 {
     const kernel_half most = (kernel_half){0} + limit;
@@ -87,7 +87,7 @@ SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
     return kernel_half_select((kernel_half_mask)(most < v), most, v);
 }
 
-/* SIMD_WIDTH doubles, one per lane. */
+/* A vector of SIMD_WIDTH doubles, one per lane, stored as two halves. */
 typedef struct kernel_whole {
     kernel_half half[2];
 } kernel_whole;
@@ -127,7 +127,7 @@ SIMD_INLINE vf kernel_whole_narrow(const kernel_whole *v)
     return out;
 }
 
-/* Returns the number in the lane. */
+/* Returns the double in the given lane. */
 SIMD_INLINE double kernel_whole_lane(const kernel_whole *v, int lane)
 {
     return v->half[lane / KERNEL_HALF][lane % KERNEL_HALF];

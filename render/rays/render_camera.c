@@ -2,7 +2,7 @@
 
 #include "render.h"
 
-/* hypot() also works for vectors whose squares overflow or underflow. */
+/* hypot() is used because it also works for vectors whose squares overflow or underflow. */
 static double length3(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);
@@ -50,7 +50,8 @@ void render_camera_ray(const render_camera *camera, int x, int y, double base[3]
     }
 }
 
-/* Samples are in columns 0, 1, ... of a grid of count × count, one per row, so that neighbours are far apart. */
+/* Sample k lies in column k of a grid of count × count cells, with one sample per row; rows are chosen so that samples
+ * in neighbouring columns are far apart. */
 void render_camera_sample(int count, int k, double offset[2])
 {
     static const unsigned char few[4] = {1, 3, 0, 2};
@@ -59,7 +60,7 @@ void render_camera_sample(int count, int k, double offset[2])
     offset[1] = (row + 0.5) / count - 0.5;
 }
 
-/* A bijective hash of 32 bits (two rounds of multiply and shift). */
+/* Returns a bijective hash of 32 bits, made of two rounds of multiplying and shifting. */
 static uint32_t mix(uint32_t h)
 {
     h ^= h >> 16;

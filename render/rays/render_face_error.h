@@ -1,4 +1,4 @@
-/* The largest distance between two faces that coincide exactly but not in their rounded coordinates. */
+/* Defines the largest distance between two faces that coincide in exact arithmetic but not after rounding. */
 #ifndef RENDER_FACE_ERROR_H
 #define RENDER_FACE_ERROR_H
 

@@ -16,7 +16,6 @@ static void normalize(double v[3])
     for (int a = 0; a < 3; a++) v[a] /= length;
 }
 
-/* Returns two unit vectors perpendicular to a third (Duff et al. 2017). */
 hit_axes hit_axes_around(const double n[3])
 {
     const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
@@ -58,8 +57,8 @@ hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const flo
 /* ---- the hemisphere ------------------------------------------------------------------------------------------ */
 
 typedef struct hemisphere {
-    double cosine, sine; /* of the pixel's rotation */
-    double begin;        /* 0 .. 1: begin of the spiral's first step */
+    double cosine, sine; /* cosine and sine of the angle by which the pixel rotates the spiral */
+    double begin;        /* begin of the spiral's first step, from 0 to 1 */
 } hemisphere;
 
 static double part_of(double x)
@@ -75,11 +74,11 @@ static hemisphere hemisphere_of(const render_job *job, uint32_t pixel)
     return (hemisphere){cos(turn), sin(turn), render_jitter(pixel, (uint32_t)job->frame)};
 }
 
-/* The golden angle's cosine and sine. */
+/* Cosine and sine of the golden angle, by which consecutive samples are rotated. */
 static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
-/* Computes the directions of a hit's samples, of unit length, z along the normal. The last ones are kept off the
- * horizon, where rounding of the surface would mean a long distance. */
+/* Computes `count` unit directions with z along the normal. The last ones are kept away from the horizon, where a
+ * rounding error of the surface would become a large error of distance. */
 static void spread(const hemisphere *h, int count, double (*out)[3])
 {
     double x = h->cosine, y = h->sine;

@@ -1,11 +1,11 @@
-/* The kernels of the instruction set in use. */
+/* Selects the kernels of the instruction set in use. */
 #ifndef RENDER_RENDER_KERNELS_H
 #define RENDER_RENDER_KERNELS_H
 
 #include "kernel_types.h"
 
-/* Returns the kernels for the calling thread's instruction set: the thread that draws a frame calls it once for the
- * whole frame. */
+/* Returns the kernels for the instruction set that the calling thread may use. The thread that draws a frame calls this
+ * once for the whole frame. */
 const kernel_table *render_kernels(void);
 
 /* Allocates and sets up a thread's memory at its first use. It is called by that thread, so that the thread touches the
