@@ -1,4 +1,4 @@
-/* A tile's part of the picture's cells, which render_candidates.c has binned. */
+/* Defines how a tile reads the cells that render_candidates.c has binned for it, and sorts them by depth. */
 #ifndef RENDER_KERNEL_BINS_H
 #define RENDER_KERNEL_BINS_H
 
@@ -17,7 +17,7 @@ static inline kernel_tile_span kernel_span_in_tile(int first, int last, int begi
     return (kernel_tile_span){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
 }
 
-/* Returns a bit for each row or column of blocks that the pixels meet. */
+/* Returns a mask with a bit for each row or column of blocks that the pixels meet. */
 static inline unsigned kernel_span_blocks(kernel_tile_span s)
 {
     return ~0u << s.first / KERNEL_BLOCK & ((2u << s.last / KERNEL_BLOCK) - 1);
@@ -35,18 +35,19 @@ static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candid
         .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
-/* Bins a tile's cells by depth into KERNEL_DEPTHS bins, unordered within each. That is accurate enough to skip what is
- * hidden. */
+/* A tile's cells are sorted by depth into KERNEL_DEPTHS bins, without an order within a bin. That is accurate enough to
+ * skip cells that are hidden. */
 enum { KERNEL_DEPTHS = 32 };
 
 typedef struct kernel_by_depth {
     kernel_tile_candidate *items;
     float low, scale;
-    /* index of each bin's first item, nearest bin first; items are linked by `next`; -1: end */
+    /* Index of each bin's first item; the nearest bin comes first. Items of a bin are linked by `next`, which is -1 at
+     * the end. */
     int first[KERNEL_DEPTHS];
 } kernel_by_depth;
 
-/* Returns the bin of a depth. It increases monotonically with depth. */
+/* Returns the bin of a depth. It increases monotonically with the depth. */
 SIMD_INLINE int kernel_depth_bin(const kernel_by_depth *q, float near)
 {
     const float bin = (near - q->low) * q->scale;

@@ -28,20 +28,22 @@
 #include "simd.h"
 
 typedef struct kernel_curved_lanes {
-    int count; /* number of vertices of a cell */
-    /* at: along the camera's axes; f: values less the isovalue, scaled as by kernel_cell_relative() */
+    int count; /* number of vertices of each cell */
+    /* at: vertex positions relative to the eye, along the camera's axes; f: vertex values minus the isovalue, scaled as
+     * by kernel_cell_relative() */
     vf at[8][3], f[8];
-    vm usual; /* lanes whose numbers have usual sizes; other cells are tested one by one */
+    /* lanes whose numbers are neither too large, too small nor NaN; cells of other lanes are tested one by one */
+    vm usual;
 } kernel_curved_lanes;
 
-/* L of kernel_outline.h at the vertices. The slab is |L| <= thickness; the thickness is infinite if there is no
- * slab. */
+/* The linear function L of kernel_outline.h at the vertices. The isosurface lies in the slab |L| <= thickness; the
+ * thickness is infinite if there is no such slab. */
 typedef struct kernel_curved_slab {
     vf at[8], thickness;
 } kernel_curved_slab;
 
-/* Returns the lanes whose cells are not folded. inverse: of the Jacobian at the middle. The limit 0.9 instead of 1
- * leaves far more than all rounding. */
+/* Returns the lanes whose cells are not folded, so that their map is invertible. inverse: the inverse of the Jacobian
+ * at the cell's middle. The limit 0.9, instead of the exact 1, leaves a margin far larger than all rounding. */
 SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const kernel_differential *d, int count,
                                             vf inverse[3][3])
 {
@@ -70,9 +72,9 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const 
     return unfolded;
 }
 
-/* Computes L at the vertices and the thickness of the slab. |f| is at most about 1. Positions have an error bound of
- * one rounding, r, of their coordinates, the middle has 8 r. Lanes whose volume is near float32's minimum become
- * unusual. */
+/* Computes L at the vertices and the thickness of the slab (kernel_outline.h). |f| is at most about 1. Positions have
+ * an error of at most one rounding, r, of their coordinates, and their mean of at most 8 r. Lanes whose volume is near
+ * float32's minimum are removed from `usual`. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);
@@ -121,14 +123,14 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
 static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
                                                                kernel_curved_slab *out)
 {
-    if (kernel_is_box(type))
-        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out); /* loops of constant length */
+    if (kernel_is_box(type)) /* A constant type gives loops of constant length, which compilers unroll. */
+        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out);
     else
         kernel_curved_lanes_slab_of(l, type, out);
 }
 
-/* Computes the bounds of the slab's polytope, from its corners and points within it: vertices in the slab, and the
- * points where lines between two vertices cross its sides. */
+/* Computes the bounds of the slab's polytope: of the vertices that lie in the slab, and of the points where lines
+ * between two vertices cross the slab's sides. */
 static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l,
                                                                const kernel_curved_slab *slab, kernel_ends_lanes *e)
 {
@@ -150,7 +152,7 @@ static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_find
 }
 
 /* Computes the bounds of the points where the isovalue crosses the edges of tets. negative: the vertices whose values
- * are below it, exactly. */
+ * are below the isovalue, compared exactly. */
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l, const vm negative[4],
                                        kernel_ends_lanes *e)
 {
@@ -158,14 +160,14 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curv
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(negative[i], negative[j]);
-        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* avoids the NaN of 0 / 0 */
+        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* max() replaces the NaN of 0 / 0 by 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
         kernel_ends_add(s, e, point, crossed);
     }
 }
 
-/* Reads the vertices and rotates them into the camera's axes. */
+/* Reads the vertices' positions and rotates them into the camera's axes. */
 SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_cells *c, int count,
                                            kernel_curved_lanes *l)
 {
@@ -179,8 +181,8 @@ SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_
     }
 }
 
-/* Sets the values less the level, and clears `usual` in lanes whose values are too large, too small or NaN. Returns the
- * largest absolute value. */
+/* Sets f to the values minus the isovalue, and removes lanes whose values are too large, too small or NaN from `usual`.
+ * Returns the largest |f| of each lane. */
 SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
                                           const kernel_level *level, kernel_curved_lanes *l)
 {
@@ -194,8 +196,8 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_t
     return size;
 }
 
-/* Adds the cells of the crossed lanes. Cells with values that are too large, too small or NaN for lanes are tested one
- * by one. */
+/* Adds the cells of the lanes in `crossed`, which the isovalue crosses, to the candidates. Cells whose numbers are too
+ * large, too small or NaN for lanes are tested one by one. */
 SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm usual, unsigned crossed,
                                     const kernel_ends_lanes *e)
 {
@@ -210,7 +212,8 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
 
 /* ---- tets ---- */
 
-/* Finds the tets that isovalues cross. All tets of a leaf are transformed, because most are crossed if one is. */
+/* Finds the tets that isovalues cross. All tets of a leaf are transformed at once, because if one of them is crossed,
+ * most are. */
 static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const kernel_cells *c)
 {
     const unsigned all = (1u << c->count) - 1;
@@ -239,7 +242,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Adds the queue's cells, with the bounds of the surface in them. */
+/* Adds the queue's cells to the candidates, with the bounds of the isosurface in them. */
 SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
@@ -251,7 +254,8 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_place(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
-    /* The power of two that scales the largest value to near 1: its exponent, negated. */
+    /* `power` has the bits of the power of two that scales the largest value to near 1: its exponent is the negated
+     * one. */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type, &slab);
@@ -275,8 +279,8 @@ static void kernel_find_all_crossed(kernel_finder *s)
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
-/* Queues the lanes' cells, which the isovalue crosses. A queue holds cells of one isovalue: it is processed first if
- * the isovalue changes. */
+/* Queues the cells of the given lanes, which the isovalue crosses. A queue holds cells of one isovalue; if the isovalue
+ * changes, the queue is processed first. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
     kernel_crossed *h = &s->crossed[kernel_found_number(from->type)];
@@ -290,7 +294,7 @@ SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, 
     }
 }
 
-/* Queues the cells whose values straddle an isovalue. */
+/* Queues the cells that have vertex values on both sides of an isovalue. */
 SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const render_surface_layer *layer = s->surface->layer;

@@ -1,5 +1,5 @@
-/* Cells that are visible in a volume, found SIMD_WIDTH at a time (kernel_candidates.h) by the bounding box of their
- * vertices. */
+/* Finds the cells that are visible in a volume, SIMD_WIDTH cells at a time (kernel_candidates.h). Their pixels are
+ * those of the bounding box of their vertices. */
 #ifndef RENDER_KERNEL_CANDIDATE_VOLUMES_H
 #define RENDER_KERNEL_CANDIDATE_VOLUMES_H
 
@@ -11,13 +11,13 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Fetches the cell from the mesh. */
+/* Reads one cell's positions and values from the mesh into s->cell. */
 SIMD_INLINE void kernel_found_fetch(kernel_finder *s, uint32_t cell)
 {
     kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
 }
 
-/* Adds all visible cells of one type to the candidates. */
+/* Adds those of the cells, which are all of one type, to the candidates whose values are visible in the volume. */
 static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
 {
     kernel_ends_lanes e = kernel_no_ends();

@@ -1,18 +1,18 @@
-/* Isosurfaces and volumes by one traversal per frame. The trees are traversed once for the whole picture, and each cell
- * that the surface crosses, or that is visible in the volume, is fetched and transformed once, to find the pixels in
- * which it may be visible. The cells are then binned by tile (render_candidates.c; sort-middle in the terms of Molnar
- * et al. 1994). Tiles trace them beginning with the nearest, and skip blocks that have nearer hits (render_kernels.c,
- * kernel_batch.h; for volumes kernel_tile_cells.h):
+/* Finds the cells that show isosurfaces and volumes by one traversal per frame. The trees are traversed once for the
+ * whole picture, and each cell that the surface crosses, or that is visible in the volume, is fetched and transformed
+ * once, to find the pixels in which it may be visible. The cells are then binned by tile (render_candidates.c;
+ * sort-middle in the terms of Molnar et al. 1994). Tiles trace them beginning with the nearest, and skip blocks that
+ * have nearer hits (render_kernels.c, kernel_batch.h; for volumes kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
- * A tile's own traversal (kernel_tile_surface.h) tests the same nodes as its neighbours' and transforms the same cells,
- * most of which lie beside the tile. It is better if surfaces hide more cells than they show, as it skips everything
- * behind them: it is used for opaque surfaces with several cells per pixel, and for frames in which too many cells are
- * visible.
+ * A tile's own traversal (kernel_tile_surface.h) instead tests the same nodes as its neighbours' traversals and
+ * transforms the same cells, most of which lie beside the tile. It is faster if surfaces hide more cells than they
+ * show, because it skips everything behind them. It is used for opaque surfaces with several cells per pixel, and for
+ * frames in which too many cells are visible.
  *
- * Boxes are bounding boxes of the projected outline (kernel_outline.h), widened by more than all rounding. Rays test
- * the cells in the boxes, so that the picture is that of any other traversal, to the last bit. */
+ * A cell's pixels are the bounding box of its projected outline (kernel_outline.h), widened by more than all rounding.
+ * Rays then test the cells themselves, so the picture is the same to the last bit for any traversal. */
 #ifndef RENDER_KERNEL_CANDIDATES_H
 #define RENDER_KERNEL_CANDIDATES_H
 
@@ -29,7 +29,7 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Finds the candidates among the pending cells of one type. */
+/* Adds those of the pending cells, which are all of one type, to the candidates that may be visible. */
 static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
@@ -57,8 +57,8 @@ static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t
         for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_surface(s, &s->cell, value);
 }
 
-/* Moves the queued cells, whose connectivity is now in the cache, to the pending lists, and prefetches their vertices.
- * Processes a pending list first if it is full. */
+/* Moves the queued cells, whose connectivity has been prefetched, to the lists of pending cells, and prefetches their
+ * vertices. A pending list that is full is processed first. */
 static void kernel_find_queued(kernel_finder *s)
 {
     const kernel_arrays *p = &s->arrays;
@@ -103,10 +103,10 @@ static void kernel_find_rest(kernel_finder *s)
     kernel_find_all_crossed(s);
 }
 
-/* Nodes are tested KERNEL_FRONT at a time, so that their prefetches overlap. */
+/* Nodes are tested KERNEL_FRONT at a time, so that their prefetches overlap in time. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
-/* A list of nodes, each stored as 2 * node, plus 1 if it lies completely in the picture. */
+/* A list of nodes, each stored as 2 * node, plus 1 if the node lies completely in the picture. */
 typedef struct kernel_front {
     int count;
     int64_t entries[KERNEL_FRONT];
@@ -125,8 +125,8 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
     return kernel_blocks_of(sides) && !(placement.far < s->t_near);
 }
 
-/* Selects the entries whose values are visible and whose boxes are in view. The test of values is branch-free, as it
- * rejects about half of the entries unpredictably. */
+/* Selects the entries whose values are visible and whose boxes are in the picture. The test of values has no branch,
+ * because it rejects about half of the entries unpredictably. */
 SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
                                      kernel_front *front, const int64_t *entries, int count)
 {
@@ -144,8 +144,8 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
     }
 }
 
-/* Separates the leaves from the left children of inner nodes, and prefetches the leaves' cells and the children's
- * ranges. */
+/* Splits the selected nodes into leaves and the left children of inner nodes, and prefetches the leaves' cells and the
+ * children's ranges of values. */
 SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
                                    kernel_front *leaves, kernel_front *children)
 {

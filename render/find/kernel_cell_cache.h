@@ -1,4 +1,4 @@
-/* Cache of the cells that single packets have met, kept while their tile is traced. */
+/* Caches the cells that single packets have fetched, while their tile is traced. */
 #ifndef RENDER_KERNEL_CELL_CACHE_H
 #define RENDER_KERNEL_CELL_CACHE_H
 
@@ -7,17 +7,16 @@
 #include "kernel_packet.h"
 #include "simd.h"
 
-/* Cells that rays of the tile have met, in a hash table without collision chains: a cell is fetched, sorted and
- * transformed into tile space once for all the tile's packets and all of a volume's windows, unless another cell
- * replaces it. */
+/* A hash table of cells without collision chains. A cell is fetched, sorted and transformed into tile space once for
+ * all the tile's packets and all of a volume's windows of depth, unless another cell replaces it in its slot. */
 enum { KERNEL_CACHE_BITS = 8, KERNEL_CACHE_CELLS = 1 << KERNEL_CACHE_BITS };
 
 typedef struct kernel_cell_cache {
     kernel_cell cells[KERNEL_CACHE_CELLS];
 } kernel_cell_cache;
 
-/* Returns the cell from the cache; fetches it if it is missing. A cached cell may already be transformed. layer:
- * distinguishes the fields with which cells are fetched. */
+/* Returns the cell from the cache, or fetches it if it is missing. A cached cell may already be transformed. layer is
+ * part of the key, because each layer fetches cells with its own field. */
 SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
                                           uint32_t index)
 {

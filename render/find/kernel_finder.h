@@ -1,4 +1,4 @@
-/* The search of a subtree for visible cells (kernel_candidates.h), and the pixels in which a single cell may be
+/* Searches a subtree for visible cells (kernel_candidates.h), and computes the pixels in which a single cell may be
  * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Cells whose
  * numbers are too large, too small or NaN for lanes are tested one by one, by the box of their vertices. */
 #ifndef RENDER_KERNEL_FINDER_H
@@ -19,15 +19,15 @@
 #include "render.h"
 #include "simd.h"
 
-/* Cells of one type, one per lane. */
+/* A list of up to SIMD_WIDTH cells of one type, one per lane. */
 typedef struct kernel_cells {
-    int type, vertices; /* vertices: number of vertices of each cell */
+    int type, vertices; /* VTK's cell type, and the number of vertices of each cell */
     int count;
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
 
-/* Empties the lanes; their contents are set cell by cell. */
+/* Empties the list and sets its type; callers add cell and vertex numbers one by one. */
 static inline void kernel_cells_begin(kernel_cells *c, int type)
 {
     c->type = type;
@@ -35,7 +35,7 @@ static inline void kernel_cells_begin(kernel_cells *c, int type)
     c->count = 0;
 }
 
-/* Fills the lanes from `count` on with copies of the first cell. */
+/* Fills the unused lanes, from `count` on, with copies of the first cell. */
 SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
 {
     for (int n = c->count; n < SIMD_WIDTH; n++) {
@@ -44,7 +44,7 @@ SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
     }
 }
 
-/* Returns the index of vertex i of each lane's cell. */
+/* Returns, per lane, the mesh's index of the cell's vertex i. */
 SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
 {
     vi vertex;
@@ -52,39 +52,40 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     return vertex;
 }
 
-/* Returns the position of a type in kernel_lane_types. */
+/* Returns the position of a cell type in the list kernel_lane_types. */
 SIMD_INLINE int kernel_found_number(int type)
 {
     return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
 }
 
-/* Queue of cells of one type with quads that an isovalue crosses, one per lane; it is processed when all lanes are full
- * (kernel_candidate_surfaces.h). */
+/* A queue of cells that one isovalue crosses, all of one type with quadrilateral faces, one per lane. It is processed
+ * when all lanes are full (kernel_candidate_surfaces.h). */
 typedef struct kernel_crossed {
     kernel_cells cells;
-    int value; /* number of the isovalue, the same for all cells */
+    int value; /* index of the isovalue in its layer, the same for all cells */
 } kernel_crossed;
 
-/* State of the search of one subtree, or of a tile. */
+/* The state of the search of one subtree, or of a tile's search. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
-    const kernel_surface *surface;   /* NULL if a volume is searched */
-    const kernel_transfer *transfer; /* the volume's, if surface is NULL */
+    const kernel_surface *surface;   /* the surface layer that is searched; NULL if a volume is searched */
+    const kernel_transfer *transfer; /* transfer function of the volume, used if surface is NULL */
     const render_field *field;
     const kernel_interest *interest;
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
-    uint32_t source;     /* source of the candidates of the layer's first isovalue */
-    kernel_tile picture; /* the whole picture as one tile, about the axis of view */
+    uint32_t source;     /* candidates' `source` number for the layer's first isovalue */
+    kernel_tile picture; /* The whole picture, treated as one tile whose axis is the direction of view. */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
-    int first[2], last[2]; /* first and last column and row to which candidates are clipped */
+    int first[2], last[2]; /* first and last column, and row, of pixels to which candidates are clipped */
     kernel_level eye[3];
     kernel_cell cell;
-    uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity has been prefetched */
+    uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is being prefetched */
     int queued_count;
-    kernel_cells pending[KERNEL_LANE_TYPES]; /* cells whose vertices have been prefetched, by kernel_found_number() */
+    /* per type (kernel_found_number()), cells whose vertices are being prefetched */
+    kernel_cells pending[KERNEL_LANE_TYPES];
     kernel_crossed crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
 } kernel_finder;
@@ -130,7 +131,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->row_0 = (float)(-f->slope_y0 / f->slope_dy);
 }
 
-/* The minimum and maximum of some numbers. */
+/* The minimum and maximum of a set of numbers. */
 typedef struct kernel_extent {
     float low, high;
 } kernel_extent;
@@ -153,9 +154,9 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. The extent is
- * widened by 1/100 pixel, 3e-5 of the numbers and blur, which is more than the error of rays that hit only by rounding.
- * blur: the error bound of the positions, in pixels. */
+/* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. `zero` is the
+ * pixel at extent 0. blur: the error bound of the extent, in pixels. The extent is widened by blur, by 1/100 pixel and
+ * by 3e-5 of the numbers, which is more than the error of rays that hit only by rounding. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {
@@ -168,9 +169,9 @@ SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, in
     return true;
 }
 
-/* Computes the candidate of a cell whose surface has these extents in depth, columns and rows, relative to the axis of
- * view; returns false if it is not visible. size: an upper bound of the cell's depths. A cell that is near or behind
- * the eye's plane may be anywhere in the picture. */
+/* Computes the candidate of a cell from the extents of its surface in depth, columns and rows, relative to the axis of
+ * view. Returns false if it is not visible. size: an upper bound of the cell's depths. A cell near or behind the eye's
+ * plane may be anywhere, so its candidate covers the whole picture. */
 SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent depth, float size,
                                           kernel_extent columns, kernel_extent rows, kernel_candidate *out)
 {
@@ -179,7 +180,7 @@ SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent 
     if (depth.high + pad < s->t_near) return false;
     out->near = depth.low - pad;
     out->far = depth.high + pad;
-    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* NaN */
+    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* the comparison also replaces NaN */
     if (!(out->far < INFINITY)) out->far = INFINITY;
     if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
         out->x0 = (uint16_t)s->first[0];
@@ -205,8 +206,8 @@ SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline
     return kernel_extents_candidate(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
-/* Counts the candidate in each of its tiles. Most lie in one tile or two adjacent ones, which a branch could not
- * predict. */
+/* Counts the candidate in each tile that its box of pixels meets. Most candidates lie in one tile or two adjacent ones,
+ * which a branch could not predict, so up to four tiles are counted without branches. */
 SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1, int y0, int y1)
 {
     const int left = x0 / KERNEL_TILE, columns = x1 / KERNEL_TILE - left, top = y0 / KERNEL_TILE,
@@ -237,7 +238,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     const grid *g = s->frame->job->parts[s->part].cells;
     kernel_outline o = {0};
     kernel_candidate candidate = {.cell = index, .source = s->source};
-    /* The corners of the bounding box of the vertices. */
+    /* The outline of a polyhedron is the eight corners of its vertices' bounding box. */
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, index);
     int64_t vertex;
@@ -258,7 +259,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* Adds the fetched cell, with the bounding box of its vertices. */
+/* Adds the fetched cell to the candidates, with the pixels of its vertices' bounding box. */
 static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel_cell *c, uint32_t source)
 {
     kernel_outline o;
@@ -268,14 +269,14 @@ static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* Adds the fetched cell if the isovalue crosses it. */
+/* Adds the fetched cell to the candidates if the isovalue crosses it. */
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_cell_straddles(c, s->surface->layer->values[value]))
         kernel_find_whole(s, c, s->source + (uint32_t)value);
 }
 
-/* Adds the fetched cell if it is visible in the volume. */
+/* Adds the fetched cell to the candidates if its values are visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
     if (s->cell.is_finite && kernel_cell_shows(&s->cell, s->transfer)) kernel_find_whole(s, &s->cell, s->source);
@@ -283,12 +284,13 @@ SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 
 /* ---- cells in lanes ---- */
 
-/* Per lane: bounds of one isovalue's surface in the cell. */
+/* Bounds of one isovalue's surface in each lane's cell: depths from the eye, and positions in columns and rows of
+ * pixels. */
 typedef struct kernel_ends_lanes {
     vf near, far, left, right, top, bottom;
 } kernel_ends_lanes;
 
-/* Reads vertices as positions relative to the eye, in the space's scale. */
+/* Reads each lane's vertex as a position relative to the eye, multiplied by the space's scale. */
 SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
@@ -300,14 +302,15 @@ SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3]
     }
 }
 
-/* Returns the lanes of `usual` whose coordinates have usual sizes. Other cells are tested one by one. */
+/* Returns the lanes of `usual` whose coordinates are small enough for float32 lanes and not NaN. Other cells are tested
+ * one by one. */
 SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
 {
     for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
     return usual;
 }
 
-/* Rotates such a position into the camera's axes. */
+/* Rotates positions relative to the eye into the camera's axes: right, up and forward. */
 SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf at[3])
 {
     const render_camera *camera = &s->frame->job->camera;
@@ -316,7 +319,7 @@ SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf
         at[a] = (place[0] * (float)axes[a][0] + place[1] * (float)axes[a][1]) + place[2] * (float)axes[a][2];
 }
 
-/* Extends the bounds in the given lanes to contain the point. */
+/* Extends the bounds in the given lanes so that they contain the point. */
 SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, const vf point[3], vm lanes)
 {
     const vf most = vf_set(INFINITY);
@@ -337,8 +340,8 @@ SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
     return (kernel_ends_lanes){most, -most, most, -most, most, -most};
 }
 
-/* Computes the first and the last pixel between each lane's ends, with the margin of kernel_extent_range(). Returns the
- * lanes that have any. */
+/* Computes the first and the last pixel between each lane's bounds low and high, with the margin of
+ * kernel_extent_range(). Returns the lanes that contain a pixel. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const int ends[2], vf *first, vf *last)
 {
     const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
@@ -347,7 +350,8 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const
     return vf_le(*first, *last);
 }
 
-/* Adds the cells of the lanes whose bits are set, by the steps of kernel_extents_candidate(). */
+/* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. It is the version in lanes of
+ * kernel_extents_candidate(). */
 static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
@@ -358,7 +362,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
     float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
-    /* The largest error bound of any lane is used for all. */
+    /* All lanes use the largest error bound of any of them. */
     const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
     vm candidates =
@@ -374,7 +378,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
         memcpy(ends[2 * a], &from, sizeof from);
         memcpy(ends[2 * a + 1], &to, sizeof to);
     }
-    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* -inf if the depth is NaN */
+    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* max() replaces a NaN depth by -inf */
     vf_store(far, -vf_max(-((e->far + s->t_near) + pad), vf_set(-INFINITY)));
     if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
     for (; lanes; lanes &= lanes - 1) {

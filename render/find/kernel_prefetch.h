@@ -1,4 +1,4 @@
-/* Prefetches cells' indices and vertices, so that they are in the cache when they are read. */
+/* Prefetches cells' vertex indices, coordinates and values, so that they are in the cache when they are read. */
 #ifndef RENDER_KERNEL_PREFETCH_H
 #define RENDER_KERNEL_PREFETCH_H
 
@@ -13,7 +13,8 @@ SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, 
         __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
-/* Prefetches a cell's vertex indices and its type. An offset is read directly, as only this prefetch depends on it. */
+/* Prefetches a cell's vertex indices and its type. An offset into the connectivity is read without a prefetch, because
+ * only this function waits for it. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;
@@ -22,7 +23,7 @@ SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
     if (g->cell_types) __builtin_prefetch(g->cell_types + cell * g->cell_types_stride);
 }
 
-/* Prefetches a cell's vertices; polyhedra are skipped. */
+/* Prefetches the coordinates and values of a cell's vertices; polyhedra are skipped. */
 SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field, uint32_t cell)
 {
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));
@@ -32,7 +33,7 @@ SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field
             g, field, g->lattice ? first + g->lattice->corner[i] : grid_array_index(&g->connectivity, first + i));
 }
 
-/* Prefetches all data of the cells. */
+/* Prefetches all data of the given cells: first all indices, then all vertices. */
 SIMD_INLINE void kernel_prefetch(const grid *g, const grid_field *field, const uint32_t *cells, int count)
 {
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);

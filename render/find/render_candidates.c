@@ -1,8 +1,8 @@
-/* Subtrees are distributed among threads. Each thread lists the cells that it finds, counts them by tile, and bins its
- * own; threads do not synchronize in between, and the thread that traces a tile gathers its cells from all lists. The
- * bound on the number of cells limits memory and wasted time: if there is more than one cell per pixel, most listed
- * cells are hidden or smaller than a pixel. Cells of a volume are not hidden: a million of them may be listed in any
- * case. */
+/* How candidates are found in parallel: subtrees are distributed among threads. Each thread lists the cells that it
+ * finds, counts them by tile, and bins its own cells; threads do not synchronize in between. The thread that traces a
+ * tile gathers the tile's cells from the bins of all threads. A bound on the number of cells limits memory and wasted
+ * time: if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of a
+ * volume are not hidden, so a million of them may be listed in any case. */
 #include "render_candidates.h"
 #include "kernel_bins.h"
 #include "kernel_types.h"
@@ -20,13 +20,13 @@
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
-/* Number of cells per pixel of their trees' bounding boxes from which on they count as small; for surfaces, cells in
- * leaves that isovalues may cross (docs/development/decisions/find.md). */
+/* Number of cells per pixel of their trees' bounding boxes above which cells count as small. For surfaces only the
+ * cells in leaves that isovalues may cross are counted (docs/development/decisions/find.md). */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
-/* Divides the trees of all surfaces, or of the volume, into subtrees. */
+/* Divides the trees of all surfaces, or of the volume, into subtrees. Returns false if there is no memory. */
 static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *list)
 {
     const render_job *job = f->job;
@@ -42,7 +42,8 @@ static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *li
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
-/* Adds a chunk to the list. A full list stays full, because the cells that did not fit are missing from it. */
+/* Adds a chunk to the list; returns false if the bound is reached or memory runs out. Such a list stays full, because
+ * the cells that did not fit are missing from it. */
 static bool grow(kernel_candidate_list *list)
 {
     if (list->is_full) return false;
@@ -75,14 +76,15 @@ static void free_list(kernel_candidate_list *list)
 
 /* ---- tiles ---------------------------------------------------------------------------------------------------- */
 
-/* The cells that one thread has found, sorted by tile: those of a tile are starts[tile] .. starts[tile + 1] - 1. */
+/* The cells that one thread has found, sorted by tile: the cells of a tile are items[starts[tile]] to items[starts[tile
+ * + 1] - 1]. */
 typedef struct bin_list {
     kernel_tile_candidate *items;
     uint32_t *starts;
 } bin_list;
 
 struct kernel_bins {
-    int list_count; /* number of the search's threads */
+    int list_count; /* number of lists: one per thread that searched */
     bin_list lists[];
 };
 
@@ -105,7 +107,7 @@ static void bins_free(struct kernel_bins *bins)
     base_free(bins);
 }
 
-/* Copies the cells to their tiles' bins; at[tile] is the index of the tile's next cell. */
+/* Copies the cells to their tiles' bins. at[tile] is the index at which the tile's next cell is stored. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
@@ -117,15 +119,15 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
         }
 }
 
-/* Bins the cells that a thread has found; starts[1 + tile] is the number of each tile's cells. Returns false if there
- * are more than `most`, or memory runs out. */
+/* Bins the cells that a thread has found. On entry starts[1 + tile] is the number of each tile's cells. Returns false
+ * if the sum is more than `most`, or memory runs out. */
 static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        starts[1 + tile] = (uint32_t)sum; /* bin_tiles() advances it to the begin of the next tile */
+        starts[1 + tile] = (uint32_t)sum; /* after bin_tiles() has advanced it, it is the begin of the next tile */
         sum += count;
     }
     if (sum > (uint64_t)most) return false;
@@ -150,8 +152,8 @@ static int count_in_tile(const bin_list *list, int64_t tile)
     return (int)(list->starts[tile + 1] - list->starts[tile]);
 }
 
-/* Gathers a tile's cells. If a single thread has found them, they are used in place; else they are copied to the bin's
- * own memory. */
+/* Gathers a tile's cells in *bin. If a single thread has found them all, they are used where they are; otherwise they
+ * are copied to the bin's own memory. Returns false if there is no memory. */
 static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
 {
     const bin_list *last = NULL;
@@ -185,13 +187,13 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
 
 /* ---- positions of cells in the picture ---------------------------------------------------------------------- */
 
-/* A range of positions along columns or rows of pixels. */
+/* A range of positions along the columns or rows of pixels, in pixels. */
 typedef struct span {
     double low, high;
 } span;
 
-/* Extends the ranges of columns and rows by a point in the trees' space. Returns the point's depth from the eye, or 1
- * for orthographic cameras. */
+/* Extends the ranges of columns (spans[0]) and rows (spans[1]) by a point in the trees' space. Returns the point's
+ * depth from the eye, or 1 if the camera is orthographic. */
 static double widen(const kernel_frame *f, const double point[3], span spans[2])
 {
     const render_camera *c = &f->job->camera;
@@ -212,7 +214,7 @@ static double widen(const kernel_frame *f, const double point[3], span spans[2])
     return depth;
 }
 
-/* Extends the ranges by all corners of the tree's box, and returns the least of their depths. */
+/* Extends the ranges of columns and rows by all corners of the tree's box. Returns the smallest depth of a corner. */
 static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans[2])
 {
     float lower[4], upper[4];
@@ -226,15 +228,15 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans
     return least;
 }
 
-/* The area of the picture that parts cover. */
+/* The number of cells of some mesh parts, and the area of the picture that their bounding boxes cover. */
 typedef struct coverage {
     double cells;
-    double pixels; /* sum over the parts' boxes */
-    span all[2];   /* ranges of all boxes together */
+    double pixels; /* sum of the areas of the parts' boxes */
+    span all[2];   /* ranges of columns and rows that all boxes together cover */
 } coverage;
 
-/* Measures the parts on which the field has ranges, or all parts if ranges is NULL. Returns false if a part does not
- * lie completely in front of the eye. */
+/* Measures the parts on which the field has ranges of values, or all parts if ranges is NULL. Returns false if a part
+ * does not lie completely in front of the eye. */
 static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, coverage *out)
 {
     *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
@@ -259,12 +261,13 @@ static bool is_of_small_cells(const kernel_frame *f)
     return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
 }
 
-/* Counts of cells in leaves: cells sampled, and cells that isovalues may cross (one count per isovalue). */
+/* Counts over sampled leaves: their cells, and the cells that isovalues may cross, counted once per isovalue. */
 typedef struct leaf_sample {
     double cells, crossed;
 } leaf_sample;
 
-/* Adds a sample of the part's nodes, about half of which are leaves. */
+/* Adds the counts of `samples` nodes spread over the part's tree; about half of them are leaves, and inner nodes have
+ * no cells. */
 static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, leaf_sample *out)
 {
     const mmbvh *tree = f->job->parts[part].tree;
@@ -291,12 +294,13 @@ bool render_surfaces_are_small(const kernel_frame *f)
     int values = 0;
     if (f->has_transparent || !measure_parts(f, NULL, &c)) return false;
     const double all = (c.all[0].high - c.all[0].low) * (c.all[1].high - c.all[1].low);
-    const double pixels = fmax(fmin(c.pixels, all), KERNEL_TILE * KERNEL_TILE); /* parts may be seen edge on */
+    /* at least one tile, because parts may be seen edge on */
+    const double pixels = fmax(fmin(c.pixels, all), KERNEL_TILE * KERNEL_TILE);
     for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
     if (!(values * c.cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
         leaf_sample leaves = {0, 0};
-        double own = 0; /* cells of the parts that have the field */
+        double own = 0; /* number of cells of the parts that have the field */
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;
@@ -333,12 +337,13 @@ void render_trees_cover(kernel_frame *f)
 typedef struct search {
     kernel_frame *frame;
     render_subtrees subtrees;
-    kernel_candidate_list *lists; /* one per thread */
+    kernel_candidate_list *lists; /* one list of candidates per thread */
     int64_t bound;
     struct kernel_bins *bins;
 } search;
 
-/* Searches all subtrees. Each thread bins its own cells as soon as no subtree is left, without waiting for others. */
+/* Searches all subtrees in parallel. Each thread bins its own cells as soon as no subtree is left, without waiting for
+ * the others. */
 static void run(search *s, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
@@ -359,7 +364,7 @@ static void run(search *s, kernel_thread *thread_of, int threads)
     }
 }
 
-/* Begins each thread's list and bins. Returns false if there is no memory. */
+/* Creates each thread's list and bins. Returns false if there is no memory. */
 static bool begin_lists(search *s, int threads)
 {
     const int64_t tiles = tile_count(s->frame);
@@ -377,7 +382,7 @@ static bool begin_lists(search *s, int threads)
     return true;
 }
 
-/* Returns whether all cells of all threads are in bins and are at most `most`. */
+/* Returns whether every thread has binned all of its cells, and the number of all cells is at most `most`. */
 static bool is_whole(const search *s, int threads, int64_t most)
 {
     const int64_t tiles = tile_count(s->frame);
@@ -389,7 +394,7 @@ static bool is_whole(const search *s, int threads, int64_t most)
     return count <= most;
 }
 
-/* Returns the candidates that the search found, or NULL. */
+/* Returns the binned candidates of all surfaces, or of the volume; NULL if there are too many or memory runs out. */
 static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads)
 {
     const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;

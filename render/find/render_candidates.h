@@ -1,21 +1,24 @@
-/* Cells whose isosurfaces or volume may be visible, binned by tile of the picture (kernel_candidates.h). */
+/* Finds the cells whose isosurfaces or volume may be visible, and bins them by tile of the picture
+ * (kernel_candidates.h). */
 #ifndef RENDER_RENDER_CANDIDATES_H
 #define RENDER_RENDER_CANDIDATES_H
 
 #include "kernel_types.h"
 
-/* Returns whether the surfaces have so many cells per pixel that tiles should traverse the trees themselves. */
+/* Returns whether opaque surfaces have so many cells per pixel that tiles should traverse the trees themselves. */
 bool render_surfaces_are_small(const kernel_frame *frame);
 
-/* Fills frame->candidates, which render_candidates_free() frees. thread_of: a state per thread. If too many cells are
- * visible, or memory runs out, frame->candidates stays NULL, and tiles traverse the trees themselves. */
+/* Finds the cells of all surfaces and stores them in frame->candidates, which render_candidates_free() frees.
+ * thread_of: one state per thread. If too many cells are visible, or memory runs out, frame->candidates stays NULL, and
+ * tiles traverse the trees themselves. */
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* Like render_candidates_find(), for the cells of the only volume: fills frame->volume_candidates. */
+/* Finds the cells of the frame's only volume and stores them in frame->volume_candidates. If they are too small or too
+ * many, or memory runs out, that stays NULL, and tiles traverse the tree themselves. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* Gathers the cells of the tile whose upper left pixel is (x0, y0) in thread->bin and volume_bin, for the kernels.
  * Returns false if there is no memory. */
 bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
-/* Sets frame->cover, from the bounds of all trees. */
+/* Sets frame->cover to the pixels in which some tree may be visible, from the bounding boxes of all trees. */
 void render_trees_cover(kernel_frame *frame);
 void render_candidates_free(kernel_frame *frame);
 

@@ -6,8 +6,9 @@
 #include "memory.h"
 #include "mmbvh.h"
 
-/* Most subtrees of a tree, and about the fewest cells of a subtree: each search of one begins anew, and ends with lanes
- * that are not full, so that small trees, as those of blocks, are left whole. */
+/* SUBTREES is the maximum number of subtrees of a tree, SUBTREE_CELLS about the minimum number of cells of a subtree.
+ * Each search of a subtree has a fixed cost and ends with vectors that are not full, so small trees, such as those of
+ * blocks, are not divided. */
 enum { SUBTREES = 128, SUBTREE_CELLS = 512 };
 
 static int64_t most_subtrees(const mmbvh *tree)

@@ -1,17 +1,18 @@
-/* Division of a frame's search into subtrees for threads. */
+/* Divides the search of a frame's trees into subtrees, which threads search independently. */
 #ifndef RENDER_RENDER_SUBTREES_H
 #define RENDER_RENDER_SUBTREES_H
 
 #include "kernel_types.h"
 
 typedef struct render_subtrees {
-    kernel_subtree *items; /* to be freed with base_free() */
+    kernel_subtree *items; /* owned by the caller, who frees it with base_free() */
     int64_t count;
 } render_subtrees;
 
-/* Begins a list with space for `trees` trees. Returns false if there is no memory. */
+/* Creates an empty list with space for the subtrees of `trees` trees. Returns false if there is no memory. */
 bool render_subtrees_begin(render_subtrees *list, int64_t trees);
-/* Divides a part's tree into up to 128 subtrees and adds them, for a surface (-1: the volume). */
+/* Divides the tree of a mesh part into up to 128 subtrees and appends them to the list. surface: index of the surface
+ * layer, or -1 for the volume. */
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part);
 
 #endif
