@@ -1,7 +1,7 @@
-/* Crossings of rays with the faces of hexes, wedges and pyramids, one ray-cell pair per lane. The crossed faces are
- * found by the signs of projected edge functions, the crossing points on quads by kernel_quad.h and on triangles by
- * weights. The operations are those of kernel_curved_intervals(), which intersects a packet with one cell, and so the
- * bits are the same. A function's type is a constant at its callers. */
+/* Computes the crossings of rays with the faces of hexes, wedges and pyramids, one ray-cell pair per lane. The crossed
+ * faces are found by the signs of projected edge functions, the crossing points on quads by kernel_quad.h and on
+ * triangles by weights. The operations are those of kernel_curved_intervals(), which intersects a packet with one cell,
+ * so the results are the same to the bit. Callers pass the cell type as a constant. */
 #ifndef RENDER_KERNEL_LOCAL_CROSSINGS_H
 #define RENDER_KERNEL_LOCAL_CROSSINGS_H
 
@@ -20,20 +20,21 @@
 
 enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
 
-/* One cell per lane: positions and the field by vertex, and per face a word of kernel_quad_corners() or
- * kernel_triangle_order(), four bits per corner. For vectors of 16 lanes `rows` holds the same data per cell: x and y
- * by vertex, z and the field by vertex, and the words by face, 8 numbers each. */
+/* The faces of one cell per lane. at: x, y, z and the field by vertex. words: per face a word of kernel_quad_corners()
+ * or kernel_triangle_order() that lists its corners, four bits each. For vectors of 16 lanes `rows` holds the same data
+ * per cell, in three rows of 16 numbers: x and y by vertex; z and the field by vertex; the words by face. */
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
-    /* kernel_curved_dents(): bits of the quads that may not look convex on some of the cell's pixels */
+    /* per cell, a bit for each quad that may not look convex on some of the cell's pixels (kernel_curved_dents()) */
     float dents[SIMD_WIDTH];
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
 } kernel_local_faces;
 
 /* ---- cells ---- */
 
-/* Computes the rank of each vertex in the order of coordinates; vertices with equal coordinates keep their order. */
+/* Computes the rank of each vertex in the lexicographic order of coordinates; vertices with equal coordinates keep
+ * their order. Coordinates are compared in double. */
 SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int count, vf rank[8])
 {
     kernel_half sum[2][8] = {0};
@@ -56,8 +57,8 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
         for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
 }
 
-/* One step of a 16 x 16 transposition, after vf_transpose() has transposed the 4 x 4 blocks: exchanges blocks that are
- * `apart` (4 or 8) vectors and lanes from each other. */
+/* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
+ * blocks that are `apart` (4 or 8) vectors and lanes from each other. number: 0 .. 15, one per lane. */
 SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
 {
     const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
@@ -69,7 +70,7 @@ SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int a
     }
 }
 
-/* Stores one row of every cell, by transposing two lists of up to 8 vectors each, in which lanes are cells. */
+/* Stores row number `row` of every cell, by transposing two lists of up to 8 vectors each, whose lanes are cells. */
 SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count,
                                      const float (*second)[SIMD_WIDTH], int second_count, int row,
                                      kernel_local_faces *out)
@@ -88,7 +89,7 @@ SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first
     for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
 }
 
-/* Stores, per lane, the slopes and origins of the rays at its first and last column and row. */
+/* Reads, per lane, the slopes and origins of the tile's rays at the cell's first and last column and row. */
 SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], kernel_ray_box *out)
 {
     const vf first = vf_set(0), last = vf_set(KERNEL_TILE - 1);
@@ -102,7 +103,8 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
     }
 }
 
-/* Fills in the faces of the cells. lists: positions, the field and ranks by vertex. ends: kernel_local_pixels(). */
+/* Computes the faces of all lanes' cells. lists: x, y, z, the field and the rank, each by vertex. ends: first and last
+ * column and row of each cell (kernel_local_pixels()). */
 SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists)[8], int32_t ends[4][SIMD_WIDTH],
                                        int type, kernel_local_faces *out)
 {
@@ -229,18 +231,19 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kern
 
 /* ---- corners ---- */
 
-/* The corners of a face of each ray's cell, in the order of the face's word: position in the ray's plane, depth, and
- * field. */
+/* The corners of one face of each ray's cell, in the order of the face's word: position in the ray's plane (x and y),
+ * depth, and field. */
 typedef struct kernel_local_corners {
     vi vertex[4];
     vf at[4][4];
 } kernel_local_corners;
 
-/* The one or two cells to which a vector of 16 rays mostly belongs, as rays are listed cell by cell. A number of each
- * ray's own vertex is then selected from the two cells' rows by one permutation. */
+/* The one or two cells to which the rays of a vector of 16 mostly belong, because rays are listed cell by cell. Any
+ * number of each ray's own vertex is then read from the two cells' rows by one permutation. */
 typedef struct kernel_local_pair {
-    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* rows of the two cells */
-    vi second;                                /* SIMD_WIDTH if the ray's cell is the second one, else 0 */
+    const float (*rows[2])[KERNEL_LOCAL_ROW]; /* the rows of data of the two cells */
+    /* per ray: SIMD_WIDTH if its cell is the second one, else 0; added to the index of a permutation */
+    vi second;
 } kernel_local_pair;
 
 SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi lane, kernel_local_pair *out)
@@ -259,7 +262,7 @@ SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi l
     return !vm_any(vm_andnot(rays, vm_or(in_first, in_last)));
 }
 
-/* Gathers the corners of each ray's face. pair: NULL if the rays have more than two cells. */
+/* Gathers the corners of each ray's face. pair: NULL if the rays have more than two different cells. */
 SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
                                            vi lane, vi face, kernel_local_corners *out)
 {
@@ -293,7 +296,7 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
                 out[n].at[i][a] = (out[n].at[i][a] - rays->origin[a]) - rays->slope[a] * out[n].at[i][2];
 }
 
-/* Returns a vertex's reference coordinate on an axis, relative to the cell's middle. */
+/* Returns a vertex's reference coordinate on an axis, relative to the middle of the cell. */
 SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
 {
     static const float own[3][3][KERNEL_LOCAL_ROW] = {
@@ -338,7 +341,8 @@ SIMD_INLINE vf kernel_local_weigh(const vf e[3], vf inverse, vf i, vf j, vf k)
     return vf_muladd(e[0], k, vf_muladd(-e[2], j, e[1] * i)) * inverse;
 }
 
-/* Finds the rays' crossings of triangles, whose corners are in the order of coordinates. */
+/* Computes the rays' crossings of triangles, whose corners are in the order of their coordinates, so that all cells of
+ * a face get the same bits. */
 SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int type, kernel_point *out)
 {
     const vf *i = c->at[0], *j = c->at[1], *k = c->at[2];
@@ -353,7 +357,7 @@ SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int ty
                                kernel_local_own(type, a, c->vertex[1]), kernel_local_own(type, a, c->vertex[2]));
 }
 
-/* Where rays cross quads, and whatever elsewhere. */
+/* Computes the crossings of the rays in on_quad[n] with quads; the points of other rays are undefined. */
 SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2], int type, const vm on_quad[2],
                                           kernel_point ends[2])
 {

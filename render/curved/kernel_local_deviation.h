@@ -1,12 +1,10 @@
-/* The field along rays between two faces of their hexes, wedges or pyramids, one ray-cell pair per lane. It is
- * evaluated at three places between the faces, or in each part of a ray's interval. A function's type is a constant at
- * its callers.
+/* Evaluates the field along rays between two faces of their hexes, wedges or pyramids, one ray-cell pair per lane. It
+ * is evaluated at three places between the faces, or in each part of a ray's interval. Callers pass the cell type as a
+ * constant.
  *
- * In kernel_local.h's reference coordinates the field is f0 + g r + (its nonlinear terms), and y = r + n(r) is linear
- * along the ray, with the same nonlinear terms b in n = B b. So with r = y - n(r)
- *
- *     field = f0 + g y + h b(r),   h = (the field's nonlinear terms) - g B,
- *
+ * In kernel_local.h's reference coordinates r the field is f0 + g r + (its nonlinear terms), and y = r + n(r) is linear
+ * along the ray, where the nonlinear terms are n = B b with products b of coordinates. So with r = y - n(r)
+ *     field = f0 + g y + h b(r),   h = (the field's nonlinear terms) - g B.
  * The first part is linear along the ray. So the field deviates from its chord between the faces by h times the
  * deviation of b from its own chord. As that is small, r need not be known as accurately as for the field itself.
  *
@@ -16,14 +14,12 @@
  *
  * Error bound. Let the residual be the sum over the coordinates of |y - (r + n(r))|. The derivative of n is at most N
  * in the cell. If r lies slightly outside the cell (kernel_local_is_near()), the derivative is at most 1.082 N:
- *
  *              r may be up to                                   derivative          gradients of b
  *     hex      |ρ|, |σ|, |κ| <= 0.52                            1.04^2 N            sqrt(2) 0.52, sqrt(3) 0.52^2
  *     wedge    0.02 outside, within the cell times 1.06         1.06 N              |(0.52, 0.707)|
  *     pyramid  |α|, |β| <= 0.52 k, k <= 1.02                    1.045 N             |(0.52, 0.52, 0.52^2)|
- *
  * These regions are convex. So r errs by at most residual / (1 - 1.082 N), provided that r itself is no farther
- * outside, which is checked; otherwise the ray takes the scalar path. */
+ * outside, which is checked; rays that fail the check are traced one by one. */
 #ifndef RENDER_KERNEL_LOCAL_DEVIATION_H
 #define RENDER_KERNEL_LOCAL_DEVIATION_H
 
@@ -37,41 +33,46 @@
 
 enum { KERNEL_DEVIATION_STEPS = 8 };
 
-/* Distance in r by which points may lie outside the cell, which extends from -1/2 to 1/2. */
+/* Distance, in reference coordinates, by which points may lie outside the cell, which extends from -1/2 to 1/2. */
 #define KERNEL_DEVIATION_MARGIN 0.02f
 
-/* Properties of the nonlinear terms per lane. */
+/* Coefficients and error bounds of the nonlinear terms of each lane's cell. */
 typedef struct kernel_local_nonlinear {
-    float terms[KERNEL_BENT_TERMS][SIMD_WIDTH]; /* h */
-    float bend[SIMD_WIDTH];                     /* N^2 */
-    float unseen[SIMD_WIDTH];                   /* lower bound of E (kernel_local_budget.h) */
-    float sensitivity[SIMD_WIDTH];              /* error bound of the field per unit of the residual */
-    float residual_limit[SIMD_WIDTH];           /* if the residual is larger, the field is undefined */
-    float tolerance[SIMD_WIDTH];                /* Newton's method stops at a residual of at most this */
+    /* h: coefficients of the field's deviation from linear (the file's opening comment) */
+    float terms[KERNEL_BENT_TERMS][SIMD_WIDTH];
+    /* N^2, the square of the bound of the derivative of the map's nonlinear part n */
+    float bend[SIMD_WIDTH];
+    /* lower bound of the error E (kernel_local_budget.h) that the three sampled places cannot show */
+    float unseen[SIMD_WIDTH];
+    float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
+    float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
+    float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
 } kernel_local_nonlinear;
 
 typedef struct kernel_local_deviations {
-    vf field[3];     /* deviation from the chord at the first quarter, the middle and the third quarter */
-    vf residual;     /* largest residual at these places; for a part, at all places and parts' ends so far */
-    vm has_diverged; /* rays for which r was not found */
+    vf field[3]; /* the field minus its chord, at a quarter, the middle and three quarters of the interval */
+    /* largest residual at these places; if an interval is cut into parts, the largest at all places and parts' ends so
+     * far */
+    vf residual;
+    vm has_diverged; /* rays for which Newton's method did not find r */
 } kernel_local_deviations;
 
 /* ---- cells ---- */
 
-/* Returns an upper bound of the gradient of a nonlinear term. */
+/* Returns an upper bound of the gradient of nonlinear term number `term` in cells of this type. */
 SIMD_INLINE float kernel_local_bent_slope(int type, int term)
 {
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
-/* Returns the factor e of kernel_local_budget.h. It bounds the part of the field's deviation that the three places do
- * not show. */
+/* Returns the factor e of kernel_local_budget.h: the part of the field's deviation that the three sampled places may
+ * miss is at most e times its bound. */
 SIMD_INLINE float kernel_local_bent_unseen(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
 
-/* Sets every member of *out but tolerance. */
+/* Computes all members of *out except tolerance for the lanes' cells. */
 SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_nonlinear *out)
 {
     vf most = vf_set(0);
@@ -90,10 +91,12 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
 
 /* ---- rays in cells ---- */
 
-/* Chords of the rays in their cells, one per lane. The position u on the ray goes from -1/2 to 1/2. */
+/* The line between the values of r at a ray's two faces, and the chords of the nonlinear terms, per ray. A position u
+ * on the ray goes from -1/2 to 1/2. */
 typedef struct kernel_local_chord {
-    vf middle[3], span[3]; /* middle and extent of the line between the values of r at the faces */
-    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* middle and extent of the nonlinear terms' chords */
+    vf middle[3], span[3]; /* r at the line's middle, and its difference between the line's ends */
+    /* the nonlinear terms' chords: value at the middle, and difference between the ends */
+    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS];
     vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
     vf tolerance, residual_limit;
 } kernel_local_chord;
@@ -109,7 +112,7 @@ SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BEN
     memcpy(out, b.term, sizeof b.term);
 }
 
-/* Returns the rays for which r lies in the cell or slightly outside. */
+/* Returns the rays for which r lies in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
 SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 {
     if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
@@ -138,7 +141,7 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     out->residual_limit = kernel_take(nonlinear->residual_limit, lane);
 }
 
-/* Computes the residual at position u, and the field's deviation from its chord. */
+/* Computes the residual of r at position u, and the field's deviation from its chord there. */
 SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
     vf term[KERNEL_BENT_TERMS];
@@ -157,8 +160,9 @@ SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
     return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
 }
 
-/* Refines r at `count` places from guesses; *residual: the largest one left. Returns the rays for which all of them lie
- * in the cell or slightly outside. */
+/* Refines r at `count` places from initial guesses by Newton's method. *residual: the largest residual left at any
+ * place. Returns the rays for which r is valid at all places: in the cell or slightly outside, with a small enough
+ * residual. */
 SIMD_INLINE vm kernel_local_settle(const kernel_local_chord *c, const float *places, int count, vm rays, int type,
                                    kernel_local_iterate *at, vf *residual)
 {
@@ -200,13 +204,13 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     for (int i = 0; i < 3; i++) out->field[i] = iterates[i].deviation;
 }
 
-/* ---- parts ---- */
+/* ---- parts of an interval ---- */
 
-/* State at the end of one of the equal parts into which a ray's interval is cut. */
+/* The state at the end of one of the equal parts into which a ray's interval is cut. */
 typedef struct kernel_local_part {
     float u;
-    vf r[3], deviation; /* deviation: of the field, from the chord of the whole interval */
-    vf residual;        /* largest one so far */
+    vf r[3], deviation; /* the field minus the chord of the whole interval, at u */
+    vf residual;        /* largest residual of the parts so far */
 } kernel_local_part;
 
 SIMD_INLINE void kernel_local_part_begin(const kernel_point *first, kernel_local_part *out)
@@ -215,8 +219,8 @@ SIMD_INLINE void kernel_local_part_begin(const kernel_point *first, kernel_local
     memcpy(out->r, first->r, sizeof out->r);
 }
 
-/* Advances to the end of the next part, whose length is `share` of the interval, and computes the deviations from the
- * part's own chord. */
+/* Advances to the end of the next part, whose length is `share` of the interval, and computes the field's deviations
+ * from the chord of that part. */
 SIMD_INLINE void kernel_local_part_next(const kernel_local_chord *c, float share, vm rays, int type,
                                         kernel_local_part *part, kernel_local_deviations *out)
 {

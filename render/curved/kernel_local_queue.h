@@ -20,28 +20,31 @@
 #include "simd.h"
 
 enum {
-    KERNEL_LOCAL_AHEAD = 8, /* prefetch distance in cells: first for vertex indices, then for coordinates and values */
+    /* prefetch distance in cells: vertex indices are prefetched that far ahead, then coordinates and values */
+    KERNEL_LOCAL_AHEAD = 8,
     KERNEL_LOCAL_ROOM = SIMD_WIDTH + 2 * KERNEL_LOCAL_AHEAD
 };
 
-/* Queue of cells of one type. When it is full, the first SIMD_WIDTH cells are processed. */
+/* A queue of cells of one type. When it is full, its first SIMD_WIDTH cells are processed together. */
 typedef struct kernel_local_queue {
-    int count, known; /* the vertex indices of the first `known` cells have been read */
+    int count, known; /* number of cells; of these, the first `known` have their vertex indices in `vertex` */
     uint32_t cell[KERNEL_LOCAL_ROOM];
     uint16_t blocks[KERNEL_LOCAL_ROOM], box[KERNEL_LOCAL_ROOM];
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
 typedef struct kernel_local_lanes {
-    kernel_tile_take *take; /* callback for cells that cannot be processed in lanes */
+    kernel_tile_take *take; /* callback that traces cells that cannot be processed in lanes */
     int volume, part;
-    kernel_arrays arrays; /* of the current part */
+    kernel_arrays arrays; /* the arrays of the current mesh part */
     kernel_local_queue queues[KERNEL_CURVED_TYPES];
-    double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH]; /* coordinates and field as the caller has them */
+    /* coordinates and field values of the fetched cells in the caller's units, by vertex */
+    double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH];
     kernel_local_cells cells;
-    /* first and last column and row in which cells may be visible (kernel_local_pixels()) */
+    /* first and last column, first and last row of pixels in which each lane's cell may be visible
+     * (kernel_local_pixels()) */
     int32_t ends[4][SIMD_WIDTH];
-    int alone; /* the lane whose cell is the tile's current cell, ready for the scalar path; -1: none */
+    int alone; /* the lane whose cell is the tile's current cell, ready to be traced on its own; -1 if there is none */
 } kernel_local_lanes;
 
 SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, kernel_tile_take *take)
@@ -52,7 +55,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, ker
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
 }
 
-/* Switches to another part. The queues must be empty. */
+/* Makes `part` the current mesh part. The queues must be empty. */
 SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
 {
     l->part = part;
@@ -67,7 +70,8 @@ SIMD_INLINE int kernel_local_queue_of(int type)
 
 /* ---- cells ---- */
 
-/* Reads coordinates and values of the first SIMD_WIDTH cells, which have this number of vertices. */
+/* Reads coordinates and values of the queue's first SIMD_WIDTH cells, which have this number of vertices. Values of
+ * cells that are not drawn become NaN. */
 SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_queue *q, int vertices)
 {
     const kernel_arrays *p = &l->arrays;
@@ -87,8 +91,8 @@ SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_qu
     }
 }
 
-/* Converts the field to the transfer function's domain, as kernel_cell_domain() does; returns the lanes that are
- * visible. */
+/* Converts field values to the transfer function's domain, clamped to +-1e18. Returns the lanes whose values are all
+ * finite and are visible. */
 SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scalars)[SIMD_WIDTH], int count,
                                    vf values[8])
 {
@@ -107,8 +111,9 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
     return vm_and(finite, kernel_interest_meets_values(&t->interest, plain, count));
 }
 
-/* Computes the tile's first and last columns and rows in which cells may be visible. The margin of 1/100 pixel exceeds
- * the rounding of vertices that are at least 1/1000 of the scene's distance in front of the eye. */
+/* Computes the tile's first and last column and row of pixels in which each lane's cell may be visible. The margin of
+ * 1/100 pixel exceeds the rounding of vertices that are at least 1/1000 of the scene's distance in front of the eye; a
+ * cell with a nearer vertex gets all pixels. */
 SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, const vf places[3][8],
                                      int32_t ends[4][SIMD_WIDTH])
 {
@@ -138,7 +143,8 @@ SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, cons
     }
 }
 
-/* Clips a box of pixels (kernel_types.h) to the lane's columns and rows; returns false if nothing is left. */
+/* Clips a box of pixels (four bits each: first and last column, first and last row) to the columns and rows in which
+ * the lane's cell may be visible. Returns false if nothing is left. */
 SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigned *box)
 {
     int end[4];
@@ -152,8 +158,9 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
     return true;
 }
 
-/* Transforms the fetched cells into tile space. Stores the vertices' positions and the field in lists; permutes its
- * further rows along with them. Returns the visible cells; *lanes: those of them that can be processed in lanes. */
+/* Transforms the fetched cells into tile space. lists[0] to lists[2] get the vertices' positions, lists[3] the field;
+ * all list_count rows are then sorted by the vertices' canonical order. Returns a mask of the visible cells. *lanes:
+ * mask of those that can be processed in lanes. */
 SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, int type, vf (*lists)[8],
                                         int list_count, float most_bent, unsigned *lanes)
 {
@@ -181,7 +188,8 @@ SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_qu
                                KERNEL_LOCAL_ROOM);
 }
 
-/* Fetches the first SIMD_WIDTH cells of the queue; returns the lanes that have one. Other lanes get the first cell. */
+/* Fetches the first SIMD_WIDTH cells of the queue. Returns the mask of lanes that have a cell; the other lanes get
+ * copies of the first cell. */
 SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
@@ -195,7 +203,7 @@ SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_
     return (1u << count) - 1;
 }
 
-/* Removes the first SIMD_WIDTH cells from the queue. */
+/* Removes the first SIMD_WIDTH cells from the queue and moves the rest to its begin. */
 SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
 {
     enum { LEFT = KERNEL_LOCAL_ROOM - SIMD_WIDTH };
@@ -220,7 +228,7 @@ SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_que
     return q->count == KERNEL_LOCAL_ROOM;
 }
 
-/* ---- pixels ---- */
+/* ---- intervals of rays in cells ---- */
 
 /* Computes the interval, relative to depth, in which each ray may be inside its cell. */
 SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_local_rays *rays, vf depth,
