@@ -1,7 +1,7 @@
-/* A part's arrays as cells in lanes fetch them: any layout, one type of cells or several. Numbers within reach of a
- * gather come by gathers, others one by one. Those that are float32 are compared and subtracted as such, others as
- * doubles, to the same bits; all are doubles behind that. Meshes of so many vertices or cells that an index has no room
- * in 32 bits have no lanes. */
+/* Reads a mesh part's coordinates, values and connectivity for one cell per lane, from arrays of any layout and meshes
+ * of one or several cell types. Numbers whose byte offset fits in 32 bits are read by gather instructions, others one
+ * by one. float32 numbers are compared and subtracted in float32, others in double; both give the same bits. After that
+ * all numbers are doubles. Meshes whose vertex or cell indices do not fit in 32 bits are not processed in lanes. */
 #ifndef RENDER_KERNEL_ARRAYS_H
 #define RENDER_KERNEL_ARRAYS_H
 
@@ -13,13 +13,15 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Numbers by index. */
+/* An array of numbers that is read by vertex or cell index. */
 typedef struct kernel_numbers {
-    const float *data; /* NULL: out of a gather's reach, or neither float32 nor float64 */
-    int32_t stride;    /* in float32's */
+    /* first number; NULL if the array cannot be gathered: it is too large, or neither float32 nor float64 */
+    const float *data;
+    int32_t stride; /* distance between consecutive numbers, in units of four bytes */
     bool is_wide;
-    grid_array array;        /* what is asked where data is NULL; */
-    const grid_field *field; /* or this, where it is a field's */
+    grid_array array; /* the array itself, read one by one if data is NULL */
+    /* if not NULL, numbers are read by grid_field_value() of this field instead of from `array` */
+    const grid_field *field;
 } kernel_numbers;
 
 SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
@@ -28,15 +30,16 @@ SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
 }
 
 typedef struct kernel_arrays {
-    bool has_lanes;         /* tets, hexes, wedges and pyramids are for lanes */
-    bool is_narrow;         /* all numbers are float32 that are gathered, */
-    bool has_narrow_places; /* or the coordinates are */
-    const grid *cells;      /* NULL: the cells' vertices are one after the other, */
-    int type;               /* and all are of this type */
-    const grid_field *own;  /* NULL, or what tells the cells that have no value of their own */
-    bool is_by_cell;        /* values are the cells' */
+    bool has_lanes;         /* set if indices fit in 32 bits, so that cells can be processed in lanes */
+    bool is_narrow;         /* set if all numbers are float32 and can be gathered */
+    bool has_narrow_places; /* set if the coordinates are float32 and can be gathered */
+    const grid *cells;      /* the mesh */
+    int type;               /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
+    /* field that is not finite for cells without a value of their own; NULL if all cells have one */
+    const grid_field *own;
+    bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
-    struct { /* arrays that are asked of memory beforehand */
+    struct { /* the arrays that are prefetched by vertex index: coordinates and values */
         const char *data;
         int64_t stride;
     } asked[4];
@@ -52,7 +55,7 @@ static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t coun
     return c;
 }
 
-/* Do the mesh's indices have room in lanes? */
+/* Returns whether the mesh's vertex and cell indices fit in the 32 bits of a lane. */
 SIMD_INLINE bool kernel_arrays_fit(const grid *g)
 {
     return g->vertex_count < INT32_MAX && g->cell_count < INT32_MAX;
@@ -92,22 +95,23 @@ SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
     return p->type != GRID_NO_TYPE ? p->type : grid_cell_type(p->cells, cell);
 }
 
-/* Returns the first of the cell's entries in the connectivity, for cells of so many vertices; for a lattice, the cell's
- * first vertex. */
+/* Returns the index of the cell's first entry in the connectivity; for a lattice, the cell's first vertex. vertices:
+ * number of vertices of each cell, used if the mesh has no offsets. */
 SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertices)
 {
     if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first(g->lattice, cell);
     return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
 }
 
-/* Stores the vertices of a lattice's cell, each room after the one before. */
+/* Stores the vertex indices of a lattice's cell in out[0], out[room], out[2 * room] and so on. */
 static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const int64_t first = grid_lattice_first(l, cell);
     for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner[i]);
 }
 
-/* vertices: of each cell; a constant where this is called from. */
+/* Reads the vertex indices of `count` cells into lanes lane, lane + 1, ... of `out`. vertices: number of vertices of
+ * each cell, which callers pass as a constant. */
 SIMD_INLINE void kernel_arrays_indices(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
                                        int32_t (*out)[SIMD_WIDTH], int lane)
 {
@@ -128,7 +132,7 @@ SIMD_INLINE void kernel_arrays_indices(const kernel_arrays *p, const uint32_t *c
     }
 }
 
-/* Asks memory for what the vertices have. */
+/* Prefetches the coordinates and values of the vertices of `count` cells, from the given lane on. */
 SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int vertices,
                                         int32_t (*const vertex)[SIMD_WIDTH], int lane)
 {
@@ -137,7 +141,8 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
             for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex[i][n] * p->asked[k].stride);
 }
 
-/* The vertices of a cell, each room after the one before, and what they have on its way from memory. */
+/* Stores a cell's vertex indices in out[0], out[room], out[2 * room] and so on, and prefetches the coordinates and
+ * values of these vertices. */
 SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const grid_array c = p->cells->connectivity;
@@ -154,8 +159,8 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     }
 }
 
-/* Stores the vertices of cells of one type into lanes from the given one on, and prefetches their coordinates and
- * values. */
+/* Stores the vertex indices of cells of one type in lanes, from the given lane on, and prefetches the vertices'
+ * coordinates and values. */
 SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
                                      int32_t (*out)[SIMD_WIDTH], int lane)
 {
@@ -171,7 +176,7 @@ SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cel
     }
 }
 
-/* Returns the lanes whose cells have a value. */
+/* Returns those of the given lanes (a bit mask) whose cells have a finite value of their own. */
 SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
     for (unsigned left = p->own ? lanes : 0; left; left &= left - 1)
@@ -181,7 +186,8 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* ---- numbers ---- */
 
-/* Returns the coordinates along a lattice's axis at vertices: grid_index_along() a lane. */
+/* Computes the vertices' coordinates along one axis of a rectilinear lattice, by the position of each vertex on that
+ * axis (the version in lanes of grid_index_along()). */
 static void kernel_axis_take(const grid_axis *axis, vi vertex, kernel_whole *out)
 {
     const grid_numbering *of = axis->vertices;
@@ -213,7 +219,7 @@ static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers
     memcpy(out, v, sizeof v);
 }
 
-/* Numbers as they came: float32 where that is what there is, for which less is to be done. */
+/* Numbers as they were read: in `narrow` if the array is float32, which saves operations, else in `wide`. */
 typedef struct kernel_taken {
     vf narrow;
     kernel_whole wide;
@@ -237,7 +243,7 @@ SIMD_INLINE kernel_whole kernel_numbers_take(const kernel_numbers *c, vi index)
     return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
 }
 
-/* Compares as above, where it is known beforehand whether all numbers are narrow. */
+/* Returns a < b per lane. is_narrow: whether both are stored as float32. */
 SIMD_INLINE vm kernel_taken_lt(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
 {
     return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
@@ -260,7 +266,7 @@ SIMD_INLINE void kernel_taken_swap(bool is_narrow, vm lanes, kernel_taken *a, ke
     }
 }
 
-/* Is a before b, in the order of coordinates? */
+/* Returns the lanes in which position a is before b in the lexicographic order of coordinates. */
 SIMD_INLINE vm kernel_taken_before(bool is_narrow, const kernel_taken a[3], const kernel_taken b[3])
 {
     vm before = kernel_taken_lt(is_narrow, &a[2], &b[2]);
@@ -270,7 +276,8 @@ SIMD_INLINE vm kernel_taken_before(bool is_narrow, const kernel_taken a[3], cons
     return before;
 }
 
-/* The vertices' coordinates. */
+/* Reads the coordinates of one vertex per lane. is_narrow: whether all three arrays are float32 that can be
+ * gathered. */
 SIMD_INLINE void kernel_arrays_place(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_taken out[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -286,13 +293,14 @@ SIMD_INLINE kernel_whole kernel_taken_whole(bool is_narrow, const kernel_taken *
     return is_narrow ? kernel_whole_widen(v->narrow) : v->wide;
 }
 
-/* A value to compare with: as it is, as two float32, and the least float32 that is not below it. */
+/* A value to compare with: in double, as a sum of two float32 (middle + rest), and the least float32 that is not below
+ * it. */
 typedef struct kernel_level {
     double value;
     float middle, rest, least;
 } kernel_level;
 
-/* The least float that is not below x. */
+/* Returns the least float32 that is not below x. */
 SIMD_INLINE float kernel_not_below(double x)
 {
     float f = (float)x;
@@ -311,14 +319,14 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
     return (kernel_level){value, middle, (float)(value - (double)middle), kernel_not_below(value)};
 }
 
-/* Is v below the level? Exactly. */
+/* Returns the lanes in which v is below the level; the comparison is exact. */
 SIMD_INLINE vm kernel_taken_below(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
 {
     const kernel_whole value = kernel_whole_set(level->value);
     return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : kernel_whole_lt(&v->wide, &value);
 }
 
-/* Returns v less the level, as a float32. */
+/* Returns v minus the level, rounded to float32. */
 SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
 {
     vf out;
@@ -327,7 +335,7 @@ SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v,
     return out;
 }
 
-/* The field at vertices of the cells. */
+/* Reads the field for one vertex per lane; a cell-centred field is read by the lanes' cells instead. */
 SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_taken *out)
 {
     if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, cells, sizeof vertex);

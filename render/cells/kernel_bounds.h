@@ -1,11 +1,12 @@
-/* Bounds of the maps and fields of hexes, wedges or pyramids, for all rays of a tile that meet them, a cell a lane
- * (kernel_roots.h has what they are bounds of). A slope that does not depend on all three of a corner's coordinates is
- * computed once for the corners that share it.
+/* Bounds of the maps and fields of hexes, wedges or pyramids, one cell per lane. They hold for all rays of a tile (what
+ * they bound is defined in kernel_roots.h). A derivative that does not depend on all three coordinates is computed once
+ * for all corners that share it.
  *
- * Let L be linear in the point, with the field's gradient at the cell's centre, and E = F - L(X), polynomial as F is
- * and small where the field is smooth. Along a ray of direction d L(X) is linear, and r* has the slope J^-1 d: where
- * |grad L . d| is more than the most that grad E . J^-1 d may be, F is monotone along every ray in the cell. And where
- * L at both ends is farther from 0 than the largest |E|, on one side, there is no root. */
+ * Let J be the Jacobian of the cell's map, L a linear function of the point with the field's gradient at the cell's
+ * centre, and E = F - L(X), which is a polynomial like F and small if the field is smooth. Along a ray of direction d,
+ * L(X) is linear and the reference coordinates r have the slope J^-1 d. If |grad L . d| is larger than the maximum of
+ * grad E . J^-1 d, F is monotone along every ray in the cell. And if L at both ends of an interval is farther from 0
+ * than the largest |E|, on the same side, the interval has no root. */
 #ifndef RENDER_KERNEL_BOUNDS_H
 #define RENDER_KERNEL_BOUNDS_H
 
@@ -20,41 +21,49 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* What a ray's one crossing is found by (surface/kernel_contraction.h): Y = inverse (X - vertex 0) + offset is r +
- * N(r), with r from the domain's middle, of a pyramid from the apex, and N's terms bent; the field is L + middle and
- * terms field of the same products. */
+/* Coefficients by which the only root of a ray is found (surface/kernel_contraction.h). Y = inverse (X - vertex 0) +
+ * offset equals r + N(r), where r is counted from the domain's middle, or from the apex of a pyramid, and `bent` has
+ * the coefficients of N. The field is L + middle + the terms `field`, which multiply the same products of
+ * coordinates. */
 typedef struct kernel_contractions {
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
-    float grow[SIMD_WIDTH]; /* K / (1 - K) of the contraction's constant K; infinite where there is none */
+    /* K / (1 - K), where K is the contraction's constant; infinite if the iteration is not a contraction */
+    float grow[SIMD_WIDTH];
     float blur[SIMD_WIDTH], rim[SIMD_WIDTH];
 } kernel_contractions;
 
-/* Bounds for cells and their isovalues, lane by lane. */
+/* Bounds for one cell and isovalue per lane. */
 typedef struct kernel_bounds {
-    /* A face's value and the field on the ray beside it are never farther apart; less than nothing where the field is
-     * not known to be monotone along the rays. */
+    /* Upper bound of the difference between a face's value and the field on the ray next to it. It is negative if the
+     * field is not known to be monotone along the rays. */
     float jump[SIMD_WIDTH];
-    /* L at vertex 0 and along tile space; and for |E|, with what rounding adds to it, or infinite where that is of no
-     * use, as nothing is proved of the cell. */
+    /* L at vertex 0, its gradient in tile space, and the bound of |E| including rounding; the bound is infinite if
+     * nothing is proved about the cell. */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
-    /* J0^-1. The cell lies between pairs of planes: low <= normal . (X - vertex 0) <= high. */
+    /* J0^-1, the inverse Jacobian at the centre. The cell lies between pairs of planes: low <= normal . (X - vertex 0)
+     * <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    float bent[3][4][SIMD_WIDTH];                 /* N's coefficients 4 to 7 */
-    float stretch[SIMD_WIDTH], slope[SIMD_WIDTH]; /* L and G of kernel_roots.h */
-    float curve[SIMD_WIDTH], twist[SIMD_WIDTH];   /* H and K; of a pyramid: times k */
+    float bent[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the map's nonlinear part N */
+    /* bounds L and G of kernel_roots.h: of the stretch of reference coordinates, and of the field's gradient */
+    float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
+    /* bounds H and K of kernel_roots.h, of second derivatives of the field and the map; for a pyramid they are
+     * multiplied by its coordinate k */
+    float curve[SIMD_WIDTH], twist[SIMD_WIDTH];
     kernel_contractions contractions;
 } kernel_bounds;
 
-/* Half of the lanes. */
+/* Intermediate results in double for SIMD_WIDTH / 2 cells. */
 typedef struct kernel_bounds_lanes {
-    kernel_half exact[4][8], apart[3][8]; /* coefficients, and places from vertex 0 on */
+    /* polynomial coefficients of positions and field, and positions relative to vertex 0 */
+    kernel_half exact[4][8], apart[3][8];
     kernel_half bent[3][4], inverse[3][3], reach[3];
     kernel_half_mask is_solid;
 } kernel_bounds_lanes;
 
-/* Which slopes there are at the corners of a domain (kernel_domain_of()), along each axis: slope_count of them, each
- * first met at a corner, and which one a corner has. Of a hex a slope depends on the two other coordinates; of a wedge
- * on the last alone, and along the last on the two others; of a pyramid on the same coordinate alone. */
+/* Tells which different derivatives there are at the corners of a reference domain (kernel_domain_of()), for each of
+ * the three axes: their number (slope_count), the corner at which each is first met, and which one each corner has. For
+ * a hex a derivative depends on the two other coordinates. For a wedge it depends on the last coordinate alone, or
+ * along the last axis on the two others. For a pyramid it depends on the same coordinate alone. */
 typedef struct kernel_slope_table {
     int corner_count, slope_count[3];
     signed char first[3][4], at[3][8];
@@ -72,7 +81,7 @@ static const kernel_slope_table kernel_slope_tables[3] = {
      {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}}},
 };
 
-/* At corners, by the number of the slope. */
+/* Derivatives at corners, indexed by the number of the derivative in kernel_slope_table. */
 typedef struct kernel_lanes_slopes {
     kernel_half bend[3][3][4], df[3][4], de[3][4];
 } kernel_lanes_slopes;
@@ -82,7 +91,7 @@ SIMD_INLINE kernel_half kernel_half_all(double x)
     return (kernel_half){0} + x;
 }
 
-/* Rounds to float32. */
+/* Returns v rounded to float32, as a double. */
 SIMD_INLINE kernel_half kernel_half_rounded(kernel_half v)
 {
     return kernel_half_widen(kernel_half_narrow(v));
@@ -93,7 +102,7 @@ SIMD_INLINE kernel_half kernel_half_more(kernel_half v, kernel_half most)
     return kernel_half_select((kernel_half_mask)(v > most), v, most);
 }
 
-/* A number's slope along axis a, of coefficients 1 to 7, at r of the domain. */
+/* Returns the derivative along axis a, at the reference point r, of a polynomial with coefficients c. */
 SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int a, const double r[3])
 {
     if (kernel_has_apex(type)) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
@@ -103,8 +112,8 @@ SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int 
     return kernel_is_box(type) ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
 }
 
-/* Returns how far the slope along axis a, of a polynomial with these coefficients 4 to 7, is at r from that at the
- * centre. */
+/* Returns the difference between the derivatives along axis a at r and at the domain's centre, of a polynomial whose
+ * coefficients 4 to 7 are `bent`. */
 SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -116,7 +125,7 @@ SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], in
     return kernel_is_box(type) ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
 }
 
-/* Finds the coefficients of the map and of the field. */
+/* Computes the polynomial coefficients of the map and of the field from the vertices' positions and values. */
 SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const float at[4][8][SIMD_WIDTH], int half)
 {
     const int count = grid_type_vertices(type);
@@ -137,8 +146,8 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
     }
 }
 
-/* Multiplies the map's bent coefficients by the inverse of its Jacobian at the centre, which makes those of N
- * (kernel_roots.h). */
+/* Multiplies the map's nonlinear coefficients by the inverse of its Jacobian at the centre, which gives the
+ * coefficients of N (kernel_roots.h). */
 SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -171,7 +180,8 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
     }
 }
 
-/* L's gradient, rounded, and E; *size is of the rounding of places. */
+/* Computes L's gradient, rounded to float32, and the coefficients of E. *size is a scale for the rounding of L at
+ * positions in the cell. */
 SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_half gradient[3],
                                             kernel_half e[8], kernel_half *size)
 {
@@ -191,7 +201,7 @@ SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int ty
     }
 }
 
-/* Bounds, over the corners of the domain, how far the field with these coefficients is off L. */
+/* Returns the maximum over the domain's corners of |E|, where e has the coefficients of E. */
 SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
 {
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
@@ -208,7 +218,8 @@ SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
     return kernel_half_sqrt(most);
 }
 
-/* The gradients of the field and of E at the corners, and the bend there. */
+/* Computes the gradients of the field and of E, and the deviation of N's derivative from that at the centre, at all
+ * corners. */
 SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_half e[8],
                                             kernel_lanes_slopes *out)
 {
@@ -224,10 +235,11 @@ SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int ty
         }
 }
 
-/* The largest over the corners. */
+/* Maxima of several norms over the corners of the domain. */
 typedef struct kernel_lanes_most {
-    kernel_half bend;                   /* a bound of the matrix's norm, to its eighth power */
-    kernel_half df, along, steep, bent; /* squares: of F's gradient; as in kernel_half_bounds() */
+    kernel_half bend; /* upper bound of the 8th power of the matrix norm of N's derivative */
+    /* squares of maxima: of |grad F|, of grad E . w, of |grad E|, and of |N' w|, as kernel_half_bounds() uses them */
+    kernel_half df, along, steep, bent;
 } kernel_lanes_most;
 
 SIMD_INLINE kernel_half kernel_half_length(const kernel_half v[3])
@@ -235,8 +247,9 @@ SIMD_INLINE kernel_half kernel_half_length(const kernel_half v[3])
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-/* A bound of how much m lengthens a vector, at most 1.15 times what it is, to its eighth power: the norm of its
- * singular values to the eighth power, which is one, and so convex as they all are. */
+/* Returns an upper bound of the 8th power of the matrix norm |m|, at most 1.15^8 times that. It is the sum of the 8th
+ * powers of the singular values, whose 8th root is a norm; so the maximum over the corners bounds it in the whole
+ * domain. */
 SIMD_INLINE kernel_half kernel_half_eighth(const kernel_half m[3][3])
 {
     kernel_half square[3][3], fourth[3][3], sum = {0};
@@ -286,7 +299,8 @@ SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_hal
     memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
 }
 
-/* The planes across J0's columns that the vertices lie between, widened by what a ray's places may be off. */
+/* Computes the two planes, perpendicular to row i of J0^-1, between which all vertices lie, moved outward by `pad`, the
+ * error of a ray's positions. */
 SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int i, kernel_half pad, int half,
                                     kernel_bounds *out)
 {
@@ -302,8 +316,8 @@ SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int 
     kernel_half_store(out->high[i], half, high + pad);
 }
 
-/* The terms of a number with these coefficients that are bent, about the middle of the domain: the products of two of
- * its coordinates there, and of a hex of all three. */
+/* Converts the nonlinear coefficients of a polynomial to coordinates about the domain's middle. They multiply the
+ * products of two coordinates, and for a hex also of all three. */
 SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_half out[4])
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
@@ -313,22 +327,24 @@ SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_h
     for (int j = 0; j < 3; j++) out[j] += 0.5 * bent[3];
 }
 
-/* What kernel_half_bounds() knows when it comes to contractions. */
+/* Results of kernel_half_bounds() that kernel_half_rate() and the contraction need. */
 typedef struct kernel_half_rates {
-    kernel_half across, gradient[3], e[8];         /* places' rounding across the beam; of L and E */
-    kernel_half gap, slope, theta, slant, rise, w; /* w: the most of |w| */
+    /* rounding of positions across the rays; gradient of L; coefficients of E */
+    kernel_half across, gradient[3], e[8];
+    kernel_half gap, slope, theta, slant, rise, w; /* other bounds of kernel_half_bounds(); w: the maximum of |w| */
     kernel_half_mask is_regular;
 } kernel_half_rates;
 
-/* The contraction's constant K, and the bounds of rounding, in the cell's own coordinates r. With u = 6e-8, e the
- * vertices' extents from vertex 0 and wide the most of a ray's |x| and |y| and of the vertices':
- * - y and w have some 4 u of |inverse| times wide across and times e, of inverse's own rounding among them: an eighth
- * of the 2e-6 that kernel_half_bounds() takes for a face's places, and 3e-7 e.
- * - L and E have 4 u of 2, which values are below (rim has a factor 2 for it), of the gradient times wide across and e
- * along the ray, and as much for the gradient's own rounding: 5e-7. Over the field's slope, times |w|, that moves r.
- * - An iteration adds some units of r, and near a pyramid's apex k is no less than 1e-6: 1e-6.
- * Faces have their crossings within gap of the ray, and values within KERNEL_FACE_BAND of what the field is there
- * (kernel_bounds). Either moves the root by itself over 1 - K. rim is twice the sum. */
+/* Computes the contraction's constant K and the bounds of rounding, in reference coordinates r. With u = 6e-8, e the
+ * vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x| and |y| of rays and vertices:
+ * - y and w err by about 4 u |inverse| times `wide` across and times e, including the rounding of the inverse itself:
+ *   an eighth of the 2e-6 that kernel_half_bounds() uses for the positions of faces, and 3e-7 e.
+ * - L and E err by 4 u times 2, the bound of values (rim has a factor 2 for this), times the gradient times `wide`
+ *   across and e along the ray, and by as much for the gradient's own rounding: 5e-7. Divided by the field's
+ *   derivative, and times |w|, that is an error of r.
+ * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6.
+ * The faces' crossings lie within `gap` of the ray, and the values there differ from the field by at most
+ * KERNEL_FACE_BAND. Each error moves the root by itself / (1 - K). rim is twice the sum. */
 SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const kernel_half_rates *r, int half,
                                   kernel_contractions *out)
 {
@@ -384,8 +400,9 @@ SIMD_INLINE void kernel_half_contraction_of(const kernel_bounds_lanes *b, const 
     kernel_half_rate(b, type, r, half, out);
 }
 
-/* Square of the Frobenius norm of a polynomial's Hessian over the widened domain; of a pyramid's times k: those of a b
- * / k with a / k and b / k in [-1/32, 33/32] are at most 1, 33/32, 33/32 and 2.13 over k, their norm 3.29. */
+/* Returns the square of the Frobenius norm of a polynomial's second derivatives over the extended domain. For a pyramid
+ * it is multiplied by k^2: for a b / k, with a / k and b / k in [-1/32, 33/32], the second derivatives are at most 1,
+ * 33/32, 33/32 and 2.13 over k, so their norm is 3.29 / k. */
 SIMD_INLINE kernel_half kernel_half_hessian(int type, const kernel_half c[4])
 {
     kernel_half sum = {0};
@@ -398,7 +415,7 @@ SIMD_INLINE kernel_half kernel_half_hessian(int type, const kernel_half c[4])
     return sum;
 }
 
-/* What the search for roots asks of the map and the field (kernel_roots.h). */
+/* Stores the coefficients and bounds of the map and the field that the search for roots needs (kernel_roots.h). */
 SIMD_INLINE void kernel_half_limits(const kernel_bounds_lanes *b, int type, kernel_half stretch, kernel_half slope,
                                     int half, kernel_bounds *out)
 {
@@ -420,13 +437,13 @@ static __attribute__((noinline)) void kernel_half_contraction(const kernel_bound
     KERNEL_OF_TYPE(type, kernel_half_contraction_of, b, r, half, out);
 }
 
-/* Bounds, for rays about (0, 0, 1), how far the field is off L, how it rises along the rays, and how far it may jump at
- * a face: the face's value is that of the patch at the coordinates found, and that point lies beside the ray by the
- * rounding of places.
+/* Computes, for rays close to the direction (0, 0, 1), how far the field differs from L, how fast L rises along the
+ * rays, and how large the jump of the field at a face can be: the face's value is that of its patch at the computed
+ * coordinates, and that point differs from the ray by the rounding of positions.
  *
- * Is F monotone along the rays? With M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, what E adds to the
- * slope of L is grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w); each is bounded alone, by its largest at
- * the corners, for the ray in the middle and by how far w may be from its. */
+ * To prove that F is monotone along the rays: with M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, E
+ * changes the derivative of L by grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w). Each of the three terms
+ * is bounded separately, by its maximum at the corners for the middle ray and by how far another ray's w may differ. */
 SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
                                     kernel_bounds *out, int type)
 {
@@ -468,7 +485,7 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     const kernel_half_mask rises = is_regular & (kernel_half_mask)(rise * 0.9999 > least);
     const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
     kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
-    /* L, and its thickness. */
+    /* L at vertex 0, and the half thickness of the slab |L| <= thickness that contains the isosurface. */
     const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
     e[0] -= level;
     const kernel_half thickness = kernel_half_error(type, e) + 1e-5 + 16 * 6e-8 * size;
@@ -488,7 +505,8 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     kernel_half_contraction(&b, &rates, half, &out->contractions, type);
 }
 
-/* Lane by lane, of places in tile space and values. */
+/* Computes the bounds for one cell of this type per lane, from vertex positions in tile space and vertex values
+ * (`at`). */
 static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[4][8][SIMD_WIDTH],
                                                        const kernel_beam *beam, kernel_bounds *out)
 {
@@ -498,14 +516,15 @@ static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[
 /* Hexes, wedges or pyramids of one type as roots are looked for in them, a cell a lane. */
 typedef struct kernel_curved {
     int type;
-    int lane;                           /* the cell that all rays of a packet are in */
-    const float (*at)[8][SIMD_WIDTH];   /* places in tile space, and the field less the isovalue, scaled */
-    const float (*colours)[SIMD_WIDTH]; /* kernel_cell.g, where the layer has a field for colours */
-    const kernel_bounds *bounds;        /* NULL: they are still to be found, of a cell alone */
+    int lane; /* lane of the cell that contains all rays of a packet */
+    /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex and lane */
+    const float (*at)[8][SIMD_WIDTH];
+    const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
+    const kernel_bounds *bounds;        /* NULL if the bounds of a single cell have not been computed yet */
     struct kernel_curved_room *room;    /* for that */
 } kernel_curved;
 
-/* Room for a cell alone, which all lanes have. */
+/* Memory for a single cell, whose data are copied to all lanes. */
 typedef struct kernel_curved_room {
     float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
     kernel_bounds bounds;
@@ -524,7 +543,7 @@ SIMD_INLINE void kernel_curved_spread(const float *of, int count, float out[8][S
     for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? of[i] : 0));
 }
 
-/* Finds the bounds of a cell alone. */
+/* Computes the bounds of one cell that is traced on its own, with its data in all lanes. */
 static __attribute__((noinline)) void kernel_curved_alone(const kernel_cell *c, const kernel_beam *beam,
                                                           kernel_curved *out)
 {

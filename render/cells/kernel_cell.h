@@ -1,17 +1,18 @@
-/* A ray and a cell: where it goes in and out, and the field's value there.
+/* Intersects a ray with a cell: computes where the ray enters and leaves, and the field there.
  *
  * Which faces a ray crosses is decided on triangles: the triangular faces, and the quads split in two by the diagonal
- * from their smallest vertex, in the order of coordinates. Where it crosses a quad is then found on the quad's bilinear
- * patch, which the isoparametric maps of both its cells have there. Everything about a face is computed from its
- * vertices alone, taken in that same order, so that two cells that share a face find the same bits on it, whatever
- * their numbering, orientation or rank.
+ * from their smallest vertex, in the lexicographic order of coordinates. The crossing point on a quad is then computed
+ * on the quad's bilinear patch, which is the image of the face under the isoparametric maps of both its cells.
+ * Everything about a face is computed from its vertices alone, taken in that same order, so that two cells that share a
+ * face compute the same bits on it, whatever their numbering, orientation or rank.
  *
  * In the ray's own plane (x, y with the ray at the origin) the edge function of edge ab is xa yb - xb ya: positive on
- * one side. It is computed so that its sign is exact (simd.h); where it is zero, the ray is taken as moved by (e, e²)
- * for an e smaller than every number, which the same for all edges decides every tie. So a ray meets exactly those
- * triangles that contain it, never both or neither of two that share an edge, and a closed surface an even number of
- * times. (Woop, Benthin and Wald 2013 for the edge functions in the ray's plane; Edelsbrunner and Mücke 1990 for the
- * ties.) Sorted along the ray the crossings pair up into the intervals inside; no orientation is asked of the cell. */
+ * one side. It is computed so that its sign is exact (simd.h). If it is zero, the ray is treated as if it were moved by
+ * (e, e²) for an e smaller than every number; that rule is the same for all edges and decides every tie. So a ray meets
+ * exactly those triangles that contain it, never both or neither of two that share an edge, and it crosses a closed
+ * surface an even number of times. (Woop, Benthin and Wald 2013 for the edge functions in the ray's plane; Edelsbrunner
+ * and Mücke 1990 for the ties.) Sorted along the ray, the crossings form pairs, which are the intervals inside the
+ * cell. The cell's orientation does not matter. */
 #ifndef RENDER_KERNEL_CELL_H
 #define RENDER_KERNEL_CELL_H
 
@@ -26,52 +27,50 @@
 
 /* The edge function of a cell's edge, for all rays of a tile.
  *
- * In the plane of the ray with parameters u, v (its slopes, or its origin where the camera is orthographic) a vertex
- * placed at X, Y, Z in tile space is at x = X - u D, y = Y - v D, where D is its depth from the eye, or 1 where the
- * camera is orthographic. The edge function is then affine in u and v, for the products u v cancel:
- *
+ * In the plane of the ray with parameters u, v (its slopes, or its origin if the camera is orthographic) a vertex at X,
+ * Y, Z in tile space is at x = X - u D, y = Y - v D, where D is its depth from the eye, or 1 if the camera is
+ * orthographic. The edge function is then affine in u and v, because the products u v cancel:
  *     e = xa yb - xb ya = (Xa Yb - Xb Ya) + u (Db Ya - Da Yb) + v (Da Xb - Db Xa)
+ * Its coefficients are computed once per cell and tile, from the edge's two vertices in the order of coordinates, so
+ * that all cells of the edge have the same bits; a packet then needs two multiply-adds. For rays for which the sign of
+ * that sum is uncertain, which depends on the edge and the ray alone, e is computed from the projected vertices
+ * instead, by vf_diff_of_products(), with its exact sign.
  *
- * Its coefficients are computed once a cell and tile, from the edge's two vertices in the order of coordinates, so that
- * all cells of the edge have the same bits; a packet then needs two multiply-adds. On rays where that leaves the sign
- * in doubt, which depends on the edge and the ray alone, e is computed from the projected vertices instead, by
- * vf_diff_of_products(), to its exact sign.
- *
- * The bound of doubt. Let r = 2^-24, W the most of |u| and |v| over the tile, reach the eye's distance from the origin
- * of depth (0 where orthographic), M = |Z| + reach >= |D| (1 where orthographic), N = 2 max(|X|, |Y|) + 5 W M; so
+ * The bound of uncertainty. Let r = 2^-24, W the maximum of |u| and |v| over the tile, reach the eye's distance from
+ * the origin of depth (0 if orthographic), M = |Z| + reach >= |D| (1 if orthographic), N = 2 max(|X|, |Y|) + 5 W M; so
  * |x|, |y| <= N / 2, |c| <= Na Nb / 2 and |cu| W, |cv| W <= Na Nb / 5.
- * - The affine form errs by r of each coefficient, of u and of v, and, if nothing is fused, of two products and two
- *   sums: by at most r (3 |c| + 5 |cu| W + 4 |cv| W) <= 3.3 r Na Nb.
+ * - The affine form errs by r of each coefficient, of u and of v, and, without fused operations, of two products and
+ *   two sums: by at most r (3 |c| + 5 |cu| W + 4 |cv| W) <= 3.3 r Na Nb.
  * - The projection, (X - origin) - slope Z, errs by r of the origin, of the first difference, twice of slope Z (the
- *   slope and the product), and of x: by at most r (2 |X| + 3 W M) <= r N. What has the exact sign is therefore the
- * edge function of vertices that are off by r N: by at most 4 r Na Nb / 2. The sum is 5.3 r Na Nb; 6 leaves room for
- * products of errors and for the bound's own roundings.
+ *   slope and the product), and of x: by at most r (2 |X| + 3 W M) <= r N. The function with the exact sign is
+ *   therefore the edge function of vertices that are displaced by r N: it errs by at most 4 r Na Nb / 2. The sum is 5.3
+ *   r Na Nb; a factor of 6 leaves room for products of errors and for the bound's own roundings.
  *
- * Weights. Signs are exact, sizes are not: where a triangle is crossed, its depth and value are means of its vertices'
- * weighed by the opposite edges' functions, of sum A (twice the triangle's area as the ray sees it). An error d of one
- * of these moves the depth t by d |z - t| / A, z being its vertex's, and so all three by no more than D S / A, where D
- * is the sum of their d, and S the triangle's extent in depth; and the place across the ray by as much with the extent
- * across. By the count above d is at most r (3 |c| + 4 |cu| W + 3 |cv| W): what rounds u and v moves the ray, for all
- * triangles alike. So where A is at least D S / KERNEL_WEIGHT_ERROR, the weights' roundings move the crossing by no
- * more than KERNEL_WEIGHT_ERROR along the ray: 4 r with all of them at their worst, where t itself is rounded by up to
- * r / 2. The extents across count for a quarter: there a crossing may move by 4 times as much, as that changes the
- * value alone. On rays where A is less (the triangle is seen edge on, or the tile is wide beside it) all three edges
- * are projected: what errs then is where the vertices are, by r N as above, for all their triangles alike, and the
- * weights are exact to some r of each. Which it is depends on the triangle and the ray alone. (An edge in doubt has
- * been projected in any case: on a ray that crosses the triangle its e is off by no more than r N times the edges
- * beside it, which is what moved vertices do.) */
+ * Weights. Signs are exact, magnitudes are not. At a crossing of a triangle, depth and value are means of the vertices'
+ * depths and values, weighted by the opposite edges' functions, whose sum is A (twice the triangle's projected area).
+ * An error d of one weight moves the depth t by d |z - t| / A, where z is its vertex's depth. So all three errors move
+ * it by no more than D S / A, where D is the sum of the three d, and S the triangle's extent in depth; the point across
+ * the ray moves by as much with the extent across. By the count above d is at most r (3 |c| + 4 |cu| W + 3 |cv| W); the
+ * rounding of u and v moves the ray equally for all triangles. So if A is at least D S / KERNEL_WEIGHT_ERROR, the
+ * weights' roundings move the crossing by no more than KERNEL_WEIGHT_ERROR along the ray: 4 r in the worst case, while
+ * t itself is rounded by up to r / 2. Extents across the ray are weighted by a quarter: a crossing may move 4 times as
+ * far there, because that changes the value alone. If A is less (the triangle is seen edge on, or the tile is wide
+ * beside it), all three edges are projected: then the vertices are displaced by r N as above, equally for all their
+ * triangles, and the weights are exact to a few r each. Which of the two methods is used depends on the triangle and
+ * the ray alone. (An uncertain edge has been projected in any case: for a ray that crosses the triangle its e errs by
+ * no more than r N times the edges next to it, which equals a displacement of the vertices.) */
 
-/* c + cu u + cv v; its sign is sure where it is beyond +-bound. */
+/* The affine edge function c + cu u + cv v; its sign is certain if its magnitude exceeds `bound`. */
 typedef struct kernel_line {
     float c, cu, cv, bound;
 } kernel_line;
 
-/* A vertex in tile space. */
+/* The position of a vertex in tile space. */
 typedef struct kernel_spot {
     float x, y, z;
 } kernel_spot;
 
-/* N above. */
+/* Returns N of the error bound above: a measure of the vertex's size in the tile's projection. */
 SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *tile, kernel_spot a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
@@ -79,7 +78,8 @@ SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *til
     return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
 }
 
-/* Makes the line of the edge from a to b, a before b in the order; sizes as above. */
+/* Computes the edge function of the edge from a to b, where a is before b in the order of coordinates. size_a, size_b:
+ * kernel_spot_size() of the vertices. */
 SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
                                             float size_b)
 {
@@ -90,14 +90,14 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a
                          6 * 6e-8f * (size_a * size_b)};
 }
 
-/* ---- how good weights are ---- */
+/* ---- accuracy of weights ---- */
 
-/* Along the ray, in t: two of them in a ray's chord leave half of the 1e-6 that it may be off by (tests/test_chords.c).
- */
+/* Largest error of a crossing's depth, in t, that the rounding of weights may cause. The two crossings of a ray's
+ * interval then use half of the 1e-6 that it may err by (tests/test_chords.c). */
 #define KERNEL_WEIGHT_ERROR 2.4e-7f
 
-/* The error d that an edge's function may have (see above), and the edge's extent, in which distances across the ray
- * count for a quarter. */
+/* The largest error d of an edge's function (see above), and the edge's extent, in which distances across the ray count
+ * for a quarter. */
 typedef struct kernel_blur {
     float error, extent;
 } kernel_blur;
@@ -109,20 +109,21 @@ SIMD_INLINE kernel_blur kernel_line_blur(const kernel_line *l, float radius, ker
                          z + 0.25f * (x + y)};
 }
 
-/* The least A that is good enough, of a triangle whose edges' errors and extents have these sums: along an axis the
- * edges are together twice as long as the triangle. */
+/* Returns the least sum of weights A that is accurate enough for a triangle, from the sums of its edges' errors and
+ * extents. Along any axis the edges' extents sum to twice the triangle's extent, hence the factor 1/2. */
 SIMD_INLINE float kernel_least_weight(float errors, float extents)
 {
     return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
 }
 
-/* The larger of both. */
+/* Returns the larger error and the larger extent of two edges. */
 SIMD_INLINE kernel_blur kernel_blur_more(kernel_blur a, kernel_blur b)
 {
     return (kernel_blur){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
 }
 
-/* No less than that of any triangle whose edges have no more than most each. */
+/* Returns an upper bound of kernel_least_weight() for all triangles whose edges have errors and extents of at most
+ * `most`. */
 SIMD_INLINE float kernel_blur_least(kernel_blur most)
 {
     return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
@@ -186,23 +187,25 @@ SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_s
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
 typedef struct kernel_cell {
-    uint32_t serial, index; /* the cache's key: tile, cell, */
-    int part, layer;        /* mesh, and whose values these are */
+    uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
+    int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
     bool is_finite, is_placed, is_constant, has_lines, has_normal;
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
     double values[GRID_MAX_CELL_VERTICES];
-    float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES]; /* tile space */
-    float f[GRID_MAX_CELL_VERTICES];     /* values as the caller wants them */
-    float g[GRID_MAX_CELL_VERTICES];     /* the same of the colour field */
-    int rank[GRID_MAX_CELL_VERTICES];    /* place in the order of coordinates */
-    kernel_line lines[KERNEL_MAX_LINES]; /* the edges' lines, then those of the quads' diagonals */
-    float doubt;                         /* for a tet: the largest of its lines' bounds */
+    float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES]; /* vertices in tile space */
+    /* vertex values as the layer needs them: relative to an isovalue, or in the transfer function's domain */
+    float f[GRID_MAX_CELL_VERTICES];
+    float g[GRID_MAX_CELL_VERTICES];     /* vertex values of the colour field, in its transfer function's domain */
+    int rank[GRID_MAX_CELL_VERTICES];    /* rank of each vertex in the lexicographic order of coordinates */
+    kernel_line lines[KERNEL_MAX_LINES]; /* edge functions of the edges, then of the quads' diagonals */
+    float doubt;                         /* for a tet: largest error bound of its edge functions */
     float
-        least[4]; /* for a tet's faces: the least sum of weights that is good enough; [0]: no less than of any triangle
-                   */
-    float normal[3]; /* for a tet: kernel_tet_normal(), where has_normal */
+        /* least sum of weights that is accurate enough: for a tet, of each face; for other cells least[0] bounds that
+         * of all triangles */
+        least[4];
+    float normal[3]; /* for a tet: gradient from kernel_tet_normal(); valid if has_normal */
 } kernel_cell;
 
 /* The places where rays go through a face: v is the value of f, w that of g, r the cell's own coordinates, which are
@@ -213,14 +216,15 @@ typedef struct kernel_crossing {
     vf r[3];
 } kernel_crossing;
 
-/* Between two crossings, inside the cell. */
+/* The part of each ray inside the cell, between two crossings: depths, values of f (v) and g (w), and reference
+ * coordinates. */
 typedef struct kernel_interval {
     vm mask;
     vf t_in, t_out, v_in, v_out, w_in, w_out;
     vf r_in[3], r_out[3];
 } kernel_interval;
 
-/* A ray's place relative to vertices: x, y in the ray's plane. */
+/* A cell's vertices projected along each ray: x, y in the ray's plane, with the ray at the origin. */
 typedef struct kernel_projected {
     vf x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES];
 } kernel_projected;
@@ -232,7 +236,7 @@ SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
     return a[2] < b[2];
 }
 
-/* A cell's size: the cube root of its box's volume, or its longest side where that is flat. */
+/* Returns a cell's size: the cube root of its bounding box's volume, or the box's longest side if the box is flat. */
 static inline double kernel_size_of(const double (*world)[3], int count)
 {
     double volume = 1, longest = 0;
@@ -248,8 +252,8 @@ static inline double kernel_size_of(const double (*world)[3], int count)
     return volume > 0 ? cbrt(volume) : longest;
 }
 
-/* Returns the face's vertices as bits of their places in the list, to which new ones are added. Returns 0 where there
- * would be more than four. */
+/* Returns a face's vertices as a mask of their indices in the list `vertices`, to which new vertices are added. Returns
+ * 0 if the list would exceed four vertices. */
 static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
 {
     int64_t first, end;
@@ -266,8 +270,9 @@ static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4],
     return corners;
 }
 
-/* Is the polyhedron a tet, on which its field is linear as a tet's is? Then it is drawn as one, to the same bits. Each
- * triangle is to lack another vertex: two of them, each twice, bound nothing. Faces in one place are none. */
+/* Returns whether a polyhedron is a tet with a linear field; it is then drawn as a tet, to the same bits. Each triangle
+ * must lack a different vertex, because two triangles that each occur twice enclose no volume. Faces that have
+ * collapsed to a point are ignored. */
 static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 {
     int64_t first, end;
@@ -301,11 +306,13 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
     return c->rank[i] < c->rank[j];
 }
 
-/* A cell's vertices begun at the one of least rank, and along its edges in the order of ranks: from[i] is the vertex
- * that takes place i. Mirrored, where that is so: orientation means nothing here. */
+/* Computes the canonical order of a cell's vertices: it begins at the vertex of least rank and continues along its
+ * edges in the order of ranks. from[i] is the vertex at position i. The order may mirror the cell, because orientation
+ * does not matter here. */
 SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
-    static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* a hex's vertices as bits of x, y, z; and back */
+    /* maps a hex's vertex number to the bits of its coordinates x, y, z, and back */
+    static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     const int begins = kernel_has_apex(c->type) ? 4 : c->count;
     int least = 0, swap;
     for (int i = 1; i < begins; i++)
@@ -313,7 +320,7 @@ SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_V
     if (kernel_is_box(c->type)) {
         int axes[3] = {1, 2, 4};
         for (int k = 0; k < 3; k++) {
-            const int at = k == 1; /* 0 and 1, 1 and 2, 0 and 1 */
+            const int at = k == 1; /* sorting network of three: compares axes 0 and 1, 1 and 2, 0 and 1 */
             if (kernel_rank_before(c, corner[corner[least] ^ axes[at + 1]], corner[corner[least] ^ axes[at]]))
                 swap = axes[at], axes[at] = axes[at + 1], axes[at + 1] = swap;
         }
@@ -339,7 +346,7 @@ SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_V
     }
 }
 
-/* Each vertex's place in the order of coordinates, without a branch on it, which none could foresee. */
+/* Computes each vertex's rank in the order of coordinates. It has no branches, because they would be unpredictable. */
 SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count, int *rank)
 {
     for (int i = 0; i < count; i++) rank[i] = 0;
@@ -351,7 +358,7 @@ SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count
         }
 }
 
-/* All that a cell has of its vertices (but the colours, which come later), from vertex from[i] to place i. */
+/* Permutes everything stored by vertex (except colours, which are read later): vertex from[i] moves to position i. */
 SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int count)
 {
     double world[GRID_MAX_CELL_VERTICES][3], values[GRID_MAX_CELL_VERTICES];
@@ -392,7 +399,7 @@ SIMD_INLINE void kernel_cell_order(kernel_cell *c)
     for (int i = 0; i < c->count; i++) c->rank[i] = rank[i];
 }
 
-/* A position into tile space (kernel_packet.h). */
+/* Transforms a position into tile space (kernel_packet.h). */
 SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile, const double *world, float *out_x,
                                  float *out_y, float *out_z)
 {
@@ -447,7 +454,7 @@ SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)
     return (kernel_spot){c->x[i], c->y[i], c->z[i]};
 }
 
-/* A quad's corners around, from the smallest vertex towards its smaller neighbour. */
+/* Computes a quad's corners in cyclic order, from the smallest vertex towards its smaller neighbour. */
 SIMD_INLINE void kernel_quad_corners(const kernel_cell *c, const signed char *loop, int corner[4])
 {
     int first = 0;
@@ -468,7 +475,7 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
     return quad_collapses(corners);
 }
 
-/* ---- the lines of a cell ---- */
+/* ---- edge functions of a cell ---- */
 
 /* Sums over the edges of each face, in kernel_triangle_least()'s order. */
 SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
@@ -525,7 +532,8 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
         if (kernel_has_triangles(c->type))
             most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
     }
-    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_blur_least(most); /* hexes hardly have triangles */
+    /* hexes have triangles only if a quad has collapsed, so their weights are always checked exactly */
+    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_blur_least(most);
 }
 
 static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)

@@ -1,5 +1,5 @@
-/* What the cells of each type have. No other file of render/ compares types: others look at properties here, and at
- * tables by kernel_shape_number() (kernel_shapes.h). */
+/* Properties of the cell types. No other file of render/ compares types: others use the properties here, and tables
+ * that are indexed by kernel_shape_number() (kernel_shapes.h). */
 #ifndef RENDER_KERNEL_CELL_TYPES_H
 #define RENDER_KERNEL_CELL_TYPES_H
 
@@ -7,66 +7,66 @@
 
 #include "grid.h"
 
-/* Tets: places and the field are linear in the cell, and its faces are triangles. */
+/* Returns true for tets: positions and the field are linear in the cell, and all faces are triangles. */
 static inline bool kernel_is_linear(int type)
 {
     return type == GRID_TET;
 }
 
-/* Polyhedra: each cell has faces of its own (kernel_polyhedron.h). */
+/* Returns true for polyhedra: each cell has its own list of faces (kernel_polyhedron.h). */
 static inline bool kernel_has_own_faces(int type)
 {
     return type == GRID_POLYHEDRON;
 }
 
-/* Pyramids: the map has a quotient (kernel_map.h). */
+/* Returns true for pyramids, whose map contains a quotient that is singular at the apex (kernel_map.h). */
 static inline bool kernel_has_apex(int type)
 {
     return type == GRID_PYRAMID;
 }
 
-/* The types whose cells have quads, in the order of all tables of these. */
+/* The types with quadrilateral faces, in the order of all tables of such types. */
 enum { KERNEL_CURVED_TYPES = 3 };
 static const int kernel_curved_types[KERNEL_CURVED_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
 
-/* The types that are looked for in lanes: these, and tets. */
+/* The types whose cells are processed in lanes: those with quadrilateral faces, and tets. */
 enum { KERNEL_LANE_TYPES = KERNEL_CURVED_TYPES + 1 };
 static const int kernel_lane_types[KERNEL_LANE_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};
 
-/* The numbers of types in such tables, for switches. */
+/* Indices of the types in tables of types with quadrilateral faces, for use in switches. */
 enum { KERNEL_SHAPE_HEX, KERNEL_SHAPE_WEDGE, KERNEL_SHAPE_PYRAMID };
 
-/* The row of a type whose cells have quads in these tables. */
+/* Returns the index in these tables of a type with quadrilateral faces. */
 static inline int kernel_shape_number(int type)
 {
     return type == GRID_HEX ? KERNEL_SHAPE_HEX : type == GRID_WEDGE ? KERNEL_SHAPE_WEDGE : KERNEL_SHAPE_PYRAMID;
 }
 
-/* Hexes: the domain is a box, and all faces are quads. */
+/* Returns true for hexes: the reference domain is a box, and all faces are quads. */
 static inline bool kernel_is_box(int type)
 {
     return type == kernel_curved_types[KERNEL_SHAPE_HEX];
 }
 
-/* Wedges: the domain is a prism. */
+/* Returns true for wedges: the reference domain is a prism. */
 static inline bool kernel_is_prism(int type)
 {
     return type == kernel_curved_types[KERNEL_SHAPE_WEDGE];
 }
 
-/* Has a cell with quads triangles as well? */
+/* Returns whether cells of a type with quadrilateral faces also have triangular faces. */
 static inline bool kernel_has_triangles(int type)
 {
     return !kernel_is_box(type);
 }
 
-/* Are there quads among the faces of all of the type's cells? */
+/* Returns whether the type is a hex, wedge or pyramid: all its cells have quadrilateral faces. */
 static inline bool kernel_has_quads(int type)
 {
     return type == kernel_curved_types[kernel_shape_number(type)];
 }
 
-/* Chooses what is for hexes, wedges or pyramids. */
+/* Selects one of three expressions by whether the type is a hex, a wedge or a pyramid. */
 #define KERNEL_BY_SHAPE(type, hex, wedge, pyramid)                                                                     \
     (kernel_shape_number(type) == KERNEL_SHAPE_HEX     ? (hex)                                                         \
      : kernel_shape_number(type) == KERNEL_SHAPE_WEDGE ? (wedge)                                                       \

@@ -23,7 +23,8 @@ SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
     return below && above;
 }
 
-/* The power of two that brings largest near 1, read off its bits: its exponent, mirrored. */
+/* Returns a power of two that scales `largest` to near 1. It is computed from the bits, by negating the exponent, which
+ * is limited so that the result is a normal number. */
 SIMD_INLINE double kernel_mirrored_power(double largest)
 {
     uint64_t bits;
@@ -36,7 +37,7 @@ SIMD_INLINE double kernel_mirrored_power(double largest)
     return scale;
 }
 
-/* f: values minus the isovalue, times a power of two that brings the largest near 1. */
+/* Sets f to the values minus the isovalue, times a power of two that scales the largest to near 1. */
 SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
 {
     double largest = 0;
@@ -48,7 +49,7 @@ SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
     for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
 }
 
-/* g: the colour field in its transfer's domain. Cells keep the field's order of vertices. */
+/* Sets g to the colour field in the domain of its transfer function. Cells keep the field's order of vertices. */
 SIMD_INLINE void kernel_cell_colours(kernel_cell *c, const kernel_surface *s, int part)
 {
     const grid_field *field = &s->layer->colour_field.fields[part];
@@ -58,13 +59,13 @@ SIMD_INLINE void kernel_cell_colours(kernel_cell *c, const kernel_surface *s, in
     }
 }
 
-/* v to float, held within -limit .. limit. */
+/* Returns v clamped to the interval [-limit, limit] and rounded to float32. */
 SIMD_INLINE float kernel_hold(double v, double limit)
 {
     return (float)(v < -limit ? -limit : v > limit ? limit : v);
 }
 
-/* Does any value between the least and the most of these show? */
+/* Returns whether some value between the smallest and the largest of these is visible with the transfer function. */
 SIMD_INLINE bool kernel_values_show(const double *values, int count, const kernel_transfer *t)
 {
     double low = values[0], high = low;
@@ -80,7 +81,7 @@ SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *
     return kernel_values_show(c->values, c->count, t);
 }
 
-/* f: values in the transfer's domain, held to 1e18 so that interpolation cannot overflow. */
+/* Sets f to the values in the transfer function's domain, clamped to +-1e18 so that interpolation cannot overflow. */
 SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
 {
     c->is_constant = true;

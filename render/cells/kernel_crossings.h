@@ -29,9 +29,10 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
     return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
 }
 
-/* Decides e on rays on which it is all but zero. Its sign is taken in double, where products of float32 are exact. Its
- * size is too little beside that of any other edge to matter, but not all weights may be zero. Where e is zero the tie
- * is decided as kernel_cell.h has it, and the sign of the zero says how. */
+/* Decides the sign of the edge function on rays on which it is almost zero. The sign is computed in double, where
+ * products of float32 are exact. The function's magnitude is negligible next to any other edge's, but not all weights
+ * may be zero, so it gets a small nonzero one. If the function is exactly zero, the tie is decided by the rule of
+ * kernel_cell.h, and stored as the sign of the zero. */
 static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, vf by, vf e)
 {
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -46,8 +47,9 @@ static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, 
     return e;
 }
 
-/* Returns the value at an interval's end. Where the surface is a face of the cell (is_of_faces of render.h) and a ray
- * meets only an edge of it, both ends have the isovalue; the end is then taken to be in the cell, below it. */
+/* Returns the value at an interval's end. If the surface is a set of the cell's faces (is_of_faces of render.h) and a
+ * ray meets only an edge of it, both ends have the isovalue; then the end's value is taken to be inside the cell, below
+ * the isovalue. */
 SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
 {
     if (!is_of_faces) return v_out;
@@ -55,7 +57,7 @@ SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
     return vf_select(is_edge, vf_set(-KERNEL_EDGE_LEAST), v_out);
 }
 
-/* Returns the edge function, with the exact sign for the projected points. */
+/* Returns the edge function of two projected points; its sign is exact for these points. */
 SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
 {
     const vf e = vf_diff_of_products(ax, by, bx, ay);
@@ -80,8 +82,8 @@ SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
     return vf_muladd(vf_set(l->cv), p->v, vf_muladd(vf_set(l->cu), p->u, vf_set(l->c)));
 }
 
-/* The edge function of the edge from a to b, a before b in the order, whose line is l: of the side where it is positive
- * the sign bit is clear, ties decided. */
+/* Returns the edge function of the edge from a to b on the packet's rays. a must be before b in the order of
+ * coordinates; l is the edge's line. The sign bit is clear on the positive side, and ties are decided. */
 SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_spot a, kernel_spot b)
 {
     if (!p->is_pencil) return kernel_edge_projected(p, a, b);
@@ -90,15 +92,16 @@ SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_
     return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_doubted(p, a, b, doubt, e) : e;
 }
 
-/* The triangle i, j, k (in the order) with its three edges: who crosses it. */
+/* Returns the rays that cross the triangle i, j, k, by its edge functions. i, j and k are in the order of
+ * coordinates. */
 SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
 {
     const vi a = vi_from_bits(ij), b = vi_from_bits(jk), c = vi_from_bits(ik);
     return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
 }
 
-/* Sums the depths or values of a crossed triangle's vertices, weighted by their opposite edges and not yet divided by
- * the sum of the weights. A sum has the sign that all its terms have. */
+/* Returns the sum of a value (depth or field) over a crossed triangle's vertices, weighted by the edge functions of the
+ * opposite edges. It must still be divided by the sum of the weights. All terms of the sum have the same sign. */
 SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
@@ -115,8 +118,8 @@ SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, 
     return kernel_line_blur(&l, p->tile->radius, a, b);
 }
 
-/* Returns the least sum of weights that is good enough, of the triangle i, j, k in the order (kernel_least_weight()).
- */
+/* Returns the least sum of weights that is accurate enough for the triangle i, j, k, whose vertices are in the order of
+ * coordinates (kernel_least_weight()). */
 static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_spot i, kernel_spot j,
                                                                    kernel_spot k)
 {
@@ -124,13 +127,13 @@ static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_
     return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 
-/* Returns the rays whose weights of a triangle that they cross are not good enough. */
+/* Returns the rays that cross a triangle but whose sum of weights is too small to be accurate. */
 SIMD_INLINE vm kernel_weak(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
 }
 
-/* The triangle's edge functions, projected on these rays. */
+/* Computes the triangle's edge functions again on the given rays, from its projected vertices. */
 static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_packet *p, const kernel_spot ijk[3],
                                                                  vm weak, vf *ij, vf *jk, vf *ik)
 {
@@ -304,14 +307,16 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
     kernel_ends_order(&ends, has_colour, out);
 }
 
-/* Hexes, wedges and pyramids: cells with quads, which a ray may go into more than once (kernel_cell.h). */
+/* The following functions intersect rays with hexes, wedges and pyramids, which have quadrilateral faces and may be
+ * entered more than once by a ray (kernel_cell.h). */
 
-/* Edge functions by vertex pair: those of the shape and of the quads' diagonals. */
+/* Edge functions by pairs of vertices: of the cell's edges and of its quads' diagonals. */
 typedef struct kernel_edges {
-    vf e[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES]; /* [a][b] with a before b in the order */
+    /* e[a][b] is set for a before b in the order of coordinates */
+    vf e[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
 } kernel_edges;
 
-/* Number n of the cell's lines. */
+/* Computes the edge function of line number n of the cell, between the vertices i and j. */
 SIMD_INLINE void kernel_curved_edge(const kernel_packet *p, const kernel_cell *c, int n, int i, int j,
                                     kernel_edges *out)
 {
@@ -325,8 +330,8 @@ SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const
     if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
-/* Edge functions of a crossed triangle i, j, k in the order, the weights, and one over their sum. Tets weigh in the
- * same way: a face's depth and value have the same bits from both its cells. */
+/* The edge functions of a crossed triangle i, j, k in the order of coordinates, which are its weights, and 1 / their
+ * sum. Tets use the same weights, so a face's depth and value have the same bits in both its cells. */
 typedef struct kernel_weights {
     int i, j, k;
     vf ij, jk, ik, inverse;
@@ -337,8 +342,8 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
     return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
 }
 
-/* Makes the weights of the triangle of these spots good enough on the rays that cross it. least is at least
- * kernel_triangle_least() of it. */
+/* Computes the weights of the triangle i, j, k again on rays for which they are not accurate enough. least: an upper
+ * bound of kernel_triangle_least() for the triangle, tested first. */
 SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit, kernel_spot i, kernel_spot j,
                                      kernel_spot k, kernel_weights *w)
 {
@@ -362,7 +367,8 @@ SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
     return kernel_weigh(w, z[w->i], z[w->j], z[w->k]);
 }
 
-/* A search for the crossings of a cell's faces: whose rays, and what all of the faces share. */
+/* Parameters of a search for crossings that are common to all faces of the cell: the packet and its rays, the cell, its
+ * projected vertices, and its edge functions. */
 typedef struct kernel_face_search {
     const kernel_packet *packet;
     const kernel_cell *cell;
@@ -383,7 +389,7 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
         out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
 
-/* The edge function from one corner to another. */
+/* Returns the edge function from one corner to another, negated if they are not in the order of coordinates. */
 SIMD_INLINE vf kernel_corner_edge(const kernel_cell *c, const kernel_edges *edges, int from, int to)
 {
     return c->rank[from] < c->rank[to] ? edges->e[from][to] : -edges->e[to][from];
@@ -398,8 +404,8 @@ SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, con
     }
 }
 
-/* The crossing of a quad's patch. The isoparametric map has the same patch there, so that the field inside the cells on
- * both sides goes on to the same value. */
+/* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
+ * cells contain this patch, so the field is continuous across the face. */
 SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_place *at,
                                     kernel_crossing *out)
 {
@@ -418,7 +424,7 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
     }
 }
 
-/* Three of the cell's vertices in the order. */
+/* Sorts three of the cell's vertices by the order of coordinates. */
 SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3], int out[3])
 {
     int i = corners[0], j = corners[1], k = corners[2], swap;
@@ -430,13 +436,14 @@ SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3
     out[2] = k;
 }
 
-/* Returns the rays that cross the triangle. */
+/* Returns the rays that cross the triangle, whose vertices are in the order of coordinates. */
 SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk[3])
 {
     return kernel_inside(rays, edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]], edges->e[ijk[0]][ijk[2]]);
 }
 
-/* Finds the crossing of three of the cell's vertices; false where no ray has any. */
+/* Computes the crossings of rays with the triangle of three of the cell's vertices. Returns false if no ray crosses
+ * it. */
 SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_crossing *out)
 {
     const kernel_cell *c = s->cell;
@@ -455,7 +462,8 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     return true;
 }
 
-/* Finds the crossings as below, for a quad that has collapsed to a triangle. */
+/* Computes the crossings of a quad that has collapsed to a triangle, and returns their number, as
+ * kernel_quad_crossings() does. */
 static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
                                                                       kernel_crossing *out)
 {
@@ -467,7 +475,8 @@ static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kern
     return n;
 }
 
-/* Finds the crossings of a quad and returns how many there are, 0 to 2; each ray's are in one of them or in both. */
+/* Computes the crossings of rays with a quad, and returns how many entries of out are set (0 to 2). A ray that meets
+ * the patch twice is in both entries. */
 SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_crossing *out)
 {
     const kernel_cell *c = s->cell;
@@ -525,7 +534,8 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
     return n;
 }
 
-/* Take the nearest crossing of each ray out of the list: false where no ray has one left. */
+/* Removes the nearest crossing of each ray from the list and returns it in *out. Returns false if no ray has a crossing
+ * left. */
 SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_crossing *out)
 {
     vi taken = vi_set(-1);

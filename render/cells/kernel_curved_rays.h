@@ -1,5 +1,6 @@
-/* Rays of several hexes, wedges or pyramids side by side (kernel_curved_batch.h, kernel_occlusion_hexes.h): which two
- * faces of its cell a ray crosses, and where. A lane takes its cell's numbers out of the batch's vectors. */
+/* Intersects rays with hexes, wedges or pyramids, one ray-cell pair per lane (kernel_curved_batch.h,
+ * kernel_occlusion_hexes.h): finds the two faces of its cell that each ray crosses, and the crossing points. Each lane
+ * gathers its cell's numbers from vectors in which lanes are cells. */
 #ifndef RENDER_KERNEL_CURVED_RAYS_H
 #define RENDER_KERNEL_CURVED_RAYS_H
 
@@ -15,7 +16,7 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Rays between two faces of their cells. */
+/* Depth t, value v and reference coordinates r at entry and exit, for a list of rays. */
 typedef struct kernel_curved_ends {
     float t[2][KERNEL_LIST_ROOM], v[2][KERNEL_LIST_ROOM], r[2][3][KERNEL_LIST_ROOM];
 } kernel_curved_ends;
@@ -95,7 +96,7 @@ SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel
     kernel_curved_count(faces, p->active, alone, out);
 }
 
-/* A quad's corners as rays see them, each ray's of its own face: as vertices of the cell, and their values. */
+/* The corners of a quad, another one for each ray: vertex numbers in the cell, and field values. */
 typedef struct kernel_curved_quad {
     vi corner[4];
     vf f[4];
@@ -134,7 +135,7 @@ SIMD_INLINE void kernel_curved_quad_place(int type, const kernel_curved_quad *ow
     }
 }
 
-/* A triangle's edge functions on rays that cross it, each with its own of its cell's: ij, jk and ik. */
+/* The triangle that each ray crosses in its own cell: corners, and the edge functions ij, jk and ik on the ray. */
 typedef struct kernel_curved_triangle {
     vi corner[3];
     vf e[3];
@@ -157,7 +158,8 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const ke
     own->e[2] = vf_select(weak, kernel_edge_between(x[0], y[0], x[2], y[2]), own->e[2]);
 }
 
-/* The triangle that is the face, on the given rays; on others another. */
+/* Gathers the corners and edge functions of the triangle `face` for the given rays. Other lanes get valid but
+ * meaningless numbers. */
 SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
                                              vm rays, vi face, kernel_curved_triangle *own)
 {
@@ -175,7 +177,7 @@ SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, cons
     if (__builtin_expect(vm_any(weak), 0)) kernel_curved_triangle_mend(h, p, weak, own);
 }
 
-/* Returns the mean of the corners' values by the weights. */
+/* Returns the mean of the corners' values v, weighted by the edge functions. */
 SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v[3], vf inverse)
 {
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
@@ -210,7 +212,8 @@ SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel
         kernel_curved_quad corners[2];
         kernel_quad_place places[2];
         for (int n = 0; n < quads; n++) kernel_curved_quad_take(h, p, type, face[n], &own[n], &corners[n]);
-        kernel_quads_cross(own, quads, once, true, places); /* not in doubt, so beside all edges */
+        /* these rays' edge functions have certain signs, so no ray meets an edge */
+        kernel_quads_cross(own, quads, once, true, places);
         for (int n = 0; n < quads; n++) kernel_curved_quad_place(type, &corners[n], &places[n], &out[n]);
     }
     for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {

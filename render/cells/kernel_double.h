@@ -1,19 +1,20 @@
-/* The ends of a tet's segment in double, for segments of which no error is allowed, or hardly any, and for functions
- * with ramps of next to no width.
+/* Computes the ends of a ray's segment in a tet in double. That is used for segments that may have no error, or almost
+ * none, and for transfer functions with extremely narrow ramps.
  *
- * In float32 a face's value errs by some 4e-7 of the transfer's domain: three weights, their sum, the vertices' places
- * and values, 6e-8 each. A steep function magnifies that, of opacity towards 1 a hundredfold; and the length of a short
- * segment is the difference of two depths that are rounded on the scale of the scene. So which faces a ray crosses, and
- * in which order segments lie along it, is decided as for all others (kernel_cell.h), and by the same bits; but how
- * long the segment is, and from which value to which, is taken from the coordinates and values as they were handed
- * over, and from the ray's place in the picture.
+ * In float32 a face's value errs by about 4e-7 of the transfer function's domain: three weights, their sum, and the
+ * vertices' positions and values have an error of 6e-8 each. A steep function magnifies that error, near an opacity of
+ * 1 by a factor of a hundred. And the length of a short segment is the difference of two depths that are rounded on the
+ * scale of the scene. So the decisions which faces a ray crosses, and in which order segments lie along it, are made in
+ * float32 as for all other cells (kernel_cell.h), with the same bits. But the segment's length, and its values at both
+ * ends, are computed from the caller's coordinates and values and from the ray's position in the picture, in double.
  *
- * An edge function is affine in the ray's u, v (kernel_cell.h). So are their sum over a face, D, and the sums of its
- * vertices' depths and values weighed by the opposite edges, N: nine coefficients a face, once a cell and tile. A ray
- * meets the face's plane at N / D. It may be beside the face there, by as much as the decision rounds, which is some
- * 1e-7 of the edges' terms. Where D is not KERNEL_DOUBLE_EDGE of these at least, the face is seen so nearly edge on
- * that the plane is left far beside it, and both float32 ends of the segment stay. All of it comes from the face's
- * vertices in their order and from the ray, so that a face is in one place for both its cells where both take it so. */
+ * An edge function is affine in the ray's u, v (kernel_cell.h). So are the sum D of a face's edge functions, and the
+ * sums N of its vertices' depths and values, weighted by the opposite edges: nine coefficients per face, computed once
+ * per cell and tile. A ray meets the face's plane at N / D. That point may lie outside the face, by as much as the
+ * decision is rounded, about 1e-7 of the edges' terms. If D is less than KERNEL_DOUBLE_EDGE of these terms, the face is
+ * seen so nearly edge on that the plane is met far outside the face, and the segment keeps both float32 ends.
+ * Everything is computed from the face's vertices in their order and from the ray, so that both cells of a face compute
+ * the same point if both use double. */
 #ifndef RENDER_KERNEL_DOUBLE_H
 #define RENDER_KERNEL_DOUBLE_H
 
@@ -26,30 +27,30 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* The plane is left by no more than 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
+/* A ray meets a face's plane outside the face by at most 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
-/* The parts of an interval that float32 loses: its length in t, and the rests of its values. */
+/* What float32 loses of an interval: its exact length in t, and the rounding errors of its two values. */
 typedef struct kernel_double {
     vf length, rest_in, rest_out;
 } kernel_double;
 
-/* c[0] + c[1] u + c[2] v. */
+/* An affine function of the ray: c[0] + c[1] u + c[2] v. */
 typedef struct kernel_affine {
     double c[3];
 } kernel_affine;
 
 typedef struct kernel_double_face {
     kernel_affine depth, value, weight;
-    double least; /* the face is not seen edge on where the weight is more */
+    double least; /* the face is not seen edge on if the weight is larger than this */
 } kernel_double_face;
 
-/* A tet's, by kernel_tet_face. */
+/* The affine functions of a tet's four faces, in the order of kernel_tet_face. */
 typedef struct kernel_double_cell {
     kernel_double_face faces[4];
 } kernel_double_cell;
 
-/* A packet's rays, from the tile's centre. */
+/* The (u, v) of a packet's rays in double, relative to the tile's centre. */
 typedef struct kernel_double_rays {
     kernel_half u[2], v[2];
 } kernel_double_rays;
@@ -73,7 +74,8 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_ray
 
 /* ---- a cell ---- */
 
-/* A vertex as kernel_place_in() has it before it rounds; depth: what u and v are multiplied by. */
+/* A vertex in tile space before it is rounded to float32. `depth` is the factor of u and v in the vertex's projection;
+ * t and value are the depth and the field. */
 typedef struct kernel_double_spot {
     double x, y, depth, t, value;
 } kernel_double_spot;
@@ -90,7 +92,7 @@ SIMD_INLINE kernel_double_spot kernel_double_place(const kernel_frame *f, const 
                                 .t = place[2] - tile->depth_shift};
 }
 
-/* The value in the transfer's domain. */
+/* Returns the value in the transfer function's domain, clamped to +-1e18. */
 static inline double kernel_double_domain(const kernel_transfer *transfer, double value)
 {
     return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);

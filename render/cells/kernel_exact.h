@@ -1,5 +1,6 @@
-/* Cells in double, from the coordinates and values as they were handed over: where rays meet a tet's faces, for reasons
- * that kernel_double.h has; and other cells' maps and fields, a point at a time, which kernel_map.h has in float32. */
+/* Computes cells in double, from the caller's coordinates and values: crossings of rays with a tet's faces, for the
+ * reasons in kernel_double.h; and the map and field of other cells at single points, which kernel_map.h computes in
+ * float32. */
 #ifndef RENDER_KERNEL_EXACT_H
 #define RENDER_KERNEL_EXACT_H
 
@@ -23,7 +24,8 @@ SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const 
         {a->x * b->y - b->x * a->y, b->depth * a->y - a->depth * b->y, a->depth * b->x - b->depth * a->x}};
 }
 
-/* The sums of a face of kernel_tet_face, from the tet's vertices and edges. No ray's |u| and |v| exceed radius. */
+/* Computes the affine sums of one face (a row of kernel_tet_face) from the tet's vertices and edge functions. radius:
+ * upper bound of the rays' |u| and |v|. */
 SIMD_INLINE void kernel_double_sums(const kernel_double_spot *spots, const kernel_affine *edges,
                                     const signed char *face, double radius, kernel_double_face *out)
 {
@@ -39,7 +41,7 @@ SIMD_INLINE void kernel_double_sums(const kernel_double_spot *spots, const kerne
         out->least += KERNEL_DOUBLE_EDGE * (n ? radius : 1) * ((fabs(ij->c[n]) + fabs(jk->c[n])) + fabs(ik->c[n]));
 }
 
-/* c: a tet that is placed. */
+/* Computes the affine functions of a tet's faces. The tet must have been transformed and sorted. */
 static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f, const kernel_tile *tile,
                                                           const kernel_cell *c, const kernel_transfer *transfer,
                                                           kernel_double_cell *out)
@@ -56,9 +58,9 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
         kernel_double_sums(spots, edges, kernel_tet_face[n], (double)tile->radius, &out->faces[n]);
 }
 
-/* ---- rays in it ---- */
+/* ---- rays in a tet ---- */
 
-/* The place where rays meet a face. is_sound: the face is not seen edge on. */
+/* Points at which rays meet a face's plane. is_sound: the face is not seen edge on. */
 typedef struct kernel_double_end {
     kernel_half t, v;
     kernel_half_mask is_sound;
@@ -84,7 +86,7 @@ SIMD_INLINE void kernel_double_take(kernel_half_mask m, const kernel_double_end 
     to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
-/* A packet's, half by half. */
+/* Results for a packet, computed in two halves. */
 typedef struct kernel_double_lanes {
     float is_sound[SIMD_WIDTH], length[SIMD_WIDTH], v_in[SIMD_WIDTH], rest_in[SIMD_WIDTH], v_out[SIMD_WIDTH],
         rest_out[SIMD_WIDTH];
@@ -123,7 +125,8 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
     kernel_double_value(last.v, out->v_out + lane, out->rest_out + lane);
 }
 
-/* Takes the tet's interval i from kernel_tet_interval(); its values become the floats nearest to those in double. */
+/* Computes the exact length and the rounding errors of interval *i, which kernel_tet_interval() has computed. The
+ * interval's values are replaced by the doubles rounded to float32. */
 static __attribute__((noinline)) kernel_double kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
                                                                  const kernel_double_cell *cell,
                                                                  const kernel_double_rays *rays, kernel_interval *i)
@@ -167,7 +170,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
     kernel_polynomial_fit(m->field, c->type, d[3]);
 }
 
-/* m of kernel_map.h, and its derivatives. */
+/* Returns the product m of kernel_map.h at r, and its derivatives. */
 static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
 {
     slopes[0] = r[1];
@@ -196,7 +199,8 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
     out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
 }
 
-/* Takes steps of Newton's method in double to the end: where a step is below 1e-8, the next would be below rounding. */
+/* Inverts the map by Newton's method in double, until a step is below 1e-8: the error after it is below rounding.
+ * Returns false if that does not converge. */
 static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {

@@ -1,6 +1,6 @@
-/* One vertex, or one edge, of as many cells at once as a vector has lanes: its place in tile space, its values relative
- * to an isovalue, and an edge's line (kernel_cell.h). What is computed in double is computed in two halves. The
- * operations are those of a cell alone in the same order, so that the numbers have the same bits. */
+/* Operations on one vertex or one edge per lane, each lane with a cell of its own: positions in tile space, values
+ * relative to an isovalue, and edge functions (kernel_cell.h). Computations in double are done in two halves of the
+ * lanes. The operations and their order are those for a single cell, so the results are the same to the bit. */
 #ifndef RENDER_KERNEL_LANES_CELL_H
 #define RENDER_KERNEL_LANES_CELL_H
 
@@ -12,7 +12,7 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Moves a vertex into tile space. */
+/* Transforms one vertex per lane into tile space. */
 SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const kernel_whole *const world[3],
                                     vf out[3])
 {
@@ -29,8 +29,8 @@ SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *ti
     }
 }
 
-/* Takes count values relative to the isovalues in double, and scales each cell's by a power of two that brings the
- * largest near 1. */
+/* Subtracts each lane's isovalue from `count` values in double, and scales the differences of each lane by a power of
+ * two that brings the largest near 1. */
 SIMD_INLINE void kernel_lanes_relative(const kernel_whole *values, int count, const double isovalues[SIMD_WIDTH],
                                        vf *out)
 {
@@ -41,7 +41,7 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_whole *values, int count, co
             v[i] = values[i].half[half] - isovalue;
             largest = kernel_half_max(kernel_half_abs(v[i]), largest);
         }
-        /* The exponent of the largest, mirrored, and held so that the power is a normal number. */
+        /* The exponent of the largest value, limited so that its negation gives a normal number. */
         kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
         const kernel_half_mask low = exponent < 23;
         const kernel_half_mask high = exponent > 2023;
@@ -51,7 +51,8 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_whole *values, int count, co
     }
 }
 
-/* N of a vertex at a place in tile space (kernel_cell.h). */
+/* Returns N of kernel_cell.h for one vertex per lane in tile space: a measure of the vertex's size in the tile's
+ * projection. */
 SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
 {
     vf depth = vf_set(1);
@@ -59,13 +60,13 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* The bound of doubt of a line between vertices of these N. */
+/* Returns the error bound of the edge function between vertices with the sizes N (kernel_lanes_size()). */
 SIMD_INLINE vf kernel_lanes_doubt(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);
 }
 
-/* Finds c, cu and cv of the line from a to b. */
+/* Computes the coefficients c, cu and cv of the edge function from a to b. */
 SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const vf b[3], vf line[3])
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -81,7 +82,7 @@ SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const v
     }
 }
 
-/* Finds the error that the line's edge function may have, and the edge's extent (kernel_blur). */
+/* Computes the error that the edge function may have, and the edge's extent (kernel_blur). */
 SIMD_INLINE void kernel_lanes_line_blur(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
                                         vf *extent)
 {

@@ -1,23 +1,22 @@
-/* Cells in coordinates of their own, one a lane: where in its cell is a point?
+/* Computes the reference coordinates of points in cells, one point per lane, each in its own cell.
  *
- * A cell's map takes its own coordinates r to X(r). About the cell's middle the map is linear but for what bends it:
- *
- *     X(r) = X0 + M r + (bent terms)      and so with A = 1 / M      y = A (X - X0) = r + n(r)
- *
- * n is small where the cell is not far from a parallelepiped, has few terms, and with y known, r is found by one step
- * of Newton's method and one that keeps its derivatives. Hexes have the terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, a
+ * A cell's map takes its reference coordinates r to X(r). About the cell's middle the map is linear except for a few
+ * nonlinear terms:
+ *     X(r) = X0 + M r + (nonlinear terms)      and so with A = 1 / M      y = A (X - X0) = r + n(r)
+ * n is small if the cell is not far from a parallelepiped. With y known, r is computed by one step of Newton's method
+ * and one more with the same derivatives. Hexes have the nonlinear terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, a
  * pyramid αβ / k, and tets none:
- *
  *              r                              inside
  *     hex      (ρ, σ, κ) from the middle      |ρ|, |σ|, |κ| <= 1/2
  *     wedge    ρ, σ from the triangle's       ρ, σ >= -1/3, ρ + σ <= 1/3, |κ| <= 1/2
+ *              centroid, κ from the middle
  *     pyramid  α, β from the axis; k is 0     |α|, |β| <= k / 2, k <= 1
  *              at the apex
  *     tet      from the middle                ρ, σ, κ >= -1/4, ρ + σ + κ <= 1/4
- *
- * The derivative of n at every corner is less than 0.78 or 0.89 by Frobenius' norm, or the cell is not for lanes: the
- * norm is convex along each coordinate, so it is nowhere in the cell more, and so r -> r + n(r) takes no two points of
- * the cell to one. Where the middle's coordinates are counted from does not matter to a point's place. */
+ * The Frobenius norm of n's derivative must be less than 0.78 or 0.89 at every corner; other cells are not processed in
+ * lanes. The norm is convex along each coordinate, so it is nowhere larger in the cell, and so r -> r + n(r) maps no
+ * two points of the cell to the same point. The choice of the origin of the coordinates does not affect the position of
+ * a point. */
 #ifndef RENDER_KERNEL_LOCAL_H
 #define RENDER_KERNEL_LOCAL_H
 
@@ -31,19 +30,21 @@
 
 enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
-/* The squares of 0.78 and, for users who bound what is wrong of r themselves, of 0.89. */
+/* Squares of the largest norm of n's derivative: 0.78, and 0.89 for callers that bound the error of r themselves. */
 #define KERNEL_LOCAL_BENT 0.6f
 #define KERNEL_LOCAL_BENT_MOST 0.8f
 
-/* Lane by lane. The field's terms are its value in the middle, its slopes along r, and its bent terms. */
+/* One cell per lane. `field` has the field's value at the middle, its derivatives along r, and the coefficients of its
+ * nonlinear terms. */
 typedef struct kernel_local_cells {
     /* y = inverse (X - origin) + offset */
     float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
     float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
     float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
-    float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH]; /* y of no point inside is beyond */
-    float bend[SIMD_WIDTH];                        /* the derivative of n is no more than its root by Frobenius' norm */
-    float blur[SIMD_WIDTH]; /* a point nearer than that to the border may be on either side of it */
+    float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH]; /* bounds of y over all points inside the cell */
+    /* square of an upper bound of the Frobenius norm of n's derivative */
+    float bend[SIMD_WIDTH];
+    float blur[SIMD_WIDTH]; /* error bound of r: a point closer to the border may be on either side of it */
 } kernel_local_cells;
 
 SIMD_INLINE int kernel_bent_terms(int type)
@@ -51,7 +52,8 @@ SIMD_INLINE int kernel_bent_terms(int type)
     return kernel_is_box(type) ? 4 : kernel_is_prism(type) ? 2 : kernel_has_apex(type) ? 1 : 0;
 }
 
-/* A number at the vertices as the terms' factors: in the middle, along r, bent. */
+/* Computes the coefficients of the field or a coordinate from its values at a hex's vertices: the value at the middle,
+ * the linear terms along r, and the nonlinear terms. The functions below do the same for other types. */
 SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
 {
     const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
@@ -107,7 +109,7 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
         kernel_tet_terms(v, out);
 }
 
-/* The bent terms at r, and what they change by along each of r. */
+/* The nonlinear terms at r, and their derivatives along each component of r. */
 typedef struct kernel_bend {
     vf term[KERNEL_BENT_TERMS], along[KERNEL_BENT_TERMS][3];
 } kernel_bend;
@@ -129,7 +131,7 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
         const vf along[2][3] = {{r[2], zero, r[0]}, {zero, r[2], r[1]}};
         memcpy(b->along, along, sizeof along);
     } else if (kernel_has_apex(type)) {
-        /* Within the cell α / k and β / k are half at most; a step beyond the apex must not blow up. */
+        /* In the cell |α / k| and |β / k| are at most 1/2; the clamp limits steps beyond the apex. */
         const vf half = vf_set(0.75f), inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         const vf a = vf_clamp(r[0] * inverse, -half, half), c = vf_clamp(r[1] * inverse, -half, half);
         b->term[0] = a * r[1];
@@ -139,10 +141,11 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
 }
 
 /* ---- the order of vertices ----
- *
- * Terms round by the order of a cell's vertices, which differs between codes and ranks. So they are turned to begin at
- * the vertex that is least by its place, then along its edges in the order of places, as kernel_cell_turn() does by
- * coordinates. Places are the same on all ranks. Vertices in one place keep their order; lanes leave such cells out. */
+ * The rounding of terms depends on the order of a cell's vertices, which differs between simulation codes and ranks. So
+ * vertices are permuted into a canonical order: first the vertex with the smallest position, then along its edges in
+ * the order of positions. kernel_cell_turn() does the same by the caller's coordinates. Positions in tile space are the
+ * same on all ranks. Vertices with the same position keep their order; cells with such vertices are not processed in
+ * lanes. */
 
 SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
 {
@@ -157,8 +160,8 @@ SIMD_INLINE vm kernel_local_is_before(vf (*const at)[8], int i, int j)
     return kernel_local_before(a, b);
 }
 
-/* Exchanges vertices i and j in those lanes. lists[0] to lists[2] are the vertices' places; further lists are exchanged
- * with them. */
+/* Exchanges vertices i and j in the given lanes. lists[0] to lists[2] are the vertices' positions; the further lists
+ * are exchanged with them. */
 SIMD_INLINE void kernel_local_swap(vf (*lists)[8], int count, vm lanes, int i, int j)
 {
     for (int n = 0; n < count; n++) {
@@ -168,7 +171,7 @@ SIMD_INLINE void kernel_local_swap(vf (*lists)[8], int count, vm lanes, int i, i
     }
 }
 
-/* Tells for each of count vertices, in the given order, the lanes in which it is the least of them. */
+/* Computes, for each of the `count` given vertices, the lanes in which it is the smallest of them. */
 SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertices, int count, vm is_least[8])
 {
     vf least[3] = {at[0][(int)vertices[0]], at[1][(int)vertices[0]], at[2][(int)vertices[0]]};
@@ -184,7 +187,8 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
 
 SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
 {
-    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
+    /* vertex number by the bits of its coordinates x, y, z */
+    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm is_least[8];
     kernel_local_least(at, vertex, 8, is_least);
     for (int a = 0; a < 3; a++) {
@@ -195,7 +199,8 @@ SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
             if (!(b >> a & 1)) kernel_local_swap(at, lists, turn, vertex[b], vertex[b | 1 << a]);
     }
     for (int k = 0; k < 3; k++) {
-        const int low = k == 1 ? 2 : 1, high = 2 * low, other = 7 & ~(low | high); /* axes 0 and 1, 1 and 2, 0 and 1 */
+        /* the network compares axes 0 and 1, then 1 and 2, then 0 and 1 */
+        const int low = k == 1 ? 2 : 1, high = 2 * low, other = 7 & ~(low | high);
         const vm swap = kernel_local_is_before(at, vertex[high], vertex[low]);
         kernel_local_swap(at, lists, swap, vertex[low], vertex[high]);
         kernel_local_swap(at, lists, swap, vertex[low | other], vertex[high | other]);
@@ -232,8 +237,8 @@ SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
     kernel_local_swap(at, lists, kernel_local_is_before(at, 3, 1), 1, 3);
 }
 
-/* Turns the vertices of a hex, wedge or pyramid in each lane, with all that the lists have of them, into the order of
- * places. */
+/* Permutes the vertices of a hex, wedge or pyramid in each lane into the canonical order of their positions. at[0] to
+ * at[2] are the positions; all lists are permuted with them. */
 SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
 {
     if (kernel_is_box(type))
@@ -244,7 +249,7 @@ SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
         kernel_pyramid_turn(at, lists);
 }
 
-/* Returns how far r lies inside of the cell's border; it is less than 0 outside. */
+/* Returns the distance of r from the cell's border, in reference coordinates; it is negative outside. */
 SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 {
     if (kernel_is_box(type)) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
@@ -258,7 +263,7 @@ SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 
 /* ---- cells ---- */
 
-/* The largest derivative's norm, squared, over the corners. */
+/* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
 SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
@@ -277,7 +282,7 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
                                             {-1.0f / 3, 2.0f / 3, 0.5f}}};
     const vf *b0 = bent[0];
     vf most = vf_set(0);
-    /* Along k, α and β: 1/4, 1/2 and 1/2 at most. */
+    /* The derivatives of αβ / k along k, α and β are at most 1/4, 1/2 and 1/2. */
     if (kernel_has_apex(type)) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
     for (int n = 0; n < (kernel_is_box(type) ? 8 : kernel_is_prism(type) ? 6 : 0); n++) {
         const float *corner = corners[kernel_is_box(type) ? 0 : 1][n];
@@ -296,7 +301,7 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
     return most;
 }
 
-/* The inverse of the matrix whose columns are m[1] to m[3]. */
+/* Inverts the 3 × 3 matrix whose columns are m[.][1], m[.][2] and m[.][3]. */
 SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
 {
     for (int i = 0; i < 3; i++) {
@@ -311,8 +316,8 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
         for (int a = 0; a < 3; a++) inverse[i][a] *= one;
 }
 
-/* Bounds y by that of all vertices, widened by what kernel_local_blur() has found before: no point inside is beyond, as
- * each is a mean of them with weights that are not negative. */
+/* Computes bounds of y: the extent of y over all vertices, widened by the error bound of kernel_local_blur(). No point
+ * of the cell lies outside, because each is a mean of the vertices with non-negative weights. */
 SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                     kernel_local_cells *out)
 {
@@ -329,9 +334,10 @@ SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inver
     }
 }
 
-/* Finds how near to the border is too near. Crossings of faces (kernel_quad.h) are off by 3e-7 of the cell's size and
- * by half a unit in the last place of their depth, projected vertices by some units of their places across the ray, and
- * r here by 2e-6 that Newton's method leaves and by as many units of a place. */
+/* Computes the error bound of r, within which a point may be on either side of the border. Crossings of faces
+ * (kernel_quad.h) err by 3e-7 of the cell's size and by half a unit in the last place of their depth; projected
+ * vertices err by a few units of their positions across the ray; and r errs by the 2e-6 that Newton's method leaves,
+ * and by as many units of a position. */
 SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf inverse[3][3], kernel_local_cells *out)
 {
     vf size[3], most = vf_set(0);
@@ -346,8 +352,9 @@ SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf in
     vf_store(out->blur, 4e-6f + 1.2e-7f * most);
 }
 
-/* Cells of one type with vertices placed in tile space and the field at them. Returns the lanes that are bent by
- * less than most_bent, a square; what other lanes have is not to be used. */
+/* Computes the coefficients of one cell of this type per lane, from vertices in tile space and the field at them.
+ * Returns the lanes whose nonlinearity (`bend`, a square) is below most_bent; results of other lanes must not be
+ * used. */
 SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], float most_bent,
                                   kernel_local_cells *out)
 {
@@ -382,14 +389,14 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 
 /* ---- points ---- */
 
-/* Points, one a lane, each in the cell of its lane. */
+/* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
-    kernel_bend bend;     /* at r */
-    vf column[3][3], det; /* columns of the derivatives' inverse, times their determinant's inverse in det */
+    kernel_bend bend;     /* nonlinear terms and derivatives at r */
+    vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
 
-/* y - (r + n(r)) */
+/* Computes the residual y - (r + n(r)). */
 SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf out[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -400,7 +407,7 @@ SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf ou
 
 SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
 {
-    vf j[3][3]; /* what r + n(r) changes by along each of r */
+    vf j[3][3]; /* derivatives of r + n(r) along each component of r */
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) {
             j[i][a] = vf_set(i == a);
@@ -418,7 +425,8 @@ SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
     p->det = 1.0f / vf_muladd(j[0][0], c[0], vf_muladd(j[0][1], c[1], j[0][2] * c[2]));
 }
 
-/* A step in the given lanes; returns the largest move. */
+/* Does a step of Newton's method in the given lanes, with the derivatives computed last. Returns the size of the
+ * largest component of each lane's step. */
 SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
 {
     const vf most = vf_set(1), far = vf_set(1.25f);
@@ -435,8 +443,8 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
     return largest;
 }
 
-/* Finds r of the points at these places; returns the lanes whose r is known to 1e-6. A lane's is the same whatever the
- * others are. */
+/* Computes r of the points at the positions `at` in tile space. lane: lane of each point's cell. Returns the lanes
+ * whose r is accurate to 1e-6. A lane's result does not depend on the other lanes. */
 SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi lane, const vf at[3],
                                  kernel_local_points *p)
 {
@@ -465,7 +473,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     return vm_not(open);
 }
 
-/* The field at r. */
+/* Returns the field at r, per lane. */
 SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
 {
     vf v = kernel_take(cells->field[0], lane);

@@ -1,12 +1,12 @@
-/* The inverse map of hexes, wedges and pyramids: which of the cell's own coordinates belong to a point, and so the
- * field and its gradient there.
+/* Inverts the maps of hexes, wedges and pyramids: computes the reference coordinates of a point, and so the field and
+ * its gradient there.
  *
- * All three are one polynomial in their coordinates (r, s, q),
+ * All three maps are one polynomial in the reference coordinates (r, s, q),
  *     c0 + c1 r + c2 s + c3 q + c4 m + c5 r q + c6 s q + c7 m q,
- * with m = r s: the trilinear hex has all terms, the wedge lacks c4 and c7. The pyramid is the collapsed hex, whose
- * map is singular at the apex; in the coordinates a = (1-q) r, b = (1-q) s, k = 1-q it is apex + a c1 + b c2 + k c3 +
- * c4 m with m = a b / k, which is linear but for the last term, and that one vanishes for a parallelogram base. So
- * Newton's method meets no singularity there: m is bounded by k. */
+ * with m = r s. The trilinear hex has all terms, the wedge lacks c4 and c7. The pyramid is the collapsed hex, whose map
+ * is singular at the apex. In the coordinates a = (1-q) r, b = (1-q) s, k = 1-q its map is apex + a c1 + b c2 + k c3 +
+ * c4 m with m = a b / k, which is linear except for the last term; that term vanishes if the base is a parallelogram.
+ * So Newton's method meets no singularity there: m is bounded by k. */
 #ifndef RENDER_KERNEL_MAP_H
 #define RENDER_KERNEL_MAP_H
 
@@ -21,8 +21,8 @@
 
 enum { KERNEL_MAP_STEPS = 10 };
 
-/* The error goes as the square of the step, times the map's curvature: below it the next one would be under float32's
- * resolution for all but the most warped cells. */
+/* Newton's method ends with a step smaller than this. The remaining error is the square of the step times the map's
+ * curvature: the next step would be below float32's resolution for all but the most warped cells. */
 #define KERNEL_MAP_TOLERANCE 5e-5f
 
 typedef struct kernel_polynomial {
@@ -38,7 +38,8 @@ typedef struct kernel_map {
     double exact[4][8]; /* the positions' coefficients and the field's, not rounded */
 } kernel_map;
 
-/* A hex's coefficients of its vertices' numbers: doubles, or vectors of them. */
+/* Computes the coefficients c of a hex from the numbers v at its vertices; both may be doubles or vectors of
+ * doubles. */
 #define KERNEL_HEX_FIT(c, v)                                                                                           \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
@@ -51,7 +52,7 @@ typedef struct kernel_map {
         (c)[7] = ((v)[6] - (v)[5] - (v)[7] + (v)[4]) - (c)[4];                                                         \
     } while (0)
 
-/* A wedge's and a pyramid's coefficients that are not 0. */
+/* Compute the nonzero coefficients of a wedge and of a pyramid from the numbers v at their vertices. */
 #define KERNEL_WEDGE_FIT(c, v)                                                                                         \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
@@ -87,7 +88,7 @@ SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[G
     KERNEL_FIT(type, out, v);
 }
 
-/* Fits the polynomials of as many cells as there are doubles in a vector. */
+/* Computes the polynomials of SIMD_WIDTH / 2 cells from the numbers v at their vertices. */
 SIMD_INLINE void kernel_half_fit(int type, kernel_half c[8], const kernel_half v[8])
 {
     KERNEL_FIT(type, c, v);
@@ -115,7 +116,7 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     m->tolerance = KERNEL_MAP_TOLERANCE;
 }
 
-/* m and its derivatives. */
+/* The product m of the map's polynomial, and its derivatives. */
 typedef struct kernel_product {
     vf m, dr, ds, dq;
 } kernel_product;
@@ -124,7 +125,7 @@ SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
 {
     kernel_product out = {r[0] * r[1], r[1], r[0], vf_set(0)};
     if (is_pyramid) {
-        /* Within the cell a / k and b / k are in [0, 1]; a step beyond the apex must not blow up. */
+        /* Within the cell a / k and b / k are in [0, 1]; the clamp limits steps beyond the apex. */
         const vf inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         out.ds = vf_clamp(r[0] * inverse, vf_set(-1), vf_set(2));
         out.dr = vf_clamp(r[1] * inverse, vf_set(-1), vf_set(2));
@@ -134,7 +135,7 @@ SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
     return out;
 }
 
-/* Each lane with coefficients of its own. */
+/* Returns the polynomial's value at r; each lane has its own coefficients. */
 SIMD_INLINE vf kernel_value_of(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3])
 {
     vf v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m->m * c[4];
@@ -171,10 +172,10 @@ SIMD_INLINE vf kernel_dot(const vf a[3], const vf b[3])
     return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
-/* The gradients of the three positions and their cross products: the rows of the Jacobian and, over det, the columns
- * of its inverse. */
+/* The cross products of the rows of the Jacobian, which are the gradients of the three positions. Divided by det, they
+ * are the columns of its inverse. */
 typedef struct kernel_jacobian {
-    vf cross[3][3]; /* cross[0] = row1 × row2, ... */
+    vf cross[3][3]; /* cross[i] = row i+1 × row i+2, with indices modulo 3 */
     vf det;
 } kernel_jacobian;
 
@@ -210,7 +211,8 @@ SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
         for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
 }
 
-/* The maps of the rays' own cells; at: places and the field by vertex, a cell a lane. */
+/* Computes the map of each ray's own cell. at: x, y, z and the field by vertex, in vectors whose lanes are cells; lane:
+ * lane of each ray's cell. */
 SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map_lanes *out, int type)
 {
     const int count = grid_type_vertices(type);
@@ -237,7 +239,7 @@ static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][S
     KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
 }
 
-/* Fits the polynomial of a field in each ray's own cell, of whose vertices it has these values. */
+/* Computes the polynomial of a field in each ray's own cell, from its values at the cells' vertices. */
 SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi lane, vf c[8], int type)
 {
     const int count = grid_type_vertices(type);
@@ -251,7 +253,7 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     }
 }
 
-/* Returns the field with these values at the vertices at r in each ray's own cell. */
+/* Returns a field at r in each ray's own cell, from its values at the cells' vertices. */
 SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
     const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
@@ -295,7 +297,7 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map_lanes
     return open;
 }
 
-/* Returns how far r is out of the cell's domain. */
+/* Returns how far r lies outside the reference domain [0, 1]^3, as the largest excess of a coordinate. */
 SIMD_INLINE vf kernel_map_beyond(const vf r[3])
 {
     vf most = vf_set(0);
@@ -303,8 +305,9 @@ SIMD_INLINE vf kernel_map_beyond(const vf r[3])
     return most;
 }
 
-/* Points of a cell have coordinates in its domain; those between a warped face's triangles and its patch, and of cells
- * so flat that rounding tells, somewhat beyond. */
+/* Largest excess of reference coordinates that still counts as a point of the cell. Points between the triangles of a
+ * warped face and its bilinear patch lie outside the domain, and so do points of cells so flat that rounding
+ * matters. */
 #define KERNEL_MAP_BEYOND 0.25f
 
 /* The coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method may diverge or come
@@ -331,12 +334,13 @@ SIMD_INLINE void kernel_lanes_normal(const kernel_map_lanes *map, const vf r[3],
     vf g[3];
     kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
     kernel_gradient_of(map->field, map->is_pyramid, &m, r, g);
-    /* grad = J^-T g: the columns of J^-1 are cross / det, and the sign of det is settled by whoever turns the normal.
-     */
+    /* grad = J^-T g, where the columns of J^-1 are cross / det. The sign of det is ignored, because callers orient the
+     * normal themselves. */
     for (int a = 0; a < 3; a++) out[a] = kernel_dot(j.cross[a], g);
 }
 
-/* The field along a ray through a cell: on the line between the values at its faces, and by the inverse map. */
+/* The following functions evaluate the field along a ray through a cell: by linear interpolation between the faces, or
+ * by the inverse map. */
 
 /* Returns the depth at which the line through the two ends is zero. */
 SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
@@ -344,14 +348,15 @@ SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
     return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
 }
 
-/* Returns the share of the interval that lies before t, in [0, 1]. */
+/* Returns the fraction of the interval that lies before t, in [0, 1]. */
 SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
 {
     const vf length = i->t_out - i->t_in;
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
 }
 
-/* The value at t on the line between those at the faces; and a guess for the coordinates there, likewise. */
+/* Return, for depth t, the value by linear interpolation between the faces, and in the same way a guess of the
+ * reference coordinates. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
     return i->v_in + kernel_share(i, t) * (i->v_out - i->v_in);
@@ -381,7 +386,7 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map_lane
     return has_failed ? vf_select(failed, kernel_line_value(i, t), value) : value;
 }
 
-/* The packet's rays, all in one cell. */
+/* Computes the field and reference coordinates at depth t for a packet's rays in a single cell. */
 SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t, vf r[3])
 {
     const kernel_rays own = kernel_packet_rays(p);
@@ -407,7 +412,7 @@ SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, k
     memcpy(out->r, i->r_out, sizeof out->r);
 }
 
-/* Interpolates between the two places, at t. */
+/* Interpolates the reference coordinates between two points of each ray, at depth t. */
 SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
 {
     const vf length = high->t - low->t;
@@ -415,16 +420,17 @@ SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_poin
     for (int a = 0; a < 3; a++) r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
 }
 
-#define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
+#define KERNEL_FACE_BAND 1e-6f /* largest difference, by rounding, between a face's value and the field there */
 #define KERNEL_DOMAIN_RIM 0.03125
 
-/* The domain's corners, widened by KERNEL_DOMAIN_RIM on all sides for what rounding takes out of it, a wedge's last two
- * again; of a pyramid a / k, b / k and k. And the centre. */
+/* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides
+ * for points that rounding moves out of it. KERNEL_WIDE is the end along a leg of a wedge's triangle, which is extended
+ * twice as far. For a pyramid the coordinates are a / k, b / k and k. */
 #define KERNEL_LOW -KERNEL_DOMAIN_RIM
 #define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
 #define KERNEL_WIDE (1 + 2 * KERNEL_DOMAIN_RIM)
 
-/* The domain's middle and corners. A wedge's last two corners repeat others. */
+/* The middle and the corners of an extended reference domain. The last two corners of a wedge repeat others. */
 typedef struct kernel_domain {
     double centre[3], corners[8][3];
 } kernel_domain;

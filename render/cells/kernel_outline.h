@@ -1,10 +1,11 @@
-/* Where a cell's isosurface can be: points whose convex hull holds it (kernel_candidate_surfaces.h).
+/* Computes an outline of a cell: points whose convex hull contains its isosurface (kernel_candidate_surfaces.h).
  *
- * In a tet it is flat: the triangle or quadrangle between the points on the edges where the field is zero. Rays hit
- * it there in float32 as well: the weights by which a face's depth and value are made have one sign (kernel_cell.h)
- * and err by some units in the last place, so both are exact at some place on the face beside the ray by as little,
- * and the line between two such places, of opposite signs, goes through the flat. Other cells are within their
- * vertices, and so are their faces, triangles or patches. */
+ * In a tet the isosurface is flat: a triangle or quadrangle whose corners are the points on the edges at which the
+ * field is zero. Hits in float32 lie on it as well. The weights from which a face's depth and value are computed all
+ * have one sign (kernel_cell.h) and err by a few units in the last place. So both are exact for some point of the face
+ * very close to the ray, and the line between two such points with values of opposite signs passes through the
+ * isosurface. Other cells lie in the convex hull of their vertices, and so do their faces, whether triangles or
+ * patches. */
 #ifndef RENDER_KERNEL_OUTLINE_H
 #define RENDER_KERNEL_OUTLINE_H
 
@@ -23,7 +24,7 @@ SIMD_INLINE float kernel_largest(const float *v, int count)
     return largest;
 }
 
-/* The hull of the vertices. */
+/* Makes the cell's vertices its outline. */
 SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
 {
     const float *places[3] = {c->x, c->y, c->z};
@@ -35,28 +36,27 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
 }
 
 /* ---- cells with quads ----
+ * Let L be linear in the point, and E its largest difference from the field F at a vertex. F - L is the mean of these
+ * differences, weighted by the shape functions, which are non-negative in the cell and sum to 1. So |F - L| <= E in the
+ * whole cell, however distorted it is; the values of faces, on their patches, are the field's. A hit is a zero of F, or
+ * is interpolated between two values of opposite signs, so that |L| <= E there too: it lies in a slab of the cell's
+ * hull, which is thin if the field is smooth.
  *
- * Let L be linear in the point, and E its largest difference from the field at a vertex. The field less L is the
- * vertices' differences weighed by the shape functions, which in the cell are not negative and sum to 1: so |F - L| <=
- * E in all of it, however distorted it is; faces' values, on their patches, are the field's. A hit is a zero of F, or
- * between two values of opposite signs and in proportion to them, so that |L| <= E there too: it is in a slab of the
- * cell's hull, thin where the field is smooth.
- *
- * That is so where the point has coordinates in the cell. Where its map is folded, solutions up to a quarter outside
- * count (kernel_map.h), where the weights' sizes sum to at most 1.5³. Folded it is not if its Jacobian differs from
- * that at the middle, J0, by so little that |J0^-1 J - 1| < 1 (in the Frobenius norm, at all corners, and so
- * everywhere, J being linear in each coordinate): then no two coordinates have one place, and those between a ray's
- * crossings of the faces are in the cell. */
+ * This holds for points with reference coordinates in the cell. If the cell's map is folded, solutions up to a quarter
+ * outside are accepted (kernel_map.h), where the weights' absolute values sum to at most 1.5³. The map is not folded if
+ * its Jacobian differs from that at the middle, J0, by so little that |J0^-1 J - 1| < 1 (in the Frobenius norm, at all
+ * corners, and so everywhere, because J is linear in each coordinate). Then no two reference points have the same
+ * position, and points between a ray's crossings of the faces are in the cell. */
 
-/* A type's Jacobian: at the middle, columns as sums of the vertices' places with weights; at the corners, columns as
- * vertex 1 - vertex 0, and + vertex 3 - vertex 2 where these are not the same. */
+/* The Jacobian of a cell type. At the middle its columns are weighted sums of the vertices' positions (`middle`). At
+ * the corners each column is vertex 1 - vertex 0, plus vertex 3 - vertex 2 if these two differ. */
 typedef struct kernel_differential {
     float middle[3][GRID_MAX_CELL_VERTICES];
     int column_count, corner_count;
     struct {
         signed char along, vertex[4];
     } columns[12];
-    signed char corners[8][3]; /* columns */
+    signed char corners[8][3]; /* the three columns of the Jacobian at each corner, as indices into `columns` */
 } kernel_differential;
 
 static const kernel_differential kernel_differentials[3] = {
@@ -85,7 +85,7 @@ static const kernel_differential kernel_differentials[3] = {
      6,
      {{0, {0, 1}}, {0, {3, 4}}, {1, {0, 2}}, {1, {3, 5}}, {2, {0, 3}}, {2, {1, 4}}, {2, {2, 5}}},
      {{0, 2, 4}, {0, 2, 5}, {0, 2, 6}, {1, 3, 4}, {1, 3, 5}, {1, 3, 6}}},
-    /* In the pyramid's own coordinates (kernel_map.h), k from the apex. */
+    /* For the pyramid, in the coordinates a, b, k of kernel_map.h, where k is 0 at the apex. */
     {{{-0.5f, 0.5f, 0.5f, -0.5f}, {-0.5f, -0.5f, 0.5f, 0.5f}, {0.75f, 0.25f, -0.25f, 0.25f, -1}},
      6,
      4,

@@ -17,21 +17,21 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Lane by lane what kernel_cell has; f is for the caller to set. */
+/* The data of a kernel_cell for one tet per lane; the caller sets f. */
 typedef struct kernel_placed {
-    kernel_whole world[3][4], values[4]; /* as they were handed over */
+    kernel_whole world[3][4], values[4]; /* coordinates and values as the caller of the library passed them */
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
 } kernel_placed;
 
-/* Vertices on their way into order. */
+/* A vertex of each lane's tet while the vertices are sorted: coordinates and vertex index. */
 typedef struct kernel_ordered {
     kernel_taken at[3];
     vi vertex;
 } kernel_ordered;
 
-/* Swaps a and b in the lanes in which b is before a. */
+/* Exchanges a and b in the lanes in which b is before a in the order of coordinates. */
 SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_ordered *b)
 {
     const vm before = kernel_taken_before(is_narrow, b->at, a->at);
@@ -41,7 +41,8 @@ SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_o
     b->vertex = vi_select(before, was, b->vertex);
 }
 
-/* Neighbours alone change places, and equal ones do not: vertices in one place stay as they came. */
+/* Reads the vertices and sorts them by coordinates. It is a bubble sort, which only exchanges neighbours that differ;
+ * so vertices with equal coordinates keep their order. */
 SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p, bool is_narrow,
                                       int32_t (*const vertices)[SIMD_WIDTH])
 {
@@ -68,7 +69,8 @@ SIMD_INLINE void kernel_placed_spots(kernel_placed *out, const kernel_frame *f, 
     }
 }
 
-/* Finds the edges' lines, and how large the faces' weights must be (kernel_least_weight()). */
+/* Computes the edge functions, and for each face the least sum of weights that is accurate enough
+ * (kernel_least_weight()). */
 SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
 {
     vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
@@ -95,7 +97,8 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
     }
 }
 
-/* Lane by lane count tets and their four vertices; vertices' lanes from count on are set to the first's. */
+/* Fetches, sorts and transforms `count` tets, given their vertex indices by vertex and lane. The remaining lanes get
+ * the vertices of the first tet. */
 static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_arrays *p,
                                                         const kernel_frame *f, const kernel_tile *tile,
                                                         int32_t vertices[4][SIMD_WIDTH], int count)
@@ -110,7 +113,7 @@ static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, cons
     kernel_placed_lines(out, f, tile);
 }
 
-/* Lane n as a cell, with all that rays ask of a tet in float32. */
+/* Copies lane n to a single cell, with all that rays need of a tet in float32. */
 SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_cell *c)
 {
     c->type = GRID_TET;

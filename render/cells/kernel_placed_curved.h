@@ -21,10 +21,11 @@
 enum {
     KERNEL_CURVED_EDGES = 12,
     KERNEL_CURVED_FACES = 6,
-    KERNEL_MAX_TRIANGLES = 4, /* of a cell's faces */
+    KERNEL_MAX_TRIANGLES = 4, /* maximum number of triangular faces of a cell */
 };
 
-/* A triangle's lines in the order of its corners i, j, k, each from the lesser: ij, jk and ik. */
+/* The edge functions of a triangle with corners i, j, k in the order of coordinates: of the edges ij, jk and ik, each
+ * from the smaller vertex. */
 typedef struct kernel_triangle_lines {
     float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH];
 } kernel_triangle_lines;
@@ -38,24 +39,26 @@ typedef struct kernel_placed_curved {
     int32_t turned[SIMD_WIDTH]; /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
     /* face by face, four bits a corner: kernel_quad_corners() or kernel_triangle_order() */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
-    kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES]; /* from the shape's first triangle on, */
-    float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];         /* and kernel_triangle_least() */
+    /* edge functions of the triangular faces, in the shape's order */
+    kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES];
+    /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
+    float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     /* for kernel_placed_curved_cell() */
     float bound[KERNEL_MAX_LINES][SIMD_WIDTH], least_of_all[SIMD_WIDTH];
     kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_placed_curved;
 
-/* The number of a type's first face that is a triangle; its others follow. */
+/* Returns the number of a type's first triangular face; its other triangles follow in the shape. */
 SIMD_INLINE int kernel_first_triangle(int type)
 {
     return kernel_has_apex(type) ? 1 : 0;
 }
 
-/* ---- a cell's numbers, for rays ---- */
+/* ---- numbers of each ray's own cell ---- */
 
-/* A number of each ray's own vertex of its cell, which has count; or of its own face. Of 16 lanes, permutations of all
- * vertices' are faster than a gather, of 8 they are slower. */
+/* Returns of[corner][lane] for each ray: a number of vertex (or face) `corner` of the cell in `lane`, which has `count`
+ * of them. With 16 lanes, permutations of all rows are faster than a gather; with 8 they are slower. */
 SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
@@ -70,9 +73,9 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
 }
 
-/* ---- order ---- */
+/* ---- order of vertices ---- */
 
-/* Vertices on their way into order. */
+/* The vertices of each lane's cell while they are permuted: coordinates, rank and vertex index. */
 typedef struct kernel_turned_curved {
     kernel_taken at[8][3];
     vf rank[8];
@@ -95,8 +98,8 @@ SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm 
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
 }
 
-/* Counts for each vertex how many are before it in the order of coordinates; equal ones are in the order in which they
- * came. */
+/* Computes each vertex's rank in the order of coordinates; vertices with equal coordinates are ranked in their given
+ * order. */
 SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -109,10 +112,12 @@ SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int
         }
 }
 
-/* Turns hexes: the least vertex first, then the axes in the order of its neighbours. */
+/* Permutes a hex's vertices: the smallest comes first, then the axes are ordered by the ranks of its three
+ * neighbours. */
 SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
 {
-    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
+    /* vertex number by the bits of its coordinates x, y, z */
+    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {
         const vm least = vf_eq(h->rank[(int)vertex[b]], vf_set(0));
@@ -123,14 +128,15 @@ SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
         for (int b = 0; b < 8; b++)
             if (!(b >> a & 1)) kernel_turned_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
     for (int k = 0; k < 3; k++) {
-        const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high); /* 0 and 1, 1 and 2, 0 and 1 */
+        /* sorting network of three: compares axes 0 and 1, 1 and 2, 0 and 1 */
+        const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high);
         const vm swap = vf_lt(h->rank[(int)vertex[high]], h->rank[(int)vertex[low]]);
         kernel_turned_swap(h, is_narrow, swap, vertex[low], vertex[high]);
         kernel_turned_swap(h, is_narrow, swap, vertex[low | other], vertex[high | other]);
     }
 }
 
-/* Turns a wedge: its least vertex comes first, then the lesser neighbour of that in its triangle. */
+/* Permutes a wedge's vertices: the smallest comes first, then its smaller neighbour in its triangle. */
 SIMD_INLINE void kernel_turned_wedge(kernel_turned_curved *h, bool is_narrow)
 {
     vm over = vm_none();
@@ -146,7 +152,8 @@ SIMD_INLINE void kernel_turned_wedge(kernel_turned_curved *h, bool is_narrow)
     kernel_turned_swap(h, is_narrow, swap, 4, 5);
 }
 
-/* Turns a pyramid: the base's least vertex comes first, then its lesser neighbour in the base; the apex stays. */
+/* Permutes a pyramid's vertices: the smallest vertex of the base comes first, then its smaller neighbour in the base;
+ * the apex stays last. */
 SIMD_INLINE void kernel_turned_pyramid(kernel_turned_curved *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
@@ -169,7 +176,8 @@ SIMD_INLINE void kernel_turned_turn(kernel_turned_curved *h, bool is_narrow, int
         kernel_turned_pyramid(h, is_narrow);
 }
 
-/* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face, or a triangle's edge. */
+/* Returns the lanes with an edge of length zero: a face has collapsed (kernel_quad_collapses()), or a triangle has an
+ * edge without length. */
 SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -184,7 +192,8 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_na
     return out;
 }
 
-/* Sets the vertices, their places and ranks; returns the lanes in which an edge has no length. */
+/* Reads the vertices and permutes them into canonical order; stores vertex indices, coordinates and ranks. Returns the
+ * lanes with an edge of length zero. */
 SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_arrays *p, bool is_narrow, int type,
                                    int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
 {
@@ -206,7 +215,7 @@ SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_array
     return kernel_turned_collapsed(&h, is_narrow, type);
 }
 
-/* ---- lines ---- */
+/* ---- edge functions ---- */
 
 /* A vertex as lines take it. */
 typedef struct kernel_lanes_spot {
@@ -238,11 +247,12 @@ SIMD_INLINE void kernel_placed_line_of(kernel_placed_curved *out, const kernel_f
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
-    /* The least of 0 and 2, of 1 and 3, and of all. */
+    /* Lanes in which 2 is smaller than 0, 3 is smaller than 1, and the smallest of all is 1 or 3. */
     const vm second = vf_lt(r[2], r[0]), fourth = vf_lt(r[3], r[1]),
              odd = vf_lt(vf_min(r[1], r[3]), vf_min(r[0], r[2]));
-    const vm far = vm_or(vm_and(odd, fourth), vm_andnot(second, odd)); /* it is 2 or 3 */
-    /* From 0 or 2 the neighbours ahead are 1 or 3, from 1 or 3 they are 2 or 0. */
+    const vm far = vm_or(vm_and(odd, fourth), vm_andnot(second, odd)); /* the smallest vertex is number 2 or 3 */
+    /* Lanes in which the next vertex of the loop is smaller than the previous one. The neighbours of 0 and 2 are 1 and
+     * 3; those of 1 and 3 are 2 and 0. */
     const vm ahead = vm_xor(far, vm_or(vm_and(odd, second), vm_andnot(vm_not(fourth), odd)));
     const vi one = vi_set(1), none = vi_set(0);
     const vi first = vi_select(odd, one, none) + (vi_select(far, one, none) << 1);
@@ -273,13 +283,14 @@ SIMD_INLINE void kernel_placed_quad(kernel_placed_curved *out, int type, int fac
     }
 }
 
-/* A triangle's corners in the order: lanes in which the loop's vertices 0, 1, 2 are i, and are k. */
+/* The order of a triangle's corners: first[n] and last[n] are the lanes in which vertex n of the loop is the smallest
+ * (i) and the largest (k). */
 typedef struct kernel_lanes_order {
     vm first[3], last[3];
 } kernel_lanes_order;
 
-/* Returns the loop's corners in the order, four bits a corner, and along which of its sides 01, 12, 20 the rank falls.
- */
+/* Returns a triangle's corners in the order of coordinates, four bits each. falls: for each side 01, 12, 20 of the
+ * loop, the lanes in which the rank decreases along it. */
 SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], kernel_lanes_order *o, vm falls[3])
 {
     const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
@@ -295,7 +306,8 @@ SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], k
     return word;
 }
 
-/* Orders a triangle's three sides, which are named by their opposite corners: those of k, i and j are ij, jk and ik. */
+/* Permutes three numbers that belong to a triangle's sides, given by the opposite corner, into the order ij, jk, ik.
+ * These sides are opposite to k, i and j. */
 SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposite[3], vf out[3])
 {
     out[0] = vf_select(o->last[0], opposite[0], vf_select(o->last[1], opposite[1], opposite[2]));
@@ -380,7 +392,7 @@ SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_
         vf_store(out->least_of_all, 1.0001f * ((3 * most.error) * (3 * most.extent) * (0.5f / KERNEL_WEIGHT_ERROR)));
 }
 
-/* ---- all of it ---- */
+/* ---- whole cells ---- */
 
 SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_arrays *p, const kernel_frame *f,
                                       const kernel_tile *tile, int32_t vertices[8][SIMD_WIDTH],
@@ -407,7 +419,8 @@ SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_ar
     return collapsed;
 }
 
-/* The vertices of cells of one type, lane by lane. Returns the lanes in which an edge has no length. */
+/* Fetches, permutes and transforms cells of one type, given their vertex indices by vertex and lane. Returns the lanes
+ * with an edge of length zero. */
 static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *out, const kernel_arrays *p,
                                                         const kernel_frame *f, const kernel_tile *tile,
                                                         int32_t vertices[8][SIMD_WIDTH],
@@ -416,7 +429,7 @@ static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *ou
     return KERNEL_OF_TYPE(type, kernel_place_curved_of, out, p, f, tile, vertices, isovalues);
 }
 
-/* ---- one cell ---- */
+/* ---- extracting one cell ---- */
 
 SIMD_INLINE void kernel_placed_flip(kernel_line *line)
 {
@@ -453,19 +466,21 @@ static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_pla
     c->least[0] = kernel_is_box(type) ? (float)INFINITY : h->least_of_all[n];
 }
 
-/* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */
+/* The rays that cross exactly two faces (`two`), with the numbers of these faces; and the rays that must be traced one
+ * by one (`alone`). */
 typedef struct kernel_curved_crossed {
     vm two, alone;
     vi first, last;
 } kernel_curved_crossed;
 
-/* The number of the least bit that is set; of 0 whatever. */
+/* Returns the index of the lowest bit that is set; the result is meaningless for 0. */
 SIMD_INLINE vi kernel_least_bit(vi bits)
 {
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* faces: bits of those that each ray crosses once. alone: the rays that are for the cell alone, whatever they cross. */
+/* Finds the rays that cross exactly two faces. faces: a bit for each face that the ray crosses once. alone: rays that
+ * must be traced one by one, whatever they cross; rays with more than two faces are added to them. */
 SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm alone, kernel_curved_crossed *out)
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);

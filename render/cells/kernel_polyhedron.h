@@ -1,12 +1,13 @@
-/* A ray and a polyhedron (render_polyhedra.h): its intervals inside, and the field's profile along them.
+/* Intersects rays with a polyhedron (render_polyhedra.h): computes its intervals inside, and the field along them.
  *
- * The surface is met as other cells' is (kernel_cell.h): edge functions of the unique edges, crossed triangles, and
- * between the crossings, sorted and paired, the ray is inside. There are as many intervals as the cell has: the list
- * is as long as the list of triangles.
+ * The surface is intersected as for other cells (kernel_cell.h): by edge functions of the unique edges and by
+ * triangles. Between the crossings, sorted and paired, the ray is inside. The number of intervals is not limited: the
+ * list is as long as the list of triangles.
  *
- * The field is linear on each tet of a triangle and the centre. The tets meet in sheets: the triangles of an edge and
- * the centre. Along the ray the field is continuous and piecewise linear, and bends only where the ray crosses a
- * sheet; so a profile is the interval's ends with the crossed sheets between them, in their order:
+ * The field is linear on each tet that joins a surface triangle to the centre. Neighbouring tets share a triangle that
+ * joins an edge to the centre, called a sheet. Along the ray the field is continuous and piecewise linear, and its
+ * slope changes only at sheets. So a profile consists of the interval's ends and the crossed sheets between them,
+ * sorted by depth:
  *
  *      v |        .sheet
  *        |      .'      '.        .exit
@@ -14,16 +15,16 @@
  *        | in
  *        +---t_in--------------------t_out---> t
  *
- * Where the cell is star-shaped from its centre, the tets fill it once, and the field on a sheet is the sheet's own.
- * Else tets overlap, and stand out of the cell; the field at a place is then the sum over the tets that hold it, each
- * with its sign (a place inside has one more of the positive ones; a sheet between two tets on its two sides is passed
- * without a jump, and one with both on one side brings or takes f - f = 0). It is summed where the ray crosses sheets,
- * by each tet's [t0, t1).
+ * If the cell is star-shaped from its centre, the tets fill it exactly once, and the field at a sheet is the sheet's
+ * own value. Otherwise tets overlap, and extend out of the cell. The field at a point is then the sum over the tets
+ * that contain it, each with its sign. (A point inside is contained in one more positive than negative tet. At a sheet
+ * with its two tets on different sides the sum does not jump; a sheet with both on one side adds or removes f - f = 0.)
+ * That sum is computed at sheets, from each tet's interval [t0, t1).
  *
- * On which side of an isovalue a ray enters and leaves, the faces' own values say (kernel_surface.h): triangles linear,
- * quads bilinear as their neighbours may have them, larger faces linear on their triangles. In a cell that is not
- * star-shaped the field just inside may be on the other side of the isovalue than the face: then it jumps at the face,
- * and the isosurface is there. */
+ * On which side of an isovalue a ray enters and leaves is decided by the faces' own values (kernel_surface.h):
+ * triangles are linear, quads bilinear as their neighbours may have them, larger faces linear on their triangles. In a
+ * cell that is not star-shaped the field just inside may be on the other side of the isovalue than the face: then it
+ * jumps at the face, and the isosurface is there. */
 #ifndef RENDER_KERNEL_POLYHEDRON_H
 #define RENDER_KERNEL_POLYHEDRON_H
 
@@ -37,15 +38,17 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Rays that cross a triangle at t: v its value there, linear, and w the colour's. Of a facet also where its face is
- * met and the face's values, which are others for quads. Of a sheet v_face and w_face are the field's values there. */
+/* Crossings of rays with a triangle, at depth t with value v and colour value w, both linear on the triangle. For a
+ * surface triangle t_face, v_face and w_face are those of its face, which differ for quads, because these are bilinear.
+ * For a sheet v_face and w_face are the field's values there. */
 typedef struct kernel_meeting {
     vm mask;
     vf t, v, w;
     vf t_face, v_face, w_face;
 } kernel_meeting;
 
-/* Rays within a tet of the surface triangle facet: v along t is v0 + (t - t0) slope. */
+/* The intervals of rays in the tet of surface triangle number `facet`: the value at t is v0 + (t - t0) (v1 - v0) / (t1
+ * - t0). sign is the tet's sign. */
 typedef struct kernel_tet_span {
     vm mask;
     vf t0, t1, v0, v1, w0, w1;
@@ -53,20 +56,21 @@ typedef struct kernel_tet_span {
     int facet;
 } kernel_tet_span;
 
-/* A packet's passage through one polyhedron; its arrays are in the thread's scratch memory. */
+/* The crossings of a packet with one polyhedron. Its arrays are in the thread's scratch memory. */
 typedef struct kernel_passage {
     const kernel_packet *packet;
     const polyhedron *cell;
-    vm rays;                /* those that are asked for */
-    bool has_colour;        /* w is asked for too */
-    vf *x, *y;              /* vertices and centre in the rays' planes */
-    vf *edge;               /* edge functions: of the edges, then of the spokes, from each vertex to the centre */
-    kernel_meeting *facets; /* by number; only those met are set */
-    vm *left;               /* rays whose crossing is not yet taken into an interval */
-    vm uneven;              /* rays that meet both halves of a quad, but not its patch, or the patch twice alone */
+    vm rays;                /* the rays to intersect */
+    bool has_colour;        /* whether colour values w are computed too */
+    vf *x, *y;              /* vertices and centre, projected along the rays */
+    vf *edge;               /* edge functions of the edges, then of the lines from each vertex to the centre */
+    kernel_meeting *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
+    vm *left;               /* by surface triangle, the rays whose crossing has not been assigned to an interval yet */
+    /* rays that cross both triangles of a quad but not its bilinear patch, or the patch twice but no triangle */
+    vm uneven;
     int *met;
     int met_count;
-    kernel_meeting *sheets; /* by edge; only those met are set */
+    kernel_meeting *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
     int *met_sheets;
     int sheet_count;
     kernel_tet_span *segments;
@@ -74,14 +78,15 @@ typedef struct kernel_passage {
     bool has_sheets;
 } kernel_passage;
 
-/* Between two crossings: the interval has the faces' values; u_in, u_out are the profile's at its ends. */
+/* One interval of each ray inside the cell. `interval` has the faces' values; u_in and u_out are the field's values
+ * just inside. */
 typedef struct kernel_stay {
     kernel_interval interval;
     kernel_meeting in, out;
     vf u_in, u_out;
 } kernel_stay;
 
-/* A linear piece of a profile. */
+/* A linear piece of the field's profile along each ray: depths, values and colour values at both ends. */
 typedef struct kernel_profile_piece {
     vf t0, t1, v0, v1, w0, w1;
 } kernel_profile_piece;
@@ -93,7 +98,8 @@ SIMD_INLINE void *kernel_carve(char **at, size_t bytes)
     return p;
 }
 
-/* False where memory ran out. */
+/* Carves the arrays for the cell's crossings out of the thread's scratch memory. Returns false if there is no
+ * memory. */
 static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, kernel_passage *out)
 {
     const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
@@ -148,7 +154,7 @@ SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
     c->least = kernel_blur_least(most);
 }
 
-/* ---- the surface ---- */
+/* ---- crossings of the surface ---- */
 
 SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
 {
@@ -175,8 +181,8 @@ SIMD_INLINE void kernel_passage_mend(const kernel_passage *r, vm hit, kernel_wei
                         kernel_polyhedron_spot(c, w->k), w);
 }
 
-/* Returns the rays that cross the triangle, and where. The weights are for guesses at its quad's patch, and the same as
- * in a hex beside it. */
+/* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the unmended weights, which
+ * serve as a guess for the quad's patch and are the same as in a hex that shares the face. */
 static vm kernel_passage_facet(const kernel_passage *r, const polyhedron_facet *t, kernel_weights *w,
                                kernel_meeting *out)
 {
@@ -190,7 +196,7 @@ static vm kernel_passage_facet(const kernel_passage *r, const polyhedron_facet *
     return out->mask;
 }
 
-/* The edge function from one of the facet's vertices to another. */
+/* Returns the edge function from one of the triangle's vertices to another. */
 SIMD_INLINE vf kernel_facet_side(const polyhedron_facet *t, const kernel_passage *r, int from, int to)
 {
     const int low = from < to ? from : to, high = from < to ? to : from;
@@ -217,8 +223,8 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_passage *r, const polyhedron
     out->e32 = kernel_facet_side(t[1], r, corner[3], corner[2]);
 }
 
-/* A place on the patch as the facet's meeting with its face. Rays that do not cross the triangle have the face's place
- * for its. */
+/* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`. Rays
+ * that do not cross the triangle itself use the patch's point for both. */
 SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_place *at, vm mine,
                                    bool has_colour, kernel_meeting *m)
 {
@@ -233,7 +239,8 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
     m->w = vf_select(apart, m->w_face, m->w);
 }
 
-/* On rays that meet the patch twice, and both triangles, gives the nearer place to the nearer triangle. */
+/* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
+ * point belongs to the nearer triangle. */
 static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *const m[2], kernel_quad_place places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
@@ -247,7 +254,8 @@ static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *c
     places[1].t = vf_select(swap, own.t, places[1].t);
 }
 
-/* A quad, by the first of its two triangles: where its patch is met, as a hex beside it has it. */
+/* Computes the crossings of a quad's bilinear patch, which are the same bits as in a hex that shares it. first: number
+ * of the first of its two triangles. */
 static void kernel_passage_quad(kernel_passage *r, int first)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
@@ -258,7 +266,7 @@ static void kernel_passage_quad(kernel_passage *r, int first)
     kernel_quad quad;
     kernel_quad_place places[2];
     int corner[4];
-    for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* numbers are in the order */
+    for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* vertex numbers are ranks, because vertices are sorted */
     kernel_quad_corners(&ranks, loop, corner);
     for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
     const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
@@ -284,7 +292,7 @@ static void kernel_passage_quad(kernel_passage *r, int first)
     }
 }
 
-/* All crossings of the surface; false where no ray has any. */
+/* Computes all crossings of the rays with the polyhedron's surface. Returns false if there are none. */
 static bool kernel_passage_cross(kernel_passage *r, vm rays, bool has_colour)
 {
     const polyhedron *c = r->cell;
@@ -307,7 +315,8 @@ static bool kernel_passage_cross(kernel_passage *r, vm rays, bool has_colour)
     return r->met_count > 0;
 }
 
-/* Take the crossing of each ray whose face is nearest: false where no ray has one left. */
+/* Removes each ray's nearest crossing, by the depth of its face, from the list and returns it in *out. Returns false if
+ * no ray has one left. */
 SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_meeting *out)
 {
     const vf zero = vf_set(0);
@@ -330,7 +339,7 @@ SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_meeting *out)
     return vm_any(out->mask);
 }
 
-/* The rays' next stay in the cell; false after the last. */
+/* Computes the next interval of each ray inside the cell. Returns false after the last one. */
 static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
 {
     if (!kernel_passage_take(r, &out->in) || !kernel_passage_take(r, &out->out)) return false;
@@ -345,7 +354,7 @@ static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
     return true;
 }
 
-/* ---- the inside ---- */
+/* ---- the field inside ---- */
 
 static void kernel_passage_sheets(kernel_passage *r)
 {
@@ -378,7 +387,7 @@ SIMD_INLINE void kernel_segment_add(kernel_tet_span *s, const kernel_meeting *m,
     s->mask = vm_or(s->mask, hit);
 }
 
-/* The tets that rays pass. */
+/* Computes the intervals of the rays in all tets of the cell. Tets without volume are left out. */
 static void kernel_passage_segments(kernel_passage *r)
 {
     const polyhedron *c = r->cell;
@@ -394,7 +403,8 @@ static void kernel_passage_segments(kernel_passage *r)
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
                 kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
-        /* A ray that meets the tet meets a sheet of it; its triangle is met by who is inside all three edges. */
+        /* A ray in the tet crosses at least one of its sheets, and crosses its surface triangle if it is inside all
+         * three edges. */
         const vm hit = kernel_inside(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
         if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
         if (!vm_any(s->mask)) continue;
@@ -404,7 +414,7 @@ static void kernel_passage_segments(kernel_passage *r)
     }
 }
 
-/* Rays whose t is in the segment: [t0, t1), or (t0, t1] where what counts is the field just before t. */
+/* Returns the rays for which t is in the tet's interval: [t0, t1), or (t0, t1] if the field just before t is needed. */
 SIMD_INLINE vm kernel_tet_span_holds(const kernel_tet_span *s, vf t, bool before)
 {
     if (before) return vm_and(s->mask, vm_and(vf_lt(s->t0, t), vf_le(t, s->t1)));
@@ -416,8 +426,9 @@ SIMD_INLINE vf kernel_segment_at(const kernel_tet_span *s, vf t, vf v0, vf v1)
     return v0 + (t - s->t0) * ((v1 - v0) / (s->t1 - s->t0));
 }
 
-/* The signed sum at t. Rounding may put ends of neighbours, which meet in one place, in the wrong order: a place that
- * is not covered once in sum is asked for a little before and behind, and last keeps what it had. */
+/* Computes the signed sum of the tets' fields at t. Rounding may put the ends of neighbouring tets, which meet at one
+ * point, in the wrong order. So if the signs at t do not sum to 1, the sum is computed slightly before and behind; if
+ * that fails too, *v and *w keep their values. */
 static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool before, vf *v, vf *w)
 {
     static const float shifts[7] = {0, 1, -1, 4, -4, 16, -16};
@@ -440,8 +451,8 @@ static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool befo
     }
 }
 
-/* Sheets between the crossed triangles and faces: those behind the triangles, of tets that stand out of the cell, are
- * none of its field. */
+/* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
+ * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
 SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *sheet)
 {
     const vm inside = vm_and(vf_lt(stay->interval.t_in, sheet->t), vf_lt(sheet->t, stay->interval.t_out));
@@ -449,7 +460,8 @@ SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *
     return vm_and(vm_and(stay->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
-/* Adds to the face's value the fields of other tets at an end, beside the tet whose triangle it is. */
+/* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
+ * one whose triangle is crossed. */
 SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const kernel_meeting *end, bool before, vf *u,
                                      vf *w)
 {
@@ -459,7 +471,7 @@ SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const ker
     *w = end->w_face + (w_sum - end->w);
 }
 
-/* Make the sheets ready to be the profile of the stay: their values, and those at its ends, the field's. */
+/* Prepares the profile of the interval: computes the field at the crossed sheets and at both ends. */
 static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
 {
     kernel_interval *i = &stay->interval;
@@ -479,14 +491,14 @@ static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
     }
 }
 
-/* The profile's begin, as a piece of no length. */
+/* Returns a piece of length zero at the begin of the profile. */
 SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_stay *stay, vf v_in)
 {
     const kernel_interval *i = &stay->interval;
     return (kernel_profile_piece){i->t_in, i->t_in, v_in, v_in, i->w_in, i->w_in};
 }
 
-/* The piece behind this one, each ray's own; v_out: the value at the profile's end. */
+/* Replaces *piece by the next piece of each ray's profile. v_out: the value at the profile's end. */
 SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay *stay, vf v_out,
                                      kernel_profile_piece *piece)
 {
@@ -502,7 +514,7 @@ SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay 
     *piece = (kernel_profile_piece){piece->t1, t, piece->v1, v, piece->w1, w};
 }
 
-/* Rays of mask whose profile goes on behind the piece. */
+/* Returns the rays of the mask whose profile continues behind the piece. */
 SIMD_INLINE vm kernel_profile_open(const kernel_stay *stay, const kernel_profile_piece *piece, vm mask)
 {
     return vm_and(mask, vf_lt(piece->t1, stay->interval.t_out));

@@ -1,34 +1,31 @@
-/* A ray and a quad's bilinear patch: how often they meet, and where.
+/* Intersects rays with a quad's bilinear patch: how often they meet, and at which points.
  *
- * Corners 0 to 3 go around; in the ray's plane, with the ray at the origin, they are c0 to c3. The patch's point (s, r)
- * is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For a given r these are the points of the line from u = (1-r) c0 +
- * r c3 to w = (1-r) c1 + r c2, which goes through the origin where B(r) = u × w = 0; likewise A(s) = 0:
- *
+ * Corners 0 to 3 are in cyclic order; in the ray's plane, with the ray at the origin, they are c0 to c3. The patch's
+ * point (s, r) is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For a given r these are the points of the line from u
+ * = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which passes through the origin if B(r) = u × w = 0; likewise A(s) = 0:
  *     B(r) = (1-r)² b0 + 2 r (1-r) b1 + r² b2,   b0 = c0×c1,  2 b1 = c0×c2 + c3×c1,  b2 = c3×c2
  *     A(s) = (1-s)² a0 + 2 s (1-s) a1 + s² a2,   a0 = c0×c3,  2 a1 = c0×c2 + c1×c3,  a2 = c1×c2
+ * b0, b2, a0 and a2 are the edge functions of the four sides. Their exact signs, with ties decided, are the same for
+ * all cells of the face. They decide almost everything:
+ * - The ray meets the patch an odd number of times if and only if it meets the quad's two triangles an odd number of
+ *   times, because both surfaces have the same border. A bilinear patch is met at most twice; so odd means once.
+ * - The two discriminants b1² - b0 b2 and a1² - a0 a2 are the same number D. At a root the patch's Jacobian in the
+ *   plane is J = A'(s) = -B'(r) = 2 sqrt(D) or -2 sqrt(D): its sign pairs the two roots of A with those of B.
+ * - Odd: then b0 and b2 differ in sign, or a0 and a2 do. If b0 and b2 do, B rises or falls through (0, 1) once, which
+ *   gives the sign of B' and so of J: the root is chosen without any arithmetic. Likewise for A.
+ * - Even: twice or never. Twice only if b0 and b2 have one sign, a0 and a2 have one sign, b1 and a1 have the opposite
+ *   signs, and D > 0. It is the only decision that depends on rounding, for a ray at the patch's silhouette, whose two
+ *   points then differ by less than 1e-8; all cells of the face decide it from the same numbers.
+ * If b0 and b2 differ in sign, D is a sum of two positive terms, and a root is a quotient of sums of terms of one sign:
+ * nothing cancels. So what is computed in double from the corners' float32 is exact except for rounding, however
+ * edge-on, thin or warped the quad is: the crossings of two quads at their common edge come in the order given by the
+ * corners' float32 positions. Therefore a ray's intervals do not overlap.
  *
- * b0, b2, a0 and a2 are the edge functions of the four sides, whose exact signs, ties included, the ray has from all
- * cells alike. They decide almost everything:
- * - How often the ray meets the patch is as odd or even as how often it meets the quad's two triangles: both surfaces
- *   have the same border. A bilinear patch is met twice at most; so odd is once.
- * - The two discriminants b1² - b0 b2 and a1² - a0 a2 are one and the same number D. At a root the patch's Jacobian in
- *   the plane is J = A'(s) = -B'(r) = 2 sqrt(D) or -2 sqrt(D): the two roots of A and those of B pair up by its sign.
- * - Odd: then b0, b2 differ in sign or a0, a2 do. If b0 and b2 do, B rises or falls through (0, 1) once, which is the
- *   sign of B' there and so that of J: the root is chosen without any arithmetic. Likewise for A.
- * - Even: twice or never. Twice only where b0, b2 have one sign, a0, a2 have one, b1 and a1 the others, and D > 0. It
- *   is the one decision that rounding may take, of a ray at the patch's silhouette, whose two places are then the same
- *   to 1e-8; all cells of the face take it from the same numbers.
+ * If B(r) = 0 for all r, the ray runs along the patch (along an edge, or a ruling), and the point is the limit of those
+ * of rays moved by (e, e²), as kernel_cell.h defines for ties: there B(r) is -e times the y of w - u.
  *
- * Where b0 and b2 differ in sign, D is a sum of two positive terms, and a root is a quotient of sums of terms of one
- * sign: nothing cancels. What is computed in double from the corners' float32 is therefore exact but for rounding,
- * however edge-on, thin or warped the quad: the crossings of two quads at their common edge come in the order that the
- * corners' float32 places have them in. That is what keeps a ray's intervals from overlapping.
- *
- * Where the whole ray B(r) = 0, it runs along the patch (along an edge, or a ruling), and the place is the limit of
- * those of rays moved by (e, e²), as kernel_cell.h has it for ties: there B(r) is -e times the y of w - u.
- *
- * Most rays meet a quad well inside and not nearly edge-on: Newton's method in float32 is then good enough, as no other
- * crossing of the cell is near. */
+ * Most rays meet a quad well inside and not nearly edge-on. Newton's method in float32 is then accurate enough, because
+ * no other crossing of the cell is near. */
 #ifndef RENDER_KERNEL_QUAD_H
 #define RENDER_KERNEL_QUAD_H
 
@@ -41,13 +38,14 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* In a packet's planes. e01 is the edge function from corner 0 to corner 1, its sign bit the exact one. */
+/* A quad's corners, projected along each ray, and the edge functions of its sides. e01 is that from corner 0 to corner
+ * 1; the sign bits are exact. */
 typedef struct kernel_quad {
     vf x[4], y[4], z[4];
     vf e01, e32, e03, e12;
 } kernel_quad;
 
-/* Rays at the patch: s along corners 0 to 1, r along 0 to 3, and their depth. */
+/* Points of rays on the patch: s from corner 0 to 1, r from corner 0 to 3, and the depth t. */
 typedef struct kernel_quad_place {
     vm mask;
     vf s, r, t;
@@ -63,16 +61,16 @@ SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 
 typedef struct kernel_flat_quad {
     double x[4], y[4], z[4];
-    bool e01, e32, e03, e12; /* negative? */
+    bool e01, e32, e03, e12; /* sign bits of the edge functions: true if negative */
 } kernel_flat_quad;
 
-/* (1-x)² c0 + 2 x (1-x) c1 + x² c2, and the sign bits of c0 and c2. */
+/* The quadratic (1-x)² c0 + 2 x (1-x) c1 + x² c2, and the exact sign bits of c0 and c2. */
 typedef struct kernel_flat_quadratic {
     double c0, c1, c2;
     bool is_negative0, is_negative2;
 } kernel_flat_quadratic;
 
-/* Exact but for one rounding, for float32 corners. */
+/* Returns the cross product of corners i and j in double, which has a single rounding for float32 corners. */
 static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
 {
     return q->x[i] * q->y[j] - q->x[j] * q->y[i];
@@ -108,7 +106,8 @@ static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
     return d > 0 ? d : 0;
 }
 
-/* The root in [0, 1] at which the derivative is 2 turn: of its two forms the one in which nothing cancels. */
+/* Returns the root in [0, 1] at which the quadratic's derivative is 2 turn. Of the two formulas for it, the one without
+ * cancellation is used. */
 static inline double kernel_flat_root(const kernel_flat_quadratic *c, double turn)
 {
     const bool is_sum = c->c1 * turn <= 0;
@@ -117,21 +116,22 @@ static inline double kernel_flat_root(const kernel_flat_quadratic *c, double tur
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* Solves v0 + x (v1 - v0) = 0 for x. v0 and v1 must not both be 0. */
+/* Solves v0 + x (v1 - v0) = 0 for x, clamped to [0, 1]. v0 and v1 must not both be 0. */
 static inline double kernel_flat_zero(double v0, double v1)
 {
     const double x = v0 / (v0 - v1);
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* The limit of the root on the line from corner i to i2 and j to j2, B or A being 0 all along it. */
+/* Returns the limit of the root if B or A vanishes for all parameters. The two lines are from corner i to i2 and from
+ * corner j to j2. */
 static inline double kernel_flat_limit(const kernel_flat_quad *q, int i, int i2, int j, int j2)
 {
     const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
     return y0 != y1 ? kernel_flat_zero(y0, y1) : kernel_flat_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
 }
 
-/* The place where J is positive or negative. */
+/* Computes the point (s, r, depth) at which the Jacobian J has the sign of `root`, where |root| is sqrt(D). */
 static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
                                      const kernel_flat_quadratic *b, double root, double place[3])
 {
@@ -142,7 +142,7 @@ static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_fla
     place[2] = (1 - r) * ((1 - s) * q->z[0] + s * q->z[1]) + r * ((1 - s) * q->z[3] + s * q->z[2]);
 }
 
-/* Finds the place of a ray that meets the two triangles once. */
+/* Computes the point of a ray that crosses exactly one of the two triangles. */
 static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
 {
     const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
@@ -152,13 +152,14 @@ static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
     kernel_flat_place(q, &a, &b, by_b != is_rising ? root : -root, place);
 }
 
-/* Is the quadratic's middle so far on the other side of its ends, which are on one, that it may have two roots? */
+/* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
+ * the other. */
 static inline bool kernel_flat_bends(const kernel_flat_quadratic *c)
 {
     return !kernel_flat_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
 
-/* Finds the places of a ray that meets the triangles twice or never. Returns false where it does not meet the patch. */
+/* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
 static inline bool kernel_flat_twice(const kernel_flat_quad *q, double places[2][3])
 {
     const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
@@ -196,7 +197,7 @@ static inline void kernel_quad_put(kernel_quad_place *out, int lane, const doubl
     out->t[lane] = (float)place[2];
 }
 
-/* ---- as many rays as there are doubles in a vector ---- */
+/* ---- SIMD_WIDTH / 2 rays, in double ---- */
 
 typedef struct kernel_half_quad {
     kernel_half x[4], y[4];
@@ -216,7 +217,7 @@ SIMD_INLINE kernel_half_mask kernel_half_vanishes(const kernel_half_quadratic *c
     return (kernel_half_mask)(c->c0 == 0) & (kernel_half_mask)(c->c1 == 0) & (kernel_half_mask)(c->c2 == 0);
 }
 
-/* Returns the quadratic's root on the side of the turn, without cancellation. */
+/* Returns the quadratic's root at which its derivative is 2 turn, without cancellation (kernel_flat_root()). */
 SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_half turn)
 {
     const kernel_half zero = {0}, one = zero + 1;
@@ -229,7 +230,8 @@ SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_
     return kernel_half_select((kernel_half_mask)(x >= 0), least, zero);
 }
 
-/* Finds the patch's place on wanted rays for which no coefficient vanishes; returns the others. */
+/* Computes the patch's point for the wanted rays of one half, each of which crosses one triangle. Returns the rays for
+ * which A or B vanishes, whose points must be computed one by one. */
 SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_place *out)
 {
     const kernel_half zero = {0}, one = zero + 1;
@@ -292,7 +294,8 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
     if (__builtin_expect(vanishing, 0)) kernel_quad_limit(q, vm_from_bits(vanishing), out);
 }
 
-/* Returns the rays of wanted that meet the patch twice, their places added to both. */
+/* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
+ * rays. */
 static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q, vm wanted, kernel_quad_place out[2])
 {
     unsigned found = 0;
@@ -308,10 +311,10 @@ static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q
     return vm_from_bits(found);
 }
 
-/* ---- a packet ---- */
+/* ---- a packet, in float32 ---- */
 
-/* Corner 0, the edges to corners 1 and 3, and corner 0 - 1 + 2 - 3, in the ray's plane; how far the edges reach along
- * the ray. */
+/* The patch as corner 0 (a), the edges to corner 1 (e) and to corner 3 (g), and corner 0 - 1 + 2 - 3 (h), in the ray's
+ * plane; ez and gz are the largest extents of the edges along the ray. */
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
     vf ez, gz;
@@ -327,7 +330,7 @@ SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
     p->hx = (q->x[2] - q->x[1]) - p->gx, p->hy = (q->y[2] - q->y[1]) - p->gy;
 }
 
-/* At the place (s, r): the patch's derivatives, their determinant, and how far the ray is. */
+/* At the point (s, r): the patch's derivatives, their determinant, and the distance from the point to the ray. */
 typedef struct kernel_patch_at {
     vf sx, sy, rx, ry, det, dx, dy;
 } kernel_patch_at;
@@ -342,8 +345,8 @@ SIMD_INLINE kernel_patch_at kernel_patch_look(const kernel_patch *p, vf s, vf r)
     return at;
 }
 
-/* A step of Newton's method for the ray's place on the patch, within [0, 1]: the error goes as its square in each, 0.2
- * to 1e-9 in four. */
+/* Number of steps of Newton's method for a ray's point on the patch, clamped to [0, 1]. The error is squared in each
+ * step: from 0.2 it falls to 1e-9 in four. */
 enum { KERNEL_PATCH_STEPS = 4 };
 
 SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
@@ -355,9 +358,10 @@ SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
     *r = vf_clamp(*r + (at.sx * at.dy - at.sy * at.dx) * inverse, zero, one);
 }
 
-/* Rays that have arrived: to what float32 leaves of the quad's size, across the ray. None have where the quad is so
- * steep that this is 8 times as much along it, or nearly folded, nor where the place is so near the quad's border that
- * the crossing of a face beside it, 1e-6 of its size off, may come in the wrong order. */
+/* Returns the rays whose points are accurate: within float32's resolution of the quad's size, across the ray. Excluded
+ * are rays for which the quad is so steep that this means an error 8 times as large along the ray, or is nearly folded,
+ * and points so near the quad's border that the crossing of a neighbouring face, with an error of 1e-6 of its size,
+ * could come in the wrong order. */
 SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
@@ -369,7 +373,8 @@ SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
     return vm_and(inside, vf_le(vf_abs(at.dx) + vf_abs(at.dy), (e + g) * 1.2e-7f));
 }
 
-/* A guess at the place: how far it is between two sides, by the triangles that the ray makes with each. */
+/* Returns a first guess of s or r: the relative distance of the ray from two opposite sides, by the areas of the
+ * triangles that it forms with each. */
 SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, int l)
 {
     const vf near = vf_abs(q->x[i] * q->y[j] - q->x[j] * q->y[i]), far = vf_abs(q->x[k] * q->y[l] - q->x[l] * q->y[k]);
@@ -377,7 +382,7 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* Finds the place on wanted rays that lie beside all edges, from edge functions of the projected corners. */
+/* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
 static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_place *out)
 {
     kernel_quad own = *q;
@@ -388,9 +393,9 @@ static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad 
     kernel_quad_once(&own, wanted, out);
 }
 
-/* Finds where rays meet the patches of count quads: once[n] has the rays that meet quad n's triangles once. Quads are
- * taken together because each step of one waits for its step before. are_beside: no ray meets an edge, and the quads'
- * edge functions are not set. */
+/* Computes the points at which rays meet the patches of `count` quads. once[n] has the rays that cross exactly one
+ * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
+ * are_beside: no ray meets an edge, and the quads' edge functions are not set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_beside,
                                     kernel_quad_place *out)
 {
@@ -420,20 +425,22 @@ SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, ker
     kernel_quads_cross(q, count, all, false, out);
 }
 
-/* May rays meet the patch twice? By the signs of its sides alone: none does that meets the triangles once. */
+/* Returns the rays that may meet the patch twice, by the signs of its sides alone. A ray that crosses exactly one
+ * triangle is never among them. */
 SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
 {
     const vi b = vi_from_bits(e01) ^ vi_from_bits(e32), a = vi_from_bits(e03) ^ vi_from_bits(e12);
     return vm_and(rays, vm_sign(~(a | b)));
 }
 
-/* v, mirrored where the other is negative. */
+/* Returns v, negated in lanes in which `other` is negative. */
 SIMD_INLINE vf kernel_turned(vf v, vf other)
 {
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
 
-/* Returns, of the rays for which kernel_quad_sides() is true, those that may really meet the patch twice. */
+/* Returns those of the rays given by kernel_quad_sides() that may still meet the patch twice when the middle
+ * coefficients are tested, too. */
 SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
@@ -444,8 +451,8 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Returns the rays that cross one of a quad's two triangles, but not both. around has the sides of its edges, taken
- * around from the begin of its diagonal, whose side is the other. */
+/* Returns the rays that cross exactly one of a quad's two triangles. around[i]: sides of the quad's edges in cyclic
+ * order from the begin of its diagonal; side: the side of the diagonal. */
 SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
@@ -453,8 +460,9 @@ SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
     return vm_xor(half0, half1);
 }
 
-/* Returns the rays that may still meet a quad's patch twice once the discriminant is known: all of them but where it is
- * below zero by more than float32's roundings, which are less than a millionth of its terms. */
+/* Returns the rays that may still meet a quad's patch twice when the discriminant is tested, too. A ray is excluded
+ * only if the discriminant is negative by more than its rounding in float32, which is below a millionth of its
+ * terms. */
 static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const vf y[8], const signed char *loop,
                                                             vm rays, vf across, vf other)
 {
@@ -464,8 +472,9 @@ static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const
     return vm_andnot(rays, vf_lt(b1 * b1 - product, -1e-6f * (most * most + vf_abs(product))));
 }
 
-/* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more. They are not on the
- * same side of opposite edges. loop has the corners 0 to 3 around; side the sides of the edges from 0 to 1 and on. */
+/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_bends() and a few more. loop: corners 0 to
+ * 3 in cyclic order; side[i]: side of the edge from corner i to the next. Only rays that are on different sides of
+ * opposite edges are tested. */
 SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, const vm side[4])
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
@@ -477,8 +486,8 @@ SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed ch
     return __builtin_expect(vm_any(bends), 0) ? kernel_curved_bends_yet(x, y, loop, bends, across, other) : bends;
 }
 
-/* Finds the places where rays meet the patch; the rays of twice meet it in two places or none. Returns how many entries
- * of out are set, 0 to 2. */
+/* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
+ * never. Returns how many entries of out are set, 0 to 2. */
 SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kernel_quad_place out[2])
 {
     const vf zero = vf_set(0);
@@ -497,30 +506,30 @@ SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kern
     return vm_any(out[1].mask) ? 2 : count;
 }
 
-/* ---- quads that look convex, a cell a lane ----
+/* ---- quads that look convex, one cell per lane ----
+ * Seen along a ray, a quad is convex if all its corners turn in the same direction; otherwise it looks folded or
+ * dented. A ray crosses a convex quad once if it is on the same side of all four edges, else never: neither the quad's
+ * diagonal nor the curvature of its patch need be tested. The turn at a corner is p × q of the projected edges p and q
+ * there, which is N · (u, v, 1) with their normal N = p × q in space and the ray's slopes u and v. Over a box of rays
+ * it differs from the middle ray's by at most |Nx| half width + |Ny| half height, which is no more than |p| |q| (half
+ * width + half height).
  *
- * Seen along a ray, a quad's corners turn all one way, or it looks folded or dented. Where they do, the ray crosses the
- * quad once if it is on one side of all four edges, else never: neither the quad's diagonal nor how its patch bends
- * has to be asked as above. The turn at a corner is p × q of the edges p and q there as projected, which is
- * N · (u, v, 1) with their normal N = p × q in space and the ray's slopes u and v. Over a box of rays it is off the
- * middle's by |Nx| half width + |Ny| half height at most, which is no more than |p| |q| (half width + half height).
- *
- * Rounding: let l be the longest edge, h the sum of the largest |u| and |v|, and S a bound of places less origins plus
- * slopes times depth. A projected edge is no longer than k = sqrt(2 + h h) l, as |x| + |y| + h |z|. A vertex projected
- * in float32 is off by two units (6e-8) of S at most, d = 1.2e-7 S; a turn of such vertices by 2 d on each coordinate
- * of both edges: 4 d k + 8 d d. What is computed here are products whose sizes add up to k k at most, each rounded 10
- * times at most: 6e-7 k k. */
+ * Rounding: let l be the longest edge, h the sum of the largest |u| and |v|, and S a bound of positions minus origins
+ * plus slopes times depth. A projected edge is no longer than k = sqrt(2 + h h) l, as |x| + |y| + h |z|. A vertex
+ * projected in float32 errs by at most two units (6e-8) of S, d = 1.2e-7 S; a turn of such vertices errs by 2 d in each
+ * coordinate of both edges: 4 d k + 8 d d. The products that are computed here have magnitudes that sum to at most k k,
+ * and each is rounded at most 10 times: 6e-7 k k. */
 
-/* Rays' slopes and origins across the view, from one end to the other. */
+/* A box of rays: [axis][end] has the slope and origin of the first and the last ray along each axis of the tile. */
 typedef struct kernel_ray_box {
     vf slope[2][2], origin[2][2];
 } kernel_ray_box;
 
-/* A cell's edges as the box's middle ray sees them, and the squares of their lengths in space. */
+/* A cell's edges as seen by the middle ray of the box, and the squares of their lengths in space. */
 typedef struct kernel_seen_edges {
     vf at[12][2], square[12];
-    vf spread; /* half width + half height */
-    vf margin; /* what rounding may make */
+    vf spread; /* half width + half height of the box of slopes */
+    vf margin; /* bound of the rounding of a turn */
 } kernel_seen_edges;
 
 SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_seen_edges *out)
@@ -541,7 +550,7 @@ SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *b
         out->square[n] = (x * x + y * y) + z * z;
         longest = vf_max(out->square[n], longest);
     }
-    /* Any vertex is three edges from the first at most. */
+    /* Every vertex is at most three edges away from the first. */
     const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
     for (int a = 0; a < 2; a++)
         reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
@@ -550,7 +559,8 @@ SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *b
     out->margin = (1e-6f * square + 4.0f * off * vf_sqrt(square)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
 }
 
-/* Lanes whose quad looks convex along all rays of the box. */
+/* Returns the lanes whose quad looks convex along all rays of the box. sides: the quad's edges in cyclic order, and
+ * whether each is reversed. */
 SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed char (*sides)[2])
 {
     const int n[4] = {sides[0][0], sides[1][0], sides[2][0], sides[3][0]};
@@ -567,7 +577,7 @@ SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed ch
     return vm_or(left, right);
 }
 
-/* Bits of the quads that may look other than convex along some ray of the box. */
+/* Returns a mask of the quads that may look other than convex along some ray of the box. */
 SIMD_INLINE vi kernel_curved_dents(vf (*const at)[8], const kernel_ray_box *box, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);

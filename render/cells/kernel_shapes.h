@@ -1,5 +1,5 @@
-/* The shapes of cells with quads, and of tets, as tables: edges, faces and corners. A new cell type goes here, and into
- * kernel_cell_types.h. */
+/* Tables of the shapes of tets, hexes, wedges and pyramids: edges, faces and reference coordinates of vertices. A new
+ * cell type must be added here and in kernel_cell_types.h. */
 #ifndef RENDER_KERNEL_SHAPES_H
 #define RENDER_KERNEL_SHAPES_H
 
@@ -7,11 +7,12 @@
 #include "kernel_cell_types.h"
 #include "simd.h"
 
-/* Edges 01, 02, 03, 12, 13, 23, and the faces without vertex 3, 2, 1, 0: their edges ij, jk and ik. */
+/* A tet's edges as pairs of vertices. */
 enum { KERNEL_TET_EDGES = 6 };
 static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-/* The faces' vertices and edges. */
+/* For each face of a tet (without vertex 3, 2, 1, 0): its vertices i, j, k, then the numbers of its edges ij, jk,
+ * ik. */
 static const signed char kernel_tet_face[4][6] = {
     {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
 
@@ -24,12 +25,14 @@ typedef struct kernel_shape {
     struct {
         int count;
         signed char vertices[4];
-        signed char sides[4][2]; /* edges from each vertex to the next, and whether they are the other way */
+        /* for each side of the face, the number of its edge, and whether the edge runs the other way */
+        signed char sides[4][2];
     } faces[6];
-    float corners[GRID_MAX_CELL_VERTICES][3]; /* the cell's own coordinates of its vertices */
+    float corners[GRID_MAX_CELL_VERTICES][3]; /* reference coordinates of the vertices */
 } kernel_shape;
 
-/* Corners of the pyramid are in the coordinates a = (1-q) r, b = (1-q) s, k = 1-q (see kernel_map.h). */
+/* The shapes of the hex, the wedge and the pyramid. A pyramid's vertices have the coordinates a = (1-q) r, b = (1-q) s,
+ * k = 1-q (kernel_map.h). */
 static const kernel_shape kernel_shapes[3] = {
     {12,
      {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
@@ -66,17 +69,17 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
     return &kernel_shapes[kernel_shape_number(type)];
 }
 
-/* Below this the errors of an edge function's products may be too small for float32. */
+/* Magnitude of an edge function below which errors of its products may be too small to be represented in float32. */
 #define KERNEL_EDGE_LEAST 1e-30f
 
-/* A cell's lines on the rays: the sides of each, whose sign bits are set where they are negative, and the least of all
- * by size. */
+/* The edge functions of a cell on the rays: the sign bit of side[n] is set if function n is negative; `least` is the
+ * smallest magnitude of all. */
 typedef struct kernel_curved_sides {
     vi side[KERNEL_MAX_LINES];
     vf least;
 } kernel_curved_sides;
 
-/* The sides of a face's edges, taken around it; of a triangle the fourth is any. */
+/* Returns the sides of a face's edges in cyclic order. For a triangle the fourth entry is meaningless. */
 SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_curved_sides *s, vi around[4])
 {
     for (int i = 0; i < 4; i++) {
@@ -85,7 +88,7 @@ SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const ke
     }
 }
 
-/* The sides of a quad's edges, taken around it. */
+/* Returns masks of the rays on the negative side of a quad's edges, in cyclic order. */
 SIMD_INLINE void kernel_quad_around(const kernel_shape *shape, int face, const kernel_curved_sides *s, vm out[4])
 {
     vi around[4];
@@ -93,7 +96,7 @@ SIMD_INLINE void kernel_quad_around(const kernel_shape *shape, int face, const k
     for (int i = 0; i < 4; i++) out[i] = vm_sign(around[i]);
 }
 
-/* Tells by its sign bit which rays are on the same side of all edges of a face of count. */
+/* Sets the sign bit for the rays that are on the same side of all edges of a face with `count` edges. */
 SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
 {
     vi differ = (around[0] ^ around[1]) | (around[1] ^ around[2]);
@@ -101,13 +104,13 @@ SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
     return ~differ;
 }
 
-/* The bit of a face where the sign bit is set. */
+/* Returns the bit 1 << face in lanes whose sign bit is set, else 0. */
 SIMD_INLINE vi kernel_face_bit(vi sign, int face)
 {
     return sign >> (31 - face) & vi_set(1 << face);
 }
 
-/* Returns the own coordinate on an axis, 0 or 1, of each ray's corner. */
+/* Returns the reference coordinate on an axis, which is 0 or 1, of each ray's vertex number `corner`. */
 SIMD_INLINE vf kernel_curved_own(const kernel_shape *shape, int count, int axis, vi corner)
 {
     int bits = 0;
@@ -115,8 +118,8 @@ SIMD_INLINE vf kernel_curved_own(const kernel_shape *shape, int count, int axis,
     return vf_from_vi(vi_set(bits) >> corner & 1);
 }
 
-/* Rays whose face of this number, the first or the last of two, is a quad. Faces are in the shape's order, so that of a
- * wedge, whose triangles come first, the last is a quad but where both are triangles; of a pyramid none is. */
+/* Returns the rays whose n-th crossed face (0: the first, 1: the last of two) is a quad. Faces are compared by their
+ * numbers in the shape: a wedge's triangles and a pyramid's quad come first. */
 SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
 {
     const vf number = vf_from_vi(face);
@@ -124,8 +127,8 @@ SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
                            n ? vm_none() : vf_lt(number, vf_set(0.5f)));
 }
 
-/* Calls a function, whose last argument is the type, with a constant for a hex, wedge or pyramid: inlined, it has loops
- * of known lengths. */
+/* Calls a function whose last argument is the cell type with a constant for it: when inlined, its loops have constant
+ * lengths. */
 #define KERNEL_OF_TYPE(type, function, ...)                                                                            \
     KERNEL_BY_SHAPE(type, function(__VA_ARGS__, GRID_HEX), function(__VA_ARGS__, GRID_WEDGE),                          \
                     function(__VA_ARGS__, GRID_PYRAMID))

@@ -1,17 +1,17 @@
-/* Polyhedra taken apart.
+/* Decomposes polyhedra.
  *
- * The caller's mesh says cells -> faces -> vertices. A ray wants the canonical triangles of the surface (each
- * face is cut as polygon.h says), the unique edges, and the centre, which with the triangles spans the tets on which
- * the field is linear. All of this is made when a ray of a tile first meets the cell, and forgotten with the tile: no
- * copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes about 200 v
- * bytes here, some 6 KB for a Voronoi cell of 27 vertices; a store holds STORE_LIMIT of them at most (then it forgets
- * all, and begins again) and one cell more.
+ * The caller's mesh is a list of faces per cell and of vertices per face. Rays need the canonical triangles of the
+ * surface (each face is cut as polygon.h defines), the unique edges, and the centre, which forms with each triangle a
+ * tet on which the field is linear. All of this is computed when a ray of a tile first meets the cell, and deleted with
+ * the tile: no copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes
+ * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. A store holds at most STORE_LIMIT bytes of them
+ * and one cell more; when that is reached, it is emptied.
  *
- * Vertices are sorted by coordinates, triangles by their vertices, edges in the order in which the triangles have them:
- * another numbering of the mesh, another order of the faces or of a face's vertices give the same polyhedron, bit for
- * bit.
+ * Vertices are sorted by coordinates, triangles by their vertices, and edges are in the order in which the triangles
+ * have them. So the polyhedron is the same to the bit for any numbering of the mesh and any order of faces or of a
+ * face's vertices.
  *
- * The sign of a tet is that of its volume, its triangle turned outward (closed_faces.h). */
+ * The sign of a tet is that of its volume, with its triangle oriented outward (closed_faces.h). */
 #include "render_polyhedra.h"
 
 #include <math.h>
@@ -30,10 +30,10 @@ typedef struct store_block {
 
 struct polyhedron_store {
     polyhedron *table[1 << TABLE_BITS];
-    store_block *blocks;  /* the one in use first */
-    store_block *unused;  /* each has the usual size */
-    size_t bytes;         /* in blocks */
-    char *work, *scratch; /* for taking apart; for the kernels */
+    store_block *blocks;  /* list of memory blocks; the block in use comes first */
+    store_block *unused;  /* free blocks, each of BLOCK_BYTES bytes */
+    size_t bytes;         /* size of all blocks in `blocks` */
+    char *work, *scratch; /* buffers for decomposing a cell, and for the kernels' temporary arrays */
     size_t work_bytes, scratch_bytes;
 };
 
@@ -78,7 +78,7 @@ void polyhedra_reset(polyhedron_store *store)
     store->bytes = 0;
 }
 
-/* Takes memory in multiples of the strictest alignment. */
+/* Rounds the size up to a multiple of 64 bytes, the strictest alignment. */
 static size_t rounded(size_t bytes)
 {
     return (bytes + 63) & ~(size_t)63;
@@ -129,20 +129,20 @@ void *polyhedra_scratch(polyhedron_store *store, size_t bytes)
     return grown(&store->scratch, &store->scratch_bytes, bytes);
 }
 
-/* ---- taking apart ---- */
+/* ---- decomposing a cell ---- */
 
 typedef struct work_vertex {
     double position[3], value;
     int64_t vertex;
-    int as_met; /* its number before sorting */
+    int as_met; /* number of the vertex before sorting */
 } work_vertex;
 
-/* Everything about one cell while it is taken apart. */
+/* Temporary data of one cell while it is decomposed. */
 typedef struct work {
     const grid *g;
     const grid_field *field;
     closed_faces faces;
-    int *rank; /* each vertex's, in the order in which they were met */
+    int *rank; /* rank of each vertex by its number before sorting */
     double (*positions)[3];
     work_vertex *vertices;
 } work;
@@ -161,7 +161,7 @@ static int facet_compare(const closed_triangle *a, const closed_triangle *b)
     return 0;
 }
 
-/* Shell's sort: short, and good for the hundred items of a usual cell. */
+/* Defines a Shell sort, which is short, and fast for the hundred items of a typical cell. */
 #define DEFINE_SORT(name, type, compare)                                                                               \
     static void name(type *items, int count)                                                                           \
     {                                                                                                                  \
@@ -178,7 +178,7 @@ static int facet_compare(const closed_triangle *a, const closed_triangle *b)
 DEFINE_SORT(sort_vertices, work_vertex, vertex_compare)
 DEFINE_SORT(sort_facets, closed_triangle, facet_compare)
 
-/* Room for the work; returns how much it is. */
+/* Lays out the temporary arrays in the buffer (NULL: only computes the size). Returns their size in bytes. */
 static size_t lay_out(work *w, char *buffer)
 {
     base_carving at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
@@ -188,7 +188,7 @@ static size_t lay_out(work *w, char *buffer)
     return at.used;
 }
 
-/* Reads the faces and sorts the vertices, whose numbers are then their places in the order. */
+/* Reads the cell's faces and sorts the vertices. In the faces, vertices are then numbered by their rank. */
 static void read_faces(work *w, int64_t cell)
 {
     closed_faces *c = &w->faces;
@@ -208,7 +208,7 @@ static void read_faces(work *w, int64_t cell)
     for (int i = 0; i < c->entry_count; i++) c->entry[i] = w->rank[c->entry[i]];
 }
 
-/* ---- what is kept ---- */
+/* ---- storing the result ---- */
 
 static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
 {
@@ -226,7 +226,7 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
     return at.used;
 }
 
-/* The mean of the vertices, summed in their order. */
+/* Stores the vertices and values in their order, and the centre as their mean, summed in this order. */
 static void keep_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};
@@ -295,7 +295,8 @@ static void keep_facets(work *w, polyhedron *c)
     }
 }
 
-/* The halves of a quad have its smallest vertex, and so are near each other in the order. */
+/* Links the two triangles of each quad. Both contain the quad's smallest vertex, so they are close to each other in the
+ * sorted list. */
 static void keep_twins(polyhedron *c)
 {
     for (int i = 0; i < c->facet_count; i++)

@@ -1,5 +1,5 @@
-/* Polyhedra as kernels want them: taken apart once a tile, into one thread's memory. The essay is in
- * render_polyhedra.c. */
+/* Polyhedra in the form that kernels use. They are decomposed once per tile, into memory of one thread;
+ * render_polyhedra.c explains how. */
 #ifndef RENDER_RENDER_POLYHEDRA_H
 #define RENDER_RENDER_POLYHEDRA_H
 
@@ -7,40 +7,46 @@
 
 #include "grid.h"
 
-/* A triangle of the surface: vertices and edges (ab, bc, ac) by number, a < b < c. */
+/* A triangle of the surface: numbers of its vertices a < b < c, and of its edges ab, bc, ac. */
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
-    int quad;   /* the quad it is half of, or -1, */
-    int twin;   /* and the other half's number */
-    float sign; /* for the tet it spans with the centre: 1, -1 where that lies outside, 0 where it has no volume */
+    int quad;   /* number of the quad of which it is one half, or -1 */
+    int twin;   /* number of the quad's other triangle, or -1 */
+    float sign; /* sign of the volume of the tet with the centre: 1; -1 if the tet is inverted; 0 if it has no volume */
 } polyhedron_facet;
 
-/* Vertices are numbered in the order of coordinates, so that a < b says which of two comes first; the centre is number
- * vertex_count, behind them all. Everything is in an order that depends on coordinates and values alone. */
+/* A decomposed polyhedron. Vertices are numbered in the lexicographic order of coordinates, so that a < b tells which
+ * of two comes first; the centre is number vertex_count, after all others. The order of everything depends on
+ * coordinates and values alone. */
 typedef struct polyhedron {
-    struct polyhedron *next; /* in the store's table */
+    struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
     int part, layer;
     bool is_finite, is_placed, is_constant;
-    bool is_star; /* no sign is negative */
+    bool is_star; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;
     int vertex_count, edge_count, facet_count;
-    double (*world)[3]; /* vertex_count + 1 each, from here */
+    double (*world)[3]; /* arrays from `world` to `lines` have an entry per vertex, and one for the centre */
     double *values;
-    float *x, *y, *z;  /* tile space */
-    float *f, *g;      /* values as the kernels want them; of the colour field */
-    double scale;      /* for the values in f */
-    double fall, rise; /* by how much values change at most along the tile's rays, down and up, a unit of depth */
-    float (*lines)[4]; /* kernel_cell.h: of the edges, then from each vertex to the centre */
-    float least;       /* for all its triangles: kernel_blur_least() */
-    int64_t *vertices; /* vertex_count */
+    float *x, *y, *z; /* vertices in tile space */
+    /* vertex values of the layer's field, relative to an isovalue or in a transfer function's domain; values of the
+     * colour field */
+    float *f, *g;
+    double scale; /* factor by which values in f are scaled */
+    /* maximum rates, per unit of depth, at which values decrease and increase along the tile's rays */
+    double fall, rise;
+    /* edge functions (kernel_cell.h): of the edges, then of the lines from each vertex to the centre */
+    float (*lines)[4];
+    float least;       /* least sum of weights that is accurate enough for all of its triangles (kernel_blur_least()) */
+    int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];
     polyhedron_facet *facets;
-    int (*quads)[4]; /* the corners around of faces of four vertices in as many places */
+    int (*quads)[4]; /* corners in cyclic order of the faces that have four vertices at four different positions */
 } polyhedron;
 
-/* A quad with two neighbouring corners in one place is a triangle, and its neighbour may have it as such. */
+/* Returns whether two neighbouring corners of a quad are at the same position. Such a quad is treated as a triangle,
+ * because the neighbouring cell may have it as a triangle. */
 static inline bool quad_collapses(const double *const corners[4])
 {
     for (int i = 0; i < 4; i++) {
@@ -52,19 +58,21 @@ static inline bool quad_collapses(const double *const corners[4])
 
 typedef struct polyhedron_store polyhedron_store;
 
-/* Makes the store of one thread. Returns NULL where memory ran out. */
+/* Creates the store of one thread. Returns NULL if there is no memory. */
 polyhedron_store *polyhedra_create(void);
 void polyhedra_free(polyhedron_store *store);
 
-/* Forget all. */
+/* Removes all polyhedra from the store; its memory is kept for new ones. */
 void polyhedra_reset(polyhedron_store *store);
 
-/* The cell with the field's values, not placed when it is new. What an earlier call returned may be gone after this
- * one. NULL where memory ran out. layer tells fields apart. */
+/* Returns the polyhedron with the field's values. If it is new, it is not yet in tile space. A pointer that an earlier
+ * call returned may be invalid after this call. layer is part of the key, because layers have different fields. Returns
+ * NULL if there is no memory. */
 polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,
                            uint32_t index);
 
-/* Room for the kernels' own numbers about one cell, 64-byte aligned; the next call may take it back. */
+/* Returns memory for temporary arrays of the kernels, aligned to 64 bytes. The next call may reuse or free it. Returns
+ * NULL if there is no memory. */
 void *polyhedra_scratch(polyhedron_store *store, size_t bytes);
 
 #endif
