@@ -1,6 +1,6 @@
-/* The tables are computed at first use. Most are published as tables (colour_tables.c). ColorBrewer's interpolate their
- * key colours linearly in sRGB, as matplotlib does; cool_to_warm is Moreland's formula in Msh, the polar form of
- * CIELAB, whose middle is neutral without a visible edge. */
+/* The colour tables are computed at first use. Most are published as tables (colour_tables.c). Those of ColorBrewer are
+ * interpolated linearly in sRGB between their key colours, as matplotlib does. cool_to_warm is Moreland's formula in
+ * Msh, the polar form of CIELAB; its middle is a neutral colour without a visible edge. */
 #include "colour_map.h"
 
 #include <pthread.h>
@@ -13,7 +13,8 @@ enum { most_keys = 11 };
 
 typedef float colour_table[COLOUR_TABLE_SIZE][3];
 
-/* Specifications by Cynthia Brewer, colorbrewer.org (Apache-2.0; NOTICE has the words): their longest palettes. */
+/* The longest palettes of ColorBrewer. Specifications by Cynthia Brewer, colorbrewer.org (Apache-2.0; the file NOTICE
+ * has the licence's text). */
 typedef struct brewer_palette {
     const char *name;
     int key_count;
@@ -83,7 +84,8 @@ static void fill_palette(colour_table table, const brewer_palette *palette)
     }
 }
 
-/* Fills a table between two saturated ends, through the neutral middle of colour_between(). */
+/* Fills a table from one saturated colour to another, by Moreland's interpolation through a neutral colour in the
+ * middle. */
 static void fill_diverging(colour_table table, unsigned low, unsigned high)
 {
     double ends[2][3];

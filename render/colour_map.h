@@ -1,8 +1,8 @@
-/* The built-in colour maps, by name. */
+/* Provides the built-in colour maps by name. */
 #ifndef RENDER_COLOUR_MAP_H
 #define RENDER_COLOUR_MAP_H
 
-/* Every map: the suffix of its constant, and its name. */
+/* Lists every built-in map: the suffix of its constant, and its name. */
 #define COLOUR_MAPS(X)                                                                                                 \
     X(VIRIDIS, "viridis")                                                                                              \
     X(PLASMA, "plasma")                                                                                                \

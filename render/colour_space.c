@@ -15,7 +15,8 @@ static double mix(double a, double b, double share)
 
 /* ---- CIELAB ---------------------------------------------------------------------------------------------------- */
 
-/* sRGB's primaries and white D65: linear RGB to XYZ over the white point, and its inverse. */
+/* Matrices from linear RGB, with sRGB's primaries and white point D65, to XYZ and back; and the XYZ of that white
+ * point. */
 static const double xyz_from_rgb[3][3] = {
     {0.4124564, 0.3575761, 0.1804375}, {0.2126729, 0.7151522, 0.0721750}, {0.0193339, 0.1191920, 0.9503041}};
 static const double rgb_from_xyz[3][3] = {
@@ -68,7 +69,7 @@ static void between_lab(const double a[3], const double b[3], double share, floa
 
 /* ---- Moreland's diverging interpolation ------------------------------------------------------------------------ */
 
-/* m: distance from black, s: angle from the grey axis, h: hue. */
+/* A colour in the polar form of CIELAB. m: distance from black; s: angle from the grey axis; h: hue. */
 typedef struct msh {
     double m, s, h;
 } msh;
@@ -91,8 +92,8 @@ static void linear_from_msh(msh colour, float linear[3])
     linear_from_lab(lab, linear);
 }
 
-/* Returns the hue that a neutral colour of distance m has on the side of a saturated one, so that the hue does not
- * rotate on the path between them. */
+/* Returns the hue to use for a neutral colour at distance m from black, on the path from a saturated colour, so that
+ * the hue does not rotate along the path. */
 static double neutral_hue(msh end, double m)
 {
     if (end.m >= m - 0.1) return end.h;

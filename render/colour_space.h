@@ -1,4 +1,4 @@
-/* Interpolation between two colours, and tables of colours through points. */
+/* Interpolates between two colours, and fills tables of colours through given points. */
 #ifndef RENDER_COLOUR_SPACE_H
 #define RENDER_COLOUR_SPACE_H
 
@@ -17,8 +17,8 @@ void colour_between(colour_space space, const double a[3], const double b[3], do
 double colour_linear_of(double srgb);
 
 typedef struct colour_point {
-    double at;      /* monotonically increasing */
-    double srgb[3]; /* in [0, 1] */
+    double at;      /* position of the colour; positions of a list increase or stay equal */
+    double srgb[3]; /* sRGB components in [0, 1] */
 } colour_point;
 
 /* Returns how many entries an evenly spaced table through the points (2 or more) should have: 256 or a few more if the

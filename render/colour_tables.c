@@ -1,10 +1,11 @@
-/* Published colour tables, 256 entries each, sRGB: 16 bits a channel, red the highest. Rounded to 8 bits they are the
- * published codes.
+/* Published colour tables of 256 entries each, in sRGB with 16 bits per channel, red in the highest bits. Rounded to 8
+ * bits they are the published codes.
  *
  * viridis, plasma, inferno, magma: van der Walt and Smith, 2015 (CC0). cividis: Nunez, Anderton and Renslow, 2018.
  * turbo: Mikhailov, 2019 (Apache-2.0). Their numbers are those of matplotlib 3.6.3. batlow: Crameri, Scientific Colour
- * Maps 7.0.1 (MIT), published as codes; the numbers here are the smoothest that are within 0.45 of a code of them, as
- * volumes take the longer the more a table bends. NOTICE has the licences' words. */
+ * Maps 7.0.1 (MIT), which is published with 8 bits; the numbers here are the smoothest within 0.45 of the published
+ * codes, because volumes are slower the more often a table's slope changes. The file NOTICE has the texts of the
+ * licences. */
 #include "colour_tables.h"
 
 #include <stddef.h>

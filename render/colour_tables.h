@@ -1,4 +1,4 @@
-/* Colour tables as they were published. */
+/* Colour tables that were published as tables. */
 #ifndef RENDER_COLOUR_TABLES_H
 #define RENDER_COLOUR_TABLES_H
 
@@ -6,8 +6,8 @@
 
 enum { COLOUR_TABLE_SIZE = 256 };
 
-/* Returns COLOUR_TABLE_SIZE entries, sRGB of 16 bits per channel, red the highest of 48; NULL if no table of this name
- * has been published. */
+/* Returns COLOUR_TABLE_SIZE entries in sRGB with 16 bits per channel, red in the highest of the lower 48 bits; NULL if
+ * there is no published table of this name. */
 const uint64_t *colour_published_table(const char *name);
 
 #endif

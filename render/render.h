@@ -31,11 +31,15 @@
 
 typedef struct render_camera {
     double eye[3];
-    double right[3], up[3], forward[3]; /* orthonormal, right-handed: right × up = -forward */
-    double half_height;                 /* perspective: tangent of half the vertical angle; else half the height */
+    /* camera axes in world coordinates: orthonormal and right-handed, right × up = -forward */
+    double right[3], up[3], forward[3];
+    /* perspective: tangent of half the vertical angle of view; orthographic: half the picture's height in scene
+     * units */
+    double half_height;
     bool is_orthographic;
     int width, height;
-    double offset[2]; /* offset of every ray from its pixel's centre, in pixels, to the right and down; 0 by default */
+    /* offset of every ray from its pixel's centre, in pixels, positive to the right and down; 0 by default */
+    double offset[2];
 } render_camera;
 
 /* Computes the offset of sample k of count (1, 2, 4, 8 or 16) in a pixel. Along either axis the samples are evenly
@@ -51,18 +55,19 @@ bool render_camera_look_at(render_camera *camera, const double eye[3], const dou
  * has length 1 along forward, not length 1. */
 void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3]);
 
-/* The space of float32 numbers. Positions are taken relative to origin and multiplied by scale, a power of two that
- * scales the scene to a size near 1. The trees have the same origin and scale. */
+/* The coordinate space of float32 positions. World positions are taken relative to origin and multiplied by scale, a
+ * power of two that brings the scene to a size near 1. The trees use the same origin and scale. */
 typedef struct render_space {
     double origin[3];
     double scale;
-    double depth_origin; /* z at which t = 0 */
+    double depth_origin; /* depth z from the eye's plane at which the ray parameter t is 0 */
 } render_space;
 
-/* The spacing of values along a colour table: linear; by the logarithm, for which low > 0; or by render_scaled(). */
+/* The spacing of values along a colour table: linear, logarithmic (for which low > 0), or symmetric logarithmic
+ * (render_scaled()). */
 typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_scale;
 
-/* The scale's function s, which is monotone, and its inverse. RENDER_LOG: ln value, -infinity if value <= 0.
+/* Compute the scale's function s, which is monotone, and its inverse. RENDER_LOG: ln value, -infinity if value <= 0.
  * RENDER_SYMLOG: value / threshold for |value| <= threshold (> 0); 1 + ln(value / threshold) above, and the negative
  * mirror image below, so that s and its slope are continuous. */
 double render_scaled(render_scale scale, double threshold, double value);
@@ -75,19 +80,23 @@ double render_unscaled(render_scale scale, double threshold, double scaled);
  * and high. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
-    int colour_count;     /* >= 2 */
-    const float *colours; /* colour_count × 3 */
+    int colour_count;     /* number of entries in the colour table, >= 2 */
+    const float *colours; /* colour table: colour_count × 3 numbers, linear RGB */
     render_scale scale;
-    double threshold; /* for RENDER_SYMLOG, > 0 */
-    /* surfaces only: colours are those of bands of equal width, not interpolated; colour_count may be 1 */
+    double threshold; /* end of the linear part of RENDER_SYMLOG, > 0; unused by other scales */
+    /* For surfaces only: colours belong to bands of equal width and are not interpolated; colour_count may then be
+     * 1. */
     bool is_banded;
-    /* surfaces only: 3 × 3, the colours below low, above high, and of NaN; values within RENDER_END of an end belong to
-     * the range. NULL: the colours of low and high, and RENDER_NO_COLOUR */
+    /* For surfaces only: the colours of values below low, above high, and of NaN, 3 numbers each. Values within
+     * RENDER_END of an end belong to the range. NULL: such values get the colours of low and high, and
+     * RENDER_NO_COLOUR. */
     const float *outside;
-    int opacity_count; /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
+    /* number of opacity points, 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, whose transfer functions have no
+     * opacity */
+    int opacity_count;
     const double *opacity_values;
     const float *opacities;
-    double unit_distance; /* scene units, > 0 */
+    double unit_distance; /* length to which opacities refer, in scene units, > 0 */
 } render_transfer;
 
 enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 64, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
@@ -97,8 +106,8 @@ enum { RENDER_MAX_CLIPS = 32 };
 enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
 typedef struct render_light {
-    double direction[3]; /* from the surface towards the light; unit length; world */
-    float colour[3];     /* linear, intensity included */
+    double direction[3]; /* unit vector from the surface towards the light, in world axes */
+    float colour[3];     /* linear RGB, multiplied by the light's intensity */
 } render_light;
 
 /* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, with n towards the
@@ -112,99 +121,112 @@ static inline bool render_takes_light(const render_material *m)
     return m->diffuse != 0 || m->specular != 0;
 }
 
-/* One field over all parts: fields[i] and ranges[i] belong to parts[i]. ranges[i].low NULL: not on that part. */
+/* One field over all mesh parts: fields[i] and ranges[i] belong to parts[i]. If ranges[i].low is NULL, the field does
+ * not exist on that part. */
 typedef struct render_field {
     const grid_field *fields;
     const mmbvh_ranges *ranges;
 } render_field;
 
 typedef enum render_normal {
-    RENDER_GRADIENT,    /* the gradient in the cell that holds the hit */
-    RENDER_DIFFERENCES, /* central ones (thesis, 4.3.4): one-sided where a sample is in no cell, the cell's gradient
-                           where an axis has neither. Over this rank's cells, or with the job's waiting over those of
-                           all */
-    RENDER_VERTEX /* gradients that the caller gives at the vertices, interpolated in the hit's cell as values are */
+    RENDER_GRADIENT, /* the field's gradient in the cell that contains the hit */
+    /* Central differences of the field (thesis, section 4.3.4). The difference is one-sided if one of its samples is in
+     * no cell; the cell's own gradient is used along an axis without samples. Samples come from this rank's cells, or,
+     * if the job has a list `waiting`, from those of all ranks. */
+    RENDER_DIFFERENCES,
+    RENDER_VERTEX /* gradients that the caller gives at the vertices, interpolated in the hit's cell like values */
 } render_normal;
 
 enum { RENDER_DIFFERENCE_SAMPLES = 6 };
 
-/* A hit of RENDER_DIFFERENCES that needs samples of other ranks (render_differences.h). 16 bytes. */
+/* A hit with a normal from RENDER_DIFFERENCES that needs samples of other ranks (render_differences.h). It takes 16
+ * bytes. */
 typedef struct render_waiting_hit {
-    uint32_t pixel, kind; /* those of its future fragment */
-    float t, reach;       /* reach: distance of its samples along each axis, before and behind it; scaled units */
+    uint32_t pixel, kind; /* pixel and kind of the fragment that will be made of the hit */
+    /* reach: distance from the hit to its samples, which lie before and behind it along each axis; scaled units */
+    float t, reach;
 } render_waiting_hit;
 
-/* The look of such a hit: the cell's gradient in camera axes, and the unlit colour. */
+/* What is needed to light such a hit: the gradient in its own cell, in camera axes, and its unlit colour. */
 typedef struct render_waiting_look {
     float normal[3], colour[3];
 } render_waiting_look;
 
-/* Growing lists of hits and looks, of equal count; memory from memory.h. */
+/* Growing lists of hits and their looks, with the same count. Memory comes from memory.h. */
 typedef struct render_waiting_list {
     render_waiting_hit *items;
     render_waiting_look *looks;
     int64_t count, capacity;
 } render_waiting_list;
 
-/* The samples around a hit: before and behind it along the first axis, the second, the third. 32 bytes. */
+/* The samples around a hit: before and behind it along the first axis, then along the second and the third. They take
+ * 32 bytes. */
 typedef struct render_samples_about {
-    uint32_t found, unused; /* found: a bit per sample, set if a cell contains its point */
+    uint32_t found, unused; /* found: one bit per sample, set if some cell contains the sample's point */
     float values[RENDER_DIFFERENCE_SAMPLES];
 } render_samples_about;
 
-/* Transmittance that marks placeholder fragments of such hits while a frame is traced. */
+/* Value of `transmittance` that marks the placeholder fragments of these hits while a frame is traced. */
 #define RENDER_WAITS 2.0f
 
-/* Range of each surface's field over all ranks, low > high if no rank has it; and the list of hits that need
- * samples. */
+/* The value range of each surface's field over all ranks (low > high if no rank has the field), and the list of hits
+ * that need samples of other ranks. */
 typedef struct render_waiting {
     double ranges[RENDER_MAX_ISOVALUES][2];
     render_waiting_list list;
 } render_waiting;
 
-/* Gradients at a part's vertices, of any length. Each vertex of the cells that the layer's isovalues cross has one. */
+/* Gradients at the vertices of a mesh part, of any length. All vertices of cells that the layer's isovalues cross have
+ * one. */
 typedef struct render_vertex_gradients {
-    const int32_t *entries;      /* by vertex: index into gradients; -1: none. NULL: the part has no such cells */
-    const float (*gradients)[3]; /* world axes */
+    /* per vertex, its index into gradients, or -1 if it has none; NULL if the part has no crossed cells */
+    const int32_t *entries;
+    const float (*gradients)[3]; /* gradients in world axes */
 } render_vertex_gradients;
 
-/* Contour lines on a surface: the share of a pixel that one covers takes its colour, before light falls on it. Lines
- * that are less than two widths apart fade. */
+/* Contour lines on a surface. A line replaces the hit's colour, before lighting, by the share of the pixel that it
+ * covers. Lines that are less than two widths apart fade. */
 typedef struct render_lines {
-    render_field field;   /* vertex-centred, with values (or NaN) on every part that has the surface; ranges not looked
-                             at */
-    int count;            /* 1 .. RENDER_MAX_LINES */
-    const double *values; /* rising */
-    float width;          /* pixels, > 0 */
-    const float *colours; /* count × 3, linear; NULL: the hit's own */
-    bool is_alone; /* nothing of the surface is seen but lines: hits beside them are none, and if it is transparent, a
-                      hit's opacity is the layer's times the share. The material takes no light */
+    /* The field whose contours are drawn, vertex-centred. It must have values (or NaN) on every part that has the
+     * surface; its ranges are not used. */
+    render_field field;
+    int count;            /* number of lines, 1 .. RENDER_MAX_LINES */
+    const double *values; /* value of the field on each line, in increasing order */
+    float width;          /* width of the lines in pixels, > 0 */
+    /* colour of each line: count × 3 numbers, linear RGB; NULL: lines have the surface's own colour */
+    const float *colours;
+    /* Only the lines of the surface are drawn: hits beside them are discarded. If the surface is transparent, a hit's
+     * opacity is the layer's times the share of the pixel that a line covers. The material must not take light. */
+    bool is_alone;
 } render_lines;
 
 typedef struct render_surface_layer {
-    render_field field; /* vertex-centred */
+    render_field field; /* the field whose isosurfaces are drawn; vertex-centred */
     int value_count;
-    const double *values; /* isovalues */
-    const float *colours; /* value_count × 3, linear; used if colour_map is NULL */
-    /* used if colour_map is set: vertex- or cell-centred, with values on every part that has the surface; its ranges
-     * are not read */
+    const double *values; /* isovalues of the surface */
+    const float *colours; /* colour of each isovalue: value_count × 3 numbers, linear RGB; used if colour_map is NULL */
+    /* The field that colours the surface if colour_map is set: vertex- or cell-centred, with values on every part that
+     * has the surface. Its ranges are not used. */
     render_field colour_field;
     const render_transfer *colour_map;
-    float opacity; /* 0 .. 1; 1 ends the ray */
+    float opacity; /* opacity of the surface, 0 .. 1; at 1 it ends the ray */
     render_material material;
     render_normal normal;
-    double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
-    const render_vertex_gradients *gradients; /* for RENDER_VERTEX: part by part */
-    const render_lines *lines;                /* NULL: none */
-    float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
-                         of three such vertices or pyramids on four */
-    float edge_colour[3]; /* linear */
-    /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that meets the face
-     * only in an edge, and so is in the cell for no length, hits it too */
+    /* distance h between a hit and its samples for central differences, in sizes of the hit's cell (the cube root of
+     * its bounding box's volume), > 0 */
+    double difference;
+    const render_vertex_gradients *gradients; /* gradients at the vertices of each part; used by RENDER_VERTEX */
+    const render_lines *lines;                /* contour lines on the surface; NULL if there are none */
+    /* Width in pixels of lines along cell edges whose two vertices lie in the surface; 0: no lines. Cells must be tets
+     * with three such vertices or pyramids with four. */
+    float edge_width;
+    float edge_colour[3]; /* colour of these edges, linear RGB */
+    /* Set if the surface consists of faces of its cells, which are below the isovalue elsewhere. A ray that meets such
+     * a face only in an edge, and so has an interval of length zero in the cell, then also hits it. */
     bool is_of_faces;
-    uint32_t clips; /* the job's clips that cut it, one bit each */
-    /* for rays from hits (render_light.h): a cell that is met nearer to the hit than this many sizes of the cell does
-     * not block; 0: every cell blocks */
+    uint32_t clips; /* clips of the job that cut the surface: bit i stands for clips[i] */
+    /* For rays from hits (render_light.h): a cell blocks such a ray only if it is met farther from the hit than this
+     * number of cell sizes; 0: every cell blocks. */
     float contact;
 } render_surface_layer;
 
@@ -213,29 +235,29 @@ typedef struct render_volume_layer {
     const render_transfer *transfer;
 } render_volume_layer;
 
-/* Rounding may move a value at an end of the range by this share of the colour table's length. */
+/* Share of the colour table's length by which rounding may move a value that is at an end of the range. */
 #define RENDER_END 4e-6f
 
-/* Linear grey of surfaces where their colour field is NaN: a scene's colour of 0.6 in float. */
+/* Linear grey level of surfaces at points at which their colour field is NaN. It is the sRGB colour 0.6 in float. */
 #define RENDER_NO_COLOUR 0.318546802f
 
-/* A mesh of this rank. */
+/* A mesh of this rank, which is one part of the scene. */
 typedef struct render_part {
     const grid *cells;
-    const mmbvh *tree; /* over cells; it has the space's origin and scale */
-    /* Loops of vertices, for layers with edges. If loops[cell] is 0, every edge between the cell's vertices in the
-     * surface is drawn; else the cell is one triangle of a polygon, whose corner count is at loops[loops[cell]] and
-     * whose corners follow. NULL: there are no polygons. */
+    const mmbvh *tree; /* min-max tree over the cells, in the coordinates of the job's space */
+    /* Vertex loops of polygons, for layers with edge lines. If loops[cell] is 0, every edge between vertices in the
+     * surface is drawn. Otherwise the cell is one triangle of a polygon: loops[loops[cell]] is the polygon's number of
+     * corners, and its corners follow. NULL: the mesh has no polygons. */
     const int64_t *loops;
 } render_part;
 
-/* How tiles of 16 x 16 rays find their visible cells. The picture is the same to the last bit; only the speed differs.
- * Pictures by segments may differ by the order of segments that begin at the same t, by 5e-7 at most. */
+/* The method by which tiles of 16 x 16 rays find their visible cells. The picture is the same to the last bit; only the
+ * speed differs. Pictures by segments may differ by the order of segments that begin at the same t, by at most 5e-7. */
 typedef enum render_traversal {
-    /* isosurfaces and a single volume: one traversal for the whole picture, and cells are binned by tile, unless too
-     * many are visible; several volumes as by RENDER_TILES */
+    /* One traversal finds the cells of isosurfaces and of a single volume for the whole picture, and bins them by tile.
+     * If too many cells are visible, or the job has several volumes, tiles traverse the trees as with RENDER_TILES. */
     RENDER_BINNED,
-    RENDER_TILES /* one traversal per tile */
+    RENDER_TILES /* each tile traverses the trees */
 } render_traversal;
 
 /* The method that integrates volumes: samples (thesis, 4.4), whose error depends on the step, or segments, which are
@@ -243,38 +265,40 @@ typedef enum render_traversal {
  * several volumes need separate_samples: without it several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 
-/* Error allowed to mixed segments if the job gives no max_error. */
+/* Error allowed to mixed segments, in linear light, if the job gives no max_error. */
 #define RENDER_MIXING_ERROR 1e-4
 
 typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_SPHERE } render_clip_kind;
 
-/* A half space, box or sphere that clips layers: only what lies inside it is drawn, or outside it if is_outside is
- * set. */
+/* A half space, box or sphere that clips layers: only what lies inside it is drawn, or only what lies outside if
+ * is_outside is set. */
 typedef struct render_clip {
     render_clip_kind kind;
     bool is_outside;
-    double normal[3], distance; /* plane: normal . position <= distance; world, any length but 0 */
-    double lower[3], upper[3];  /* box */
-    double centre[3], radius;   /* sphere */
+    /* half space normal . position <= distance, in world coordinates; the normal has any length but 0 */
+    double normal[3], distance;
+    double lower[3], upper[3]; /* opposite corners of a box, in world coordinates */
+    double centre[3], radius;  /* centre and radius of a sphere, in world coordinates */
 } render_clip;
 
-/* What hits are painted with: their colours, lit or not; or numbers of the pixel's nearest surface as red, green and
- * blue. With numbers, surfaces must be opaque and there must be no volumes. */
+/* What the fragments of hits contain: lit or unlit colours, or numbers of the pixel's nearest surface as red, green and
+ * blue. With numbers, all surfaces must be opaque and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
-    RENDER_UNLIT,   /* of surfaces that take light, colours before it falls on them; in the place of t_out and
-                       transmittance the normal, from which render_light_fragment() makes those of RENDER_LIGHT
-                       (render_light.h) */
-    RENDER_NORMALS, /* the unit normal that light falls on, towards the eye, in world axes */
-    RENDER_VALUES   /* the value that colours the surface, or where none does its isovalue; and the number of the
-                       isovalue among the job's */
+    /* Surfaces that take light get their colours before lighting, and their normal in place of t_out and transmittance.
+     * render_light_fragment() computes from these the fragments that RENDER_LIGHT would have given (render_light.h). */
+    RENDER_UNLIT,
+    RENDER_NORMALS, /* the unit normal in world axes, on the side of the eye */
+    /* the value of the colour field, or the isovalue if there is none; and the index of the isovalue among the job's */
+    RENDER_VALUES
 } render_paint;
 
-/* The shadows and ambient occlusion of hits painted RENDER_UNLIT: render_light.h. */
+/* Parameters of shadows and ambient occlusion, for hits painted RENDER_UNLIT (render_light.h). */
 typedef struct render_occlusion {
-    uint32_t lights; /* lights that cast shadows, one bit each */
-    int samples;     /* for ambient occlusion: number of rays per hit, 0 .. 64; 0: none */
-    double radius;   /* for ambient occlusion: distance beyond which surfaces do not block; scene units, > 0 */
+    uint32_t lights; /* lights that cast shadows: bit i stands for lights[i] */
+    int samples;     /* number of rays per hit for ambient occlusion, 0 .. 64; 0: no ambient occlusion */
+    /* distance beyond which surfaces do not occlude a hit's rays into the hemisphere; scene units, > 0 */
+    double radius;
 } render_occlusion;
 
 typedef struct render_job {
@@ -282,59 +306,63 @@ typedef struct render_job {
     render_space space;
     const render_part *parts;
     int part_count;
-    const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: all parts are traversed */
+    /* tree over the parts' bounding boxes (mmbvh_build_boxes); NULL: all parts are traversed one by one */
+    const mmbvh *parent;
     const render_surface_layer *surfaces;
-    int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
+    /* number of surface layers; all of them together may have at most RENDER_MAX_ISOVALUES isovalues */
+    int surface_count;
     render_paint paint;
-    const render_occlusion *occlusion; /* for RENDER_UNLIT */
-    /* NULL: RENDER_DIFFERENCES are computed at once; else its hits are added to the list instead of becoming fragments,
-     * except those of polyhedra. Not with RENDER_VALUES */
+    const render_occlusion *occlusion; /* shadows and ambient occlusion; used by RENDER_UNLIT */
+    /* NULL: normals by RENDER_DIFFERENCES are computed at once from this rank's cells. Otherwise such hits, except
+     * those of polyhedra, are added to its list instead of becoming fragments. Not allowed with RENDER_VALUES. */
     render_waiting *waiting;
     render_traversal traversal;
     const render_volume_layer *volumes;
     int volume_count;
-    int clip_count;           /* at most RENDER_MAX_CLIPS */
-    const render_clip *clips; /* layers have sets of them, with bit i for clips[i] */
-    uint32_t volume_clips;    /* clips of all volumes */
+    int clip_count;           /* number of clips, at most RENDER_MAX_CLIPS */
+    const render_clip *clips; /* the clips; layers refer to them by bit sets, in which bit i stands for clips[i] */
+    uint32_t volume_clips;    /* clips that cut all volumes: bit i stands for clips[i] */
     const render_light *lights;
     int light_count;
-    double step; /* distance between samples, scene units, > 0; volumes only */
+    double step; /* distance between the samples of volumes, in scene units, > 0 */
     render_integration integration;
-    /* for segments: > 0: cells other than tets are cut so that no channel of a pixel errs by more, in linear light; 0:
-     * into parts no longer than step */
+    /* Error bound for segments. > 0: intervals in cells other than tets are divided until no channel of a pixel errs by
+     * more, in linear light. 0: they are divided into parts no longer than step. */
     double max_error;
-    /* with max_error: upper bound of the length of rays in the cells of all ranks, in scene units; the same on all
-     * ranks, so that all cut alike. 0: the bound for this rank's cells */
+    /* Upper bound of the length of rays in the cells of all ranks, in scene units; used with max_error. It must be the
+     * same on all ranks, so that all divide intervals in the same way. 0: the bound for this rank's cells is used. */
     double extent;
-    /* samples of a ray that are looked up together, 1 .. RENDER_MAX_GROUP: N of the thesis's sample position packets
-     * (4.4.1) */
+    /* number of samples of a ray that are looked up together, 1 .. RENDER_MAX_GROUP: the N of the thesis's sample
+     * position packets (section 4.4.1) */
     int sample_group;
-    bool jitter;   /* the offset of a ray's first sample is a hash of pixel and frame; else 1/2 */
-    int frame;     /* 0 .. : number of the accumulated frame */
-    bool is_alone; /* no other rank holds cells: all samples of a ray may go into one fragment */
-    /* Pixels to trace (pixel_set.h); NULL: all. */
+    /* Set if the position of a ray's first sample is a hash of pixel and frame; otherwise it is half a step. */
+    bool jitter;
+    int frame;     /* number of this frame among those that are averaged, from 0 on */
+    bool is_alone; /* Set if no other rank holds cells: all samples of a ray may then be blended into one fragment. */
+    /* Set of the pixels to trace (pixel_set.h); NULL: all pixels. */
     const unsigned char *pixels;
-    /* every sample of every cell and volume becomes a fragment of length 0, every segment one or several fragments that
-     * compositing can mix */
+    /* Set if each sample of each cell and volume becomes a fragment of length 0, and each segment one or several
+     * fragments, which compositing can mix. */
     bool separate_samples;
-    /* the fragments of a volume, of which there is one, are the fold of this rank's samples or segments
-     * (fragment_fold.h); not with separate_samples */
+    /* Set if the fragments of the volume, of which there must be only one, are folds of this rank's samples or
+     * segments, which do not depend on the partition (fragment_fold.h). Not allowed with separate_samples. */
     bool reproducible;
-    int threads; /* >= 1; 0: OpenMP's default */
+    int threads; /* number of threads, >= 1; 0: OpenMP's default */
 } render_job;
 
 typedef struct render_statistics {
-    int64_t rays; /* number of rays traced: one per pixel */
+    int64_t rays; /* number of traced rays, one per pixel */
     int64_t map_failures;
-    int64_t volume_cells; /* cells that tiles transformed for volumes, counted once per tile and window of depth */
+    int64_t volume_cells; /* cells that were transformed for volumes, counted once per tile and window of depth */
     double surface_ms, volume_ms;
 } render_statistics;
 
-/* Returns the offset in [0, 1) of a pixel's samples in a frame. */
+/* Returns the position in [0, 1) of a pixel's first sample in a frame, in steps. It is a hash of both numbers. */
 double render_jitter(uint32_t pixel, uint32_t frame);
 
-/* Intervals of visible values: a cell whose range, rounded to float, meets none of them is invisible. For a transfer
- * function they are the ranges that are not transparent; returns their number, at most RENDER_MAX_INTERVALS. */
+/* Compute intervals of visible values: a cell whose range, rounded to float, meets none of them is invisible. The first
+ * returns the interval of an isovalue. The second computes the intervals in which a transfer function is not
+ * transparent, and returns their number, at most RENDER_MAX_INTERVALS. */
 mmbvh_interval render_isovalue_interval(double value);
 int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
@@ -353,8 +381,8 @@ insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, vo
 const char *render_isa(void);
 const char *render_isa_warning(void);
 
-/* A box around a rank's cells that may matter to hits of other ranks. Ranks exchange these boxes to find the ranks that
- * a hit needs. Scene units; empty if lower > upper. */
+/* A bounding box of those cells of a rank that may affect hits of other ranks. Ranks exchange these boxes to find which
+ * ranks a hit needs. It is in scene units, and empty if lower > upper. */
 typedef struct render_box {
     double lower[3], upper[3];
 } render_box;

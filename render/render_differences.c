@@ -1,4 +1,5 @@
-/* Threads process hits chunk by chunk, so that cells fetched for one hit are cached for its neighbours. */
+/* CHUNK_HITS: number of hits that a thread processes at once, so that cells fetched for one hit are cached for its
+ * neighbours. SORTED_HITS: number of hits that are sorted at once. */
 #include "render_differences.h"
 
 #include <math.h>
@@ -28,7 +29,7 @@ void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_I
     for (int i = 0; i < job->surface_count; i++) render_surface_range(job, i, ranges[i]);
 }
 
-/* ---- which ranks to ask -------------------------------------------------------------------------------------- */
+/* ---- selection of ranks ----------------------------------------------------------------------------------------- */
 
 static bool is_by_differences(const render_surface_layer *layer)
 {
@@ -40,18 +41,20 @@ render_box render_differences_box(const render_job *job)
     return hit_box(job, is_by_differences);
 }
 
-/* Margin in scaled units, in which the size of a scene is about 1: points and float32 boxes have smaller errors. */
+/* Margin in scaled units, in which the size of a scene is about 1. The errors of points and of float32 boxes are
+ * smaller. */
 static const double box_margin = 1e-5;
 
-/* Tests whether one bar of the cross meets the box. The points are the ends of a cross around the hit, two reaches
- * wide. */
+/* The six sample points are the ends of a cross around the hit, whose three bars are two reaches long. The test is
+ * whether one of the bars meets the box. */
 bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
     const double reach = (double)hit->reach / job->space.scale, margin = box_margin / job->space.scale;
     double base[3], direction[3];
-    /* number of axes along which the hit is outside the box, and along which even the arms are */
+    /* beside: number of axes along which the hit is outside the box; beyond: number of axes along which the whole cross
+     * is outside. */
     int beside = 0, beyond = 0;
     render_camera_ray(&job->camera, (int)(hit->pixel % width), (int)(hit->pixel / width), base, direction);
     for (int a = 0; a < 3; a++) {
@@ -66,7 +69,7 @@ bool render_differences_meet(const render_job *job, const render_waiting_hit *hi
 /* ---- order ----------------------------------------------------------------------------------------------------- */
 
 typedef struct place_of_hit {
-    uint64_t tile; /* tile, and block in the tile */
+    uint64_t tile; /* number of the tile, and of the block in the tile */
     uint32_t kind, within;
     int64_t index;
 } place_of_hit;
@@ -127,7 +130,7 @@ typedef struct chunk_work {
     int threads;
     const render_waiting_hit *hits;
     render_samples_about *samples;
-    const render_waiting_list *list; /* hits to light; NULL: samples are taken */
+    const render_waiting_list *list; /* hits to be lit; NULL if samples are to be taken */
     const render_samples_about *merged;
     fragment *out;
 } chunk_work;
@@ -193,7 +196,7 @@ insitu_status render_differences_light(const render_job *job, const render_waiti
                                        const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
                                        base_error *error)
 {
-    /* Hits, samples and fragments then have the same indices, from 0 on. */
+    /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
     const render_waiting_list some = {list->items + first, list->looks + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;

@@ -1,11 +1,11 @@
-/* Normals by central differences whose samples lie in the cells of any rank.
+/* Computes normals by central differences whose samples lie in the cells of any rank.
  *
- * A frame whose job has a waiting list is traced first; its hits by differences are added to that list. Around each hit
- * six samples are taken, in this rank's cells and by every rank whose box contains one of their points. The samples are
- * merged, and their differences are the normal with which the hit is lit. Each rank computes the hit's pixel, tile and
- * ray from the camera, which all ranks have, and samples in the same tile space as the rank of the hit. So the result
- * has the same bits as on one rank with all cells. Where cells overlap, the sample is the minimum of their values, on
- * whichever ranks they are. */
+ * A frame whose job has a waiting list is traced first; its hits with normals by differences are added to that list.
+ * Around each hit six samples are taken, in this rank's cells and by every rank whose box contains one of their points.
+ * The samples are merged, and their differences give the normal with which the hit is lit. Each rank computes the hit's
+ * pixel, tile and ray from the camera, which all ranks have, and samples in the same tile space as the rank of the hit.
+ * So the result has the same bits as on one rank with all cells. If cells overlap, the sample is the minimum of their
+ * values, on whichever ranks they are. */
 #ifndef RENDER_RENDER_DIFFERENCES_H
 #define RENDER_RENDER_DIFFERENCES_H
 
@@ -17,17 +17,17 @@
 /* Returns the bounding box of all cells on this rank that may contain samples. */
 render_box render_differences_box(const render_job *job);
 
-/* Returns whether the job may have hits that need samples of other ranks. */
+/* Returns whether the job has surfaces whose hits may need samples of other ranks. */
 bool render_has_differences(const render_job *job);
 
 /* Computes the range of each surface's field on this rank; the ranges over all ranks are reduced from these. */
 void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2]);
 
-/* Sorts the hits so that neighbouring pixels' are together, only for speed. Returns false and keeps the order if memory
- * ran out. */
+/* Sorts the hits by tile and block, so that hits of neighbouring pixels are adjacent, which only matters for speed.
+ * Returns false and keeps the order if memory ran out. */
 bool render_differences_sort(const render_job *job, render_waiting_list *list);
 
-/* Returns whether one of the hit's points may be in the box. */
+/* Returns whether one of the six sample points of the hit may be in the box. */
 bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box);
 
 /* Samples this rank's cells around the hits, which may belong to any rank. Local. */

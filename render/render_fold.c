@@ -32,7 +32,8 @@ static bool make_room(render_folding *folding, int64_t count)
     return folding->starts && folding->items;
 }
 
-/* Sorts the tile's fragments by pixel, stably; those of pixel k begin at items[starts[k]]. */
+/* Sorts the tile's fragments by pixel, keeping the order within a pixel. The fragments of pixel k begin at
+ * items[starts[k]]. */
 static void collect(render_folding *folding, const pixel_area *area, const fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;
@@ -44,8 +45,8 @@ static void collect(render_folding *folding, const pixel_area *area, const fragm
     starts[pixels] = count;
 }
 
-/* Sorts fragments, which come nearly sorted. The mark of a run's first fragment must not affect the order, so kinds are
- * not compared. */
+/* Sorts fragments by depth; they are nearly sorted already. The mark on a run's first fragment must not affect the
+ * order, so kinds are not compared. */
 static void sort(fragment *items, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
@@ -63,8 +64,8 @@ static void sort(fragment *items, int64_t count)
     }
 }
 
-/* Returns the error bound in t of a segment's end: another rank's segment that ends or begins within it may touch this
- * one. */
+/* Returns the error bound, in t, of a segment's end. If another rank's segment ends or begins within this distance, the
+ * two may touch. */
 static float error_at(float t)
 {
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
@@ -77,7 +78,7 @@ static void shorten(const render_folding *folding, fragment *items, int64_t coun
     for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
 }
 
-/* Folds one run, interval by interval (fragment_stretch()); returns the end of its output. */
+/* Folds the fragments of one run, interval by interval (fragment_stretch()). Returns the end of its output. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;

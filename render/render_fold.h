@@ -7,10 +7,10 @@
 #include "fragment.h"
 #include "render.h"
 
-/* State of one thread. It owns the buffers; the job is borrowed. */
+/* The state of one thread while it folds tiles. It owns its buffers; the job is borrowed. */
 typedef struct render_folding {
     const render_job *job;
-    bool has_segments; /* segments, else samples */
+    bool has_segments; /* set if volumes are integrated by segments, else by samples */
     fragment *items;
     int64_t capacity, *starts;
 } render_folding;

@@ -52,7 +52,7 @@ bool fragment_reserve(fragment_list *list, int64_t more)
     const int64_t grown = list->capacity + list->capacity / 2 + 1024;
     const int64_t capacity = grown > needed ? grown : needed;
     if (w->piece < 0) return grow(list, capacity);
-    /* Moves the fragments out of the piece, which becomes empty. */
+    /* The fragments move out of the piece, which thereby becomes empty. */
     fragment_list own = {0};
     if (!grow(&own, capacity)) return false;
     memcpy(own.items, list->items, (size_t)list->count * sizeof *own.items);
@@ -62,7 +62,7 @@ bool fragment_reserve(fragment_list *list, int64_t more)
     return true;
 }
 
-/* Moves the fragments behind the end into the gaps before it. */
+/* Closes the gaps at the ends of pieces by moving fragments from behind position `count` into them. */
 static void close_gaps(const fragment_pieces *pieces, int64_t count)
 {
     fragment *items = pieces->out->items + pieces->first;

@@ -12,21 +12,21 @@ enum { FRAGMENT_PIECE = 4096 };
 
 typedef struct fragment_pieces {
     fragment_list *out;
-    int64_t first;       /* index in out of the first piece */
+    int64_t first;       /* index in out at which the first piece begins */
     int64_t piece_count; /* number of pieces that fit into out */
     int64_t taken;
-    int *filled; /* number of fragments in each piece */
+    int *filled; /* number of fragments in each piece, set when the piece is closed */
 } fragment_pieces;
 
-/* A thread's list: a piece, or its own memory. */
+/* The list to which a thread writes: a piece of the common list, or memory of its own. */
 typedef struct fragment_writer {
     fragment_list list; /* must be the first member: fragment_reserve() casts its address to the writer */
     fragment_pieces *pieces;
-    int64_t piece; /* number of the piece; -1: its own memory */
+    int64_t piece; /* number of the piece to which the thread writes; -1: it writes to its own memory */
 } fragment_writer;
 
-/* Begins writing to out. expected: number of fragments for which out should have space. Returns false if memory ran
- * out. */
+/* Prepares out for writing in pieces. expected: number of fragments for which out should have space. Returns false if
+ * memory ran out. */
 bool fragment_pieces_begin(fragment_pieces *pieces, fragment_list *out, int64_t expected);
 
 /* Ensures space for `room` more fragments; may continue in a new chunk. */

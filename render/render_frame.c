@@ -28,13 +28,14 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Most tiles have at most this number of fragments; a thread whose tile has more copies its list out of its piece. */
+/* Number of fragments that most tiles do not exceed. A thread whose tile has more moves its fragments from its piece to
+ * memory of its own. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
 /* The destination of fragments: each writer's piece of a list, or a callback that receives them tile by tile. */
 typedef struct frame_end {
-    fragment_writer *writers; /* one per thread */
-    fragment_taker *take;     /* NULL: fragments go to the writers' lists */
+    fragment_writer *writers; /* one writer per thread */
+    fragment_taker *take;     /* callback that receives fragments; NULL: fragments stay in the writers' lists */
     void *state;
 } frame_end;
 
@@ -101,7 +102,7 @@ static bool append_waiting(render_waiting_list *to, const render_waiting_list *f
     return true;
 }
 
-/* Removes the placeholder fragments of hits that need samples of other ranks. */
+/* Removes the placeholder fragments of hits that still need samples of other ranks. */
 static void drop_places(fragment_list *list, int64_t first)
 {
     fragment *to = list->items + first;
@@ -113,7 +114,7 @@ static void drop_places(fragment_list *list, int64_t first)
 
 /* ---- threads ------------------------------------------------------------------------------------------------- */
 
-/* Initializes the states of all threads, also of those that OpenMP may not start. */
+/* Initializes the states of all threads, including those that OpenMP may not start. */
 static void begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
 {
     bool has_polyhedra = false;
@@ -187,7 +188,8 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     return has_memory;
 }
 
-/* Expects a fragment at every other pixel if most pixels are traced: memory that is never written costs nothing. */
+/* Returns the number of fragments for which memory is reserved: one at every other pixel. Memory that is never written
+ * costs nothing. If only a set of pixels is traced, none is reserved. */
 static int64_t expected_fragments(const render_job *job)
 {
     return job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
@@ -214,7 +216,7 @@ static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int thread
     return is_traced;
 }
 
-/* Draws a frame. out: NULL if fragments are passed to take(). */
+/* Draws a frame. The fragments are appended to out, or, if out is NULL, passed to take() tile by tile. */
 static insitu_status draw(const render_job *job, fragment_list *out, fragment_taker *take, void *state,
                           render_statistics *statistics, base_error *error)
 {

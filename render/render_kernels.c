@@ -67,7 +67,8 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, 
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
-/* Sets the tile's layer by the source. Returns the isovalue's number in that layer. */
+/* Makes the surface layer of a candidate's source current. Stores the source's mesh part, and returns the number of its
+ * isovalue in that layer. */
 SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
     const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
@@ -134,7 +135,8 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
     m->alone_count = 0;
 }
 
-/* Queues a cell of the current layer and the part. */
+/* Queues a cell of the current layer and the given part for tracing: in a batch if it fits one, else in the list of
+ * single cells. */
 SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
@@ -151,7 +153,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
     }
 }
 
-/* Traces all queued cells. */
+/* Traces all cells that are still queued. */
 static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     kernel_tile_queue_alone(t, m);
@@ -182,8 +184,8 @@ typedef struct kernel_pending {
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_pending;
 
-/* Sorts pending cells by their part, and leaves them in order of depth within each: a batch holds cells of one part, and
- * those of blocks alternate in depth. */
+/* Sorts pending cells by their part, and leaves them in order of depth within each: a batch holds cells of one part,
+ * and those of blocks alternate in depth. */
 static void kernel_pending_sort(kernel_pending *w)
 {
     for (int n = 1; n < w->count; n++) {
@@ -251,7 +253,7 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
     if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, &by_depth, true);
 }
 
-/* ---- isosurfaces in the cells that a tile finds itself ---- */
+/* ---- isosurfaces in cells that a tile finds by traversing the trees ---- */
 
 /* Queues the cells found so far for tracing, unless nearer hits hide them. */
 static bool kernel_tile_find_take(kernel_candidate_list *list)
@@ -272,7 +274,7 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
     return true;
 }
 
-/* Switches the search to another part. */
+/* Makes another mesh part current for the search; the cells pending from the previous part are processed first. */
 static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
@@ -314,7 +316,7 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
 
 /* ---- tiles ---- */
 
-/* The memory that a thread keeps from tile to tile. */
+/* The memory that a thread keeps from tile to tile of a frame. */
 typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
     kernel_cell tile_cell;
@@ -383,21 +385,21 @@ static void trace_tile_samples(kernel_tile_trace *t)
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
-/* Returns whether the tile may contain any tree's box. */
+/* Returns whether the tile meets the part of the picture in which some tree may be visible. */
 static bool is_covered(const kernel_frame *f, int x0, int y0)
 {
     return x0 <= f->cover[0][1] && x0 + KERNEL_TILE > f->cover[0][0] && y0 <= f->cover[1][1] &&
            y0 + KERNEL_TILE > f->cover[1][0];
 }
 
-/* Returns whether the tile may have samples or segments of volumes. */
+/* Returns whether the tile may contain samples or segments of volumes. */
 static bool has_volume(const kernel_frame *f, const kernel_thread *thread, int x0, int y0)
 {
     if (!f->volume_count || !is_covered(f, x0, y0)) return false;
     return !f->volume_candidates || thread->volume_bin.count;
 }
 
-/* Returns whether the tile may have hits. */
+/* Returns whether the tile may contain hits on surfaces. */
 static bool has_surface(const kernel_frame *f, const kernel_thread *thread, int x0, int y0)
 {
     if (!f->surface_count) return false;

@@ -25,7 +25,7 @@ static hit_place place_of(const render_job *job, const render_hit *hit)
     return hit_place_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
-/* Returns the layer to which the fragment's surface belongs. */
+/* Returns the surface layer to which the fragment belongs, by the number of its isovalue. */
 static const render_surface_layer *layer_of(const render_job *job, const fragment *f)
 {
     int value = (int)(f->kind - FRAGMENT_SURFACE), i = 0;
@@ -42,7 +42,8 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 {
     double n[3];
     if (f->kind < FRAGMENT_SURFACE || !render_takes_light(&layer_of(job, f)->material)) return false;
-    if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false; /* a gradient that is no number */
+    /* The hit has a normal that is not finite, because its gradient is NaN or infinite. */
+    if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false;
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
     hit_normal(hit->normal, n);
@@ -65,29 +66,30 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
  * others. */
 enum { CHUNK_HITS = 64, CHUNK_RAYS = CHUNK_HITS * (RENDER_MAX_SAMPLES + RENDER_MAX_LIGHTS) };
 
-/* Number of tiles of a light's lattice per scaled unit. */
+/* Number of tiles per scaled unit in the lattice of tiles across a light's direction. */
 enum { LIGHT_TILES = 32 };
 
 struct render_occluders {
     const kernel_table *kernels;
-    render_job job; /* as given by the caller */
+    render_job job; /* the job that the caller gave */
     render_job surfaces;
-    kernel_frame frame; /* of the surfaces only */
+    kernel_frame frame; /* constants of a frame with the job's surfaces only */
     kernel_occluders trees;
     int threads;
 };
 
-/* Name of a ray in a chunk. hit: number of the hit; number: a sample of the hemisphere, or a light from
- * RENDER_MAX_SAMPLES on. */
+/* Identifies a ray in a chunk. hit: index of the hit in the chunk; number: index of the ray in the hemisphere, or
+ * RENDER_MAX_SAMPLES plus the index of a light. */
 typedef struct ray_name {
     int16_t hit, number;
 } ray_name;
 
-/* State of a thread. Its frame is a copy with its own job, so that the camera can be moved from space to space. */
+/* The state of a thread that traces rays from hits. Its frame is a copy with a job of its own, because the camera
+ * changes from one tile space to the next. */
 typedef struct tracer {
     const render_occluders *of;
     const kernel_table *kernels;
-    const render_job *job; /* as given by the caller */
+    const render_job *job; /* the job that the caller gave */
     render_job moved;
     kernel_frame frame;
     kernel_thread thread;
@@ -107,7 +109,7 @@ static bool grow_doubts(kernel_straights *s)
     return true;
 }
 
-/* ---- single rays */
+/* ---- tracing single rays */
 
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
@@ -223,10 +225,11 @@ static void ask_cell(tracer *t, int32_t occluder)
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Marks a doubt whose cell has already been traced for all its rays. */
+/* Marks a doubt (a ray that must be tested exactly in a cell) whose cell has already been tested with all its rays. */
 enum { ASKED = -1 };
 
-/* Traces a hit's rays into the hemisphere in the cells of its `count` doubts. */
+/* Tests a hit's rays into the hemisphere exactly in the cells of its `count` doubts, and closes the rays that are
+ * blocked. */
 static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *doubts, int64_t count)
 {
     uint64_t open = 0;
@@ -420,10 +423,10 @@ render_box render_occluder_box(const render_job *job)
     return hit_box(job, is_opaque);
 }
 
-/* Margin of boxes in scaled units: more than the errors of rays and of float32 boxes. */
+/* Margin by which boxes are extended, in scaled units: it is larger than the errors of rays and of float32 boxes. */
 static const double box_margin = 1e-5;
 
-/* Returns whether a ray of length reach may meet the box. */
+/* Returns whether a ray from a point, of length `reach`, may meet the box extended by the margin. */
 static bool meets_box(const double from[3], const double direction[3], double reach, double margin,
                       const render_box *box)
 {
@@ -476,7 +479,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
-/* Computes kernel_shade()'s sums over the open lights only, in double. */
+/* Computes the sums of diffuse and specular light of kernel_shade() over the lights in `lights` only, in double. */
 static void shade(const render_job *job, const render_material *m, const hit_place *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {

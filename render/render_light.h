@@ -1,16 +1,16 @@
-/* Shadows and ambient occlusion of hits: which of a hit's rays are unblocked, and the resulting colour.
+/* Computes shadows and ambient occlusion of hits: which of a hit's rays are unblocked, and the resulting colour.
  *
  * A frame painted RENDER_UNLIT is traced first. Each of its hits then has one ray towards each light that casts shadows
- * and that it faces, and a set of rays into the hemisphere above it; every rank that holds cells on their way is asked
- * which of them its opaque surfaces block, and a ray is open where none does. Whether one blocks depends on the ray and
- * on the cell alone, so that the picture does not depend on who holds which cell. Transparent surfaces and volumes
- * block nothing; transparent surfaces are lit as opaque ones are; a surface that takes no light (its material is
- * ambient alone) has its colours from the frame, and has no rays.
+ * and that it faces, and a set of rays into the hemisphere above it. Each rank tests which of these rays its opaque
+ * surfaces block; a ray is open if no rank's do. Whether a cell blocks a ray depends on the ray and the cell alone, so
+ * the picture does not depend on the partition. Transparent surfaces and volumes block nothing; transparent surfaces
+ * are lit like opaque ones. A surface that takes no light (its material is purely ambient) gets its colours in the
+ * first frame, and has no rays.
  *
- * Where rays begin. A hit deviates from its surface by the rounding of its depth and of the numbers from which the
- * depth was computed: by at most 1e-6 in the space's scaled units (KERNEL_WEIGHT_ERROR twice, and t's own rounding).
+ * Where rays begin: a hit deviates from its surface by the rounding of its depth and of the numbers from which the
+ * depth was computed, by at most 1e-6 in the space's scaled units (twice KERNEL_WEIGHT_ERROR, and t's own rounding).
  * Rays begin RENDER_LIFT scaled units above it, along the normal. So a ray leaves the cell that was hit instead of
- * meeting it again; anything nearer than that to a surface is not distinguished from it. */
+ * meeting it again. Anything closer than that to a surface is not distinguished from it. */
 #ifndef RENDER_RENDER_LIGHT_H
 #define RENDER_RENDER_LIGHT_H
 
@@ -21,16 +21,17 @@
 
 enum { RENDER_MAX_SAMPLES = 64 };
 
-/* In scaled units; the size of a scene is about 1. */
+/* Height above its surface at which a hit's rays begin, in scaled units, in which the size of a scene is about 1. */
 #define RENDER_LIFT 4e-6
 
-/* A hit, from an unlit fragment. */
+/* A hit on a surface, taken from an unlit fragment: pixel, depth, and encoded normal. */
 typedef struct render_hit {
     uint32_t pixel;
     float t, normal[2];
 } render_hit;
 
-/* A bit for each ray into the hemisphere, and for each ray towards a light. */
+/* The state of a hit's rays: one bit for each ray into the hemisphere (samples), and one for each ray towards a light.
+ * A bit is set while the ray is open. */
 typedef struct render_hit_rays {
     uint64_t samples;
     uint32_t lights, unused;
@@ -39,7 +40,8 @@ typedef struct render_hit_rays {
 /* Computes the hit of an unlit fragment of the job, with its rays. Returns false if it is lit without rays. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
-/* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its samples. */
+/* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its rays into the
+ * hemisphere. */
 void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
                         double directions[RENDER_MAX_SAMPLES][3]);
 
@@ -51,8 +53,8 @@ typedef struct render_occluders render_occluders;
 insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error);
 void render_occluders_free(render_occluders *occluders);
 
-/* Closes the rays that are blocked by this rank's opaque surfaces; occluders may be NULL. Local; after an error the
- * rays are in an undefined state. */
+/* Clears the bits of rays that are blocked by this rank's opaque surfaces. occluders may be NULL. Local; after an error
+ * the rays are in an undefined state. */
 insitu_status render_occlude(const render_occluders *occluders, const render_hit *hits, render_hit_rays *rays,
                              int64_t count, base_error *error);
 
@@ -65,7 +67,8 @@ typedef void render_box_taker(void *state, int box, const render_hit_rays *rays)
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
                           const render_box *boxes, int count, render_box_taker *take, void *state);
 
-/* Lights an unlit fragment by its open rays, as RENDER_LIGHT would have done; leaves fragments of volumes unchanged. */
+/* Lights an unlit fragment by its open rays, giving the fragment that RENDER_LIGHT would have given if nothing were
+ * blocked. Fragments of volumes are left unchanged. */
 void render_light_fragment(const render_job *job, const render_hit_rays *open, fragment *f);
 
 #endif

@@ -26,7 +26,7 @@ static float above(double v)
     return (double)f < v ? nextafterf(f, INFINITY) : f;
 }
 
-/* Adds an interval, or extends the last one; returns the number of intervals. */
+/* Adds an interval, or extends the last one if they touch; returns the number of intervals. */
 static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
 {
     if (count && intervals[count - 1].high >= below(low)) {
@@ -90,7 +90,8 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
                                 .shift = (float)((begin - low) * slope)};
 }
 
-/* Returns the position of a point of the opacity, as kernel_colour_place() computes it. */
+/* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_place() computes
+ * it. */
 static double ramp_place(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
@@ -278,7 +279,7 @@ static insitu_status check_job(const render_job *job, base_error *error)
     if (job->sample_group < 1 || job->sample_group > KERNEL_MAX_GROUP)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "sample group of %d, expected 1 to %d", job->sample_group,
                          KERNEL_MAX_GROUP);
-    /* The scene has a size near 1 in scaled units: smaller steps would make millions of samples per ray. */
+    /* In scaled units the scene has a size near 1, so smaller steps would give millions of samples per ray. */
     if (!(job->step * job->space.scale > 1e-6))
         return base_fail(error, INSITU_ERROR_ARGUMENT,
                          "step of %g between samples, expected more than a millionth of "
@@ -295,7 +296,7 @@ static insitu_status check_job(const render_job *job, base_error *error)
     return INSITU_OK;
 }
 
-/* Returns an upper bound of a ray's length in the cells, in scaled units: the diagonal of the bounding box of all
+/* Returns an upper bound of the length of a ray in the cells, in scaled units: the diagonal of the bounding box of all
  * trees. */
 static double scene_reach(const render_job *job)
 {
@@ -314,11 +315,12 @@ static double scene_reach(const render_job *job)
     return sqrt(square);
 }
 
-/* Below this max_error the ends of tets in float32 are not accurate enough: the largest error measured, over random
- * tets and functions with steps and opacities up to 1, was 3.4e-5. */
+/* Below this max_error the ends of tets' intervals are computed in double. The largest error measured with float32,
+ * over random tets and functions with steps and opacities up to 1, was 3.4e-5. */
 static const double double_error = 2e-4;
 
-/* Returns whether there may be cells whose segments are computed in lanes (kernel_local_segments.h). */
+/* Returns whether the job may have hexes, wedges or pyramids, whose segments are computed in lanes
+ * (kernel_local_segments.h). */
 static bool has_curved_cells(const render_job *job)
 {
     for (int i = 0; i < job->part_count; i++) {
@@ -328,9 +330,9 @@ static bool has_curved_cells(const render_job *job)
     return false;
 }
 
-/* An eighth of max_error is allotted to the colour table, and four fifths to the field
- * (docs/development/error_budget.md): half of these over the length of the ray, half over the absorption. Segments that
- * are mixed with other volumes use half of that for their mixing. */
+/* Distributes the job's error bound. An eighth of max_error is allotted to the colour table, and four fifths to the
+ * field (docs/development/error_budget.md): half of these over the length of the ray, half over the absorption.
+ * Segments that are mixed with other volumes use half of that for the mixing. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
@@ -342,9 +344,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = job->max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * (error_of_each > 0 ? error_of_each : RENDER_MIXING_ERROR));
-    /* The partition determines whether overlaps are found that lie clearly in front of a surface. So compositing and a
-     * rank must cut at the surface with the same result, to 1e-6. Segments of several volumes are always cut by
-     * compositing. */
+    /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. So compositing and
+     * a rank must give the same result when they cut segments at the surface, to 1e-6. Segments of several volumes are
+     * always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {
@@ -385,7 +387,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     if (segments != INSITU_OK) render_unprepare(frame);
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
-    /* A tile's list of cells is consumed by one turn. */
+    /* A tile's list of cells can be used by one turn only, because tracing consumes it. */
     frame->bins_volume =
         bins && job->volume_count == 1 && frame->volume_turns <= 1 && !(frame->has_segments && job->separate_samples);
     return segments;
