@@ -1,4 +1,4 @@
-/* A ray's hits on isosurfaces: they are clipped, get their normals and colours, and the nearest is kept (thesis,
+/* Processes a ray's hits on isosurfaces: tests clips, computes normals and colours, and keeps the nearest hit (thesis,
  * sections 4.3.4 and 4.3.5). */
 #ifndef RENDER_KERNEL_ACCEPT_H
 #define RENDER_KERNEL_ACCEPT_H
@@ -18,22 +18,23 @@
 #include "render.h"
 #include "simd.h"
 
-/* Normals out of gradients at the vertices: the three components are interpolated in the hit's cell just as values are,
- * so that they go on from cell to cell without a jump, and so does the light on the surface.
+/* Normals from gradients at the vertices. The gradient's three components are interpolated in the hit's cell like
+ * values, so that they are continuous from cell to cell, and so is the light on the surface.
  *
- * Only visible hits get one. Until no nearer hit can come, a hit keeps its cell, and its coordinates in the cell in the
- * normal's place. Then rays are taken one by one, and those that hit the same cell share its coefficients. */
+ * Only visible hits get such a normal. Until no nearer hit can come, a hit stores its cell, and its reference
+ * coordinates instead of the normal. Then rays are processed one by one, and those that hit the same cell share its
+ * coefficients. */
 
-/* A cell's gradients, in camera axes. */
+/* The gradients at a cell's vertices, in camera axes, and their interpolating polynomials. */
 typedef struct kernel_smooth_cell {
     int part;
     int32_t index;
     kernel_cell cell;
     double gradient[3][GRID_MAX_CELL_VERTICES];
-    double polynomial[3][8]; /* not set for tets */
+    double polynomial[3][8]; /* coefficients of the three components; not set for tets */
 } kernel_smooth_cell;
 
-/* Fetches the gradient at a vertex, in camera axes; 0 where it has none. */
+/* Computes the gradient at a vertex, in camera axes; 0 if the vertex has none. */
 SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vertex_gradients *gradients, int64_t vertex,
                                         double out[3])
 {
@@ -63,7 +64,8 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
         kernel_polynomial_fit(out->polynomial[k], c->type, out->gradient[k]);
 }
 
-/* Computes a point's barycentric coordinates in a tet; 1/4 each where the tet has no volume. */
+/* Computes a point's barycentric coordinates in a tet. They are 1/4 each if the tet has no volume or the point is far
+ * outside. */
 SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double point[3], double out[4])
 {
     double d[4][3], sum = 0;
@@ -73,7 +75,8 @@ SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double poin
         const double *u = d[(i + 1) & 3], *v = d[(i + 2) & 3], *w = d[(i + 3) & 3];
         const double volume = (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2])) +
                               u[2] * (v[0] * w[1] - v[1] * w[0]);
-        out[i] = i & 1 ? -volume : volume; /* three steps around four corners are an odd permutation */
+        /* rotating four corners by one position is an odd permutation, which changes the sign of the volume */
+        out[i] = i & 1 ? -volume : volume;
         sum += out[i];
     }
     for (int i = 0; i < 4; i++) {
@@ -82,7 +85,8 @@ SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double poin
     }
 }
 
-/* Does what kernel_value_of() does, in double. */
+/* Returns the value at r of the polynomial with the coefficients c, as kernel_value_of() does, but for one point in
+ * double. */
 SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, const double r[3])
 {
     double m = r[0] * r[1];
@@ -94,7 +98,8 @@ SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, cons
     return is_pyramid ? v : v + r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Interpolates the gradient. place has the cell's own coordinates; in a tet, the point in tile space. */
+/* Computes the gradient at a point by interpolation. place: the reference coordinates or, in a tet, the position in
+ * tile space. */
 SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double place[3], float out[3])
 {
     const kernel_cell *c = &s->cell;
@@ -116,7 +121,7 @@ SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double plac
     }
 }
 
-/* Returns the ray's place at t, in tile space. */
+/* Computes the ray's point at depth t in tile space. */
 SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, double out[3])
 {
     out[0] = (double)p->origin_x[ray] + (double)p->slope_x[ray] * (double)t;
@@ -124,8 +129,8 @@ SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, doub
     out[2] = (double)t;
 }
 
-/* Replaces the coordinates in the normals' place by normals, in camera axes. Hits without a cell have theirs
- * already. */
+/* Replaces the reference coordinates stored in `normal` by normals, in camera axes. Hits without a cell already have
+ * their normals. */
 static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
                                                             vf t, const kernel_hit_cells *cells, vf normal[3])
 {
@@ -148,7 +153,8 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
     }
 }
 
-/* Computes the gradient of a tet's field by Cramer's rule in double, up to its length and sign. */
+/* Computes the direction of the gradient of a tet's field by Cramer's rule in double. Its length and sign are
+ * arbitrary. */
 SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
 {
     double d[3][3], df[3], g[3];
@@ -181,16 +187,18 @@ typedef struct kernel_surface_state {
     int layer;
     kernel_hits *hits;
     bool is_opaque;
-    bool is_contracted; /* lanes have asked contractions (kernel_contraction.h) of these rays, which did not decide */
+    /* set if the lanes' contraction test has already been done for these rays and has not decided them
+     * (kernel_contraction.h) */
+    bool is_contracted;
 } kernel_surface_state;
 
-/* Takes gradients from tile space to camera axes by undoing the shear. */
+/* Transforms gradients from tile space to camera axes, by undoing the shear. */
 SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
 {
     g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
 }
 
-/* Computes the unit normal that kernel_shade() lights by, in world axes. */
+/* Computes the unit normal, in world axes, that kernel_shade() uses: it points to the eye's side. */
 SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3], vf out[3])
 {
     const render_camera *c = &p->frame->job->camera;
@@ -205,7 +213,8 @@ SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3],
         out[a] = turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
 }
 
-/* Writes the normal of RENDER_NORMALS, as kernel_shade() finds it, or for RENDER_VALUES the isovalue's number. */
+/* Stores the unit normal in world axes (RENDER_NORMALS), or the number of the isovalue (RENDER_VALUES), as the hit's
+ * colour. */
 static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
                                                                  vf colour[3])
 {
@@ -217,8 +226,8 @@ static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_pa
     kernel_world_normal(p, normal, colour);
 }
 
-/* Packs the normal of RENDER_UNLIT: as a point of the octahedron |x| + |y| + |z| = 1 whose lower half is folded over
- * the upper one (Meyer et al. 2010). */
+/* Stores the normal of an unlit hit in t_out and transmittance, as a point of the octahedron |x| + |y| + |z| = 1 whose
+ * lower half is folded over the upper one (Meyer et al. 2010). */
 static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p, const vf normal[3],
                                                          kernel_fragments *f)
 {
@@ -232,7 +241,8 @@ static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p,
     f->transmittance = vf_select(is_below, (1.0f - vf_abs(u)) * side_v, v);
 }
 
-/* Paints hits as the job asks; kind is that of the fragments. What takes no light is done, as nothing waits for it. */
+/* Computes the fragments' colours as the job's `paint` says: lit, unlit with the normal, or numbers. kind: the
+ * fragments' kind. Surfaces that take no light are finished at once even if the job is unlit. */
 SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
                               kernel_fragments *f)
 {
@@ -247,8 +257,8 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
-/* Writes hits as deep as the nearest ones, which folded cells may have. Compositing decides between them by their bits,
- * which do not depend on the order of cells. */
+/* Emits hits with the same depth as the nearest ones, which folded cells may have, as fragments of their own.
+ * Compositing chooses between them by their bits, so the result does not depend on the order of cells. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
@@ -257,7 +267,7 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
-/* How hits look before light falls on them: a vector along the normal, in camera axes, and the colour. */
+/* Properties of hits before lighting: a vector along the normal, in camera axes, and the colour. */
 typedef struct kernel_look {
     vf normal[3], colour[3];
 } kernel_look;
@@ -267,8 +277,9 @@ SIMD_INLINE kernel_look kernel_look_of(const vf normal[3], const vf colour[3])
     return (kernel_look){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
 }
 
-/* Puts hits that other ranks may have samples about among those that wait, and in the place of each a fragment by which
- * volumes are cut. Returns the others. */
+/* Moves hits whose normals need samples of other ranks to the thread's waiting list, and emits a placeholder fragment
+ * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with 0 do not
+ * wait. */
 static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const kernel_surface *s, int value, vm hit,
                                                       vf t, vf reach, const kernel_look *look)
 {
@@ -290,34 +301,34 @@ static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const ke
     return vm_andnot(hit, waits);
 }
 
-/* Hits: the depth, a vector along the normal (or the coordinates from which kernel_vertex_normals() makes one), the
- * value that the surface is coloured by, and the field of its contour lines (NULL: it has none). */
+/* Hits of rays: the depth; a vector along the normal, or the reference coordinates from which kernel_vertex_normals()
+ * computes one; the value w of the colour field; and the field of contour lines (NULL if the surface has none). */
 typedef struct kernel_hit_places {
     vf t, normal[3], w;
     const kernel_along *along;
 } kernel_hit_places;
 
-/* Returns the value that colours the surface, or else its isovalue. w is the value's place along the colour map's
- * range. */
+/* Returns the value that colours the surface, in the field's units, or the isovalue if there is no colour field. w: the
+ * value in the colour map's domain. */
 SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
 {
     if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
     return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
 }
 
-/* Returns the rays on which the sign changes between the interval's faces. */
+/* Returns the rays on which the field's sign differs at the two ends of the interval. */
 SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
 {
     return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
 
-/* Returns the rays whose interval is in front of the eye and of the nearest hit. */
+/* Returns the rays whose interval begins before the nearest hit and ends behind the eye's plane. */
 SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
 {
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
-/* Returns the hits that clips keep. */
+/* Returns those of the hits at t that all clips keep. clips: one bit per clip of the job. */
 static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
 {
     kernel_lanes l;
@@ -333,7 +344,7 @@ static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *
     return vm_from_bits(kept);
 }
 
-/* Returns the hits in front of the eye that the surface's clips keep. */
+/* Returns those of the hits at t that are in front of the eye and are kept by the surface's own clips. */
 SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     const vm in_front = vm_and(hit, vf_le(p->t_near, t));
@@ -346,18 +357,18 @@ SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, v
     return kernel_kept(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
 }
 
-/* ---- hits of rays that are lanes of several cells ---- */
+/* ---- hits of rays in lanes, each with its own cell ---- */
 
-/* One ray's hit. */
+/* The hit of one ray. */
 typedef struct kernel_ray_hit {
     int part, value;
     uint32_t cell;
     float depth;
-    float normal[3]; /* as in kernel_hits */
-    float colour[3]; /* not lit */
+    float normal[3]; /* a normal or reference coordinates, as in kernel_hits */
+    float colour[3]; /* colour before lighting */
 } kernel_ray_hit;
 
-/* Writes one ray's hit that is as deep as the nearest. */
+/* Emits one ray's hit that has the same depth as the nearest one. */
 static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
                                                             const kernel_ray_hit *hit)
 {
@@ -370,8 +381,9 @@ static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, co
     kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
 }
 
-/* Does what kernel_accept() does for one ray, as two lanes may be of one pixel. Returns its block where the hit is
- * nearer. */
+/* Keeps one ray's hit if it is the nearest, as kernel_accept() does for a packet; two lanes may belong to the same
+ * pixel, so they are processed one by one. Returns the bit of the ray's block if the hit is nearer than the last one,
+ * else 0. */
 SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
 {
     const kernel_surface *s = t->surface;

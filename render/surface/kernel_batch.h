@@ -1,13 +1,11 @@
-/* Tets, as many at once as there are lanes, in a tile that traces what is binned there, or finds it itself:
- *
- *     lanes are cells:     fetched, ordered, placed, edge functions' lines          (once a batch)
- *     lanes are pixels:    each with the lines of its own cell                      (cells of few pixels)
- *                          a packet of a block's rays, all with one cell's lines    (other cells)
- *
- * Where cells are small a block's packet would be asked for rays most of which lie beside the cell. Pixels of several
- * cells' boxes are put side by side instead, and a lane takes its cell's numbers out of the batch's vectors by a
- * permutation. Every operation is that of a cell alone (kernel_crossings.h, kernel_surface.h) in the same
- * order, so that a hit has the same bits however it came to be found. */
+/* Traces batches of SIMD_WIDTH tets in a tile:
+ *     lanes are cells:     fetched, sorted, transformed; edge functions computed    (once per batch)
+ *     lanes are pixels:    each uses the edge functions of its own cell             (cells of few pixels)
+ *                          or a packet of a block's rays, all with one cell         (other cells)
+ * If cells are small, most rays of a block's packet would lie beside the cell. So the pixels of several cells' boxes
+ * are processed side by side instead, and each lane reads its cell's numbers from the batch's vectors by a permutation.
+ * All operations are those for a single cell (kernel_crossings.h, kernel_surface.h) in the same order, so a hit has the
+ * same bits whichever way it is computed. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
 
@@ -29,7 +27,8 @@
 #include "simd.h"
 
 enum {
-    KERNEL_BATCH_PIXELS = 32 /* in a cell's box: with more of them, the cell is traced block by block */
+    /* maximum number of pixels in a cell's box; a cell with more of them is traced block by block */
+    KERNEL_BATCH_PIXELS = 32
 };
 
 _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
@@ -49,7 +48,7 @@ typedef struct kernel_batch {
     kernel_placed tets; /* f: field less the isovalue, scaled */
     bool has_normals;
     vf normal[3];
-    kernel_pixel_list rays; /* to trace */
+    kernel_pixel_list rays; /* list of rays to be traced */
 } kernel_batch;
 
 /* ---- lanes are cells ---- */
@@ -60,7 +59,8 @@ static void kernel_batch_begin(kernel_batch *b)
     b->layer = b->part = -1;
 }
 
-/* Finds the gradients in all of the cells, as kernel_tet_normal() does, when one is hit first. */
+/* Computes the gradients in all cells of the batch, by the operations of kernel_tet_normal(), when one of them is hit
+ * for the first time. */
 static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, const kernel_frame *f)
 {
     const double scale = f->job->space.scale;
@@ -87,7 +87,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
     b->has_normals = true;
 }
 
-/* ---- a cell out of the batch, for blocks ---- */
+/* ---- a cell of the batch that is traced by blocks ---- */
 
 /* Without world coordinates: the normal is known. */
 static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, int n, kernel_cell *c)
@@ -101,7 +101,8 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, i
 
 /* ---- lanes are pixels ---- */
 
-/* Returns the rays that hit their cells' surfaces, and where. */
+/* Returns the rays that hit the surface in their cells, and stores the depths of the hits in *out. t_near: depth at
+ * which the rays begin. */
 SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kernel_lane_rays *r, vf *out)
 {
     const vf far = r->far;
@@ -116,7 +117,7 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kerne
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, far)));
 }
 
-/* Returns the blocks in which something is nearer. */
+/* Accepts the hits of one vector of rays. Returns the mask of blocks in which a ray has a nearer hit than before. */
 static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
                                     unsigned hit, vf depth)
 {

@@ -1,29 +1,26 @@
-/* A ray's one crossing in a cell that is bent little, without the faces.
+/* Computes a ray's only crossing of the isovalue in a cell that is nearly affine, without intersecting the cell's
+ * faces.
  *
- * With J0 the Jacobian at the middle of the cell's domain, Y = J0^-1 X is r + N(r), and with L linear in space the
- * field is L(X) + E(r) (kernel_bounds.h); N and E have the products of the domain's coordinates alone. On a ray X = X0
- * + t d, with y = J0^-1 X0 and w = J0^-1 d, the two equations
- *
+ * With J0 the Jacobian at the middle of the reference domain, Y = J0^-1 X is r + N(r), and with L linear in space the
+ * field is L(X) + E(r) (kernel_bounds.h); N and E contain only products of reference coordinates. On a ray X = X0 + t
+ * d, with y = J0^-1 X0 and w = J0^-1 d, the two equations
  *     r + N(r) = y + t w                          r is on the ray
  *     L(X0) + t grad L . d + E(r) = 0             the field is the isovalue there
- *
- * become one when t is taken out of the second and put into the first:
- *
+ * become one when t is eliminated by the second:
  *     r = f(r) = a - N(r) - w E(r) / (grad L . d),        a = y - w L(X0) / (grad L . d).
- *
- * f changes by no more than K = theta + |w| |grad E| / |grad L . d| a length in the domain (the norms are those of
- * kernel_bounds.h). Where K < 1 that says all, by Banach and Krawczyk. For a place q of the domain, with s = f(q) - q:
- *
- *     one     The ball of K / (1 - K) |s| about f(q), if it is in the domain, is taken into itself: it has a root, and
- *             the domain has no other.
- *     none    A root x of a convex part D of the domain has |f(q) - x| <= K |q - x|, hence
- *             |s|^2 <= 2 s . (x - q), which is not more than its largest at the corners of D: where |s|^2 is more, D
- *             has none. With q = f(q) moved to the nearest place of D, that is the case wherever f(q) is outside.
- *
- * What else is rounding. f is computed to blur: of places, and of the field times |w| / |grad L . d|. Faces tell where
- * a crossing is to their own rounding, which moves a root by no more than rim, in which 1 / (1 - K) is counted. A root
- * is taken where it is inside by more than that, and left out where all that is wider by rim has none; what is nearer
- * to a face is for the faces. So this agrees with them, in this cell and in the next one. */
+ * f changes by no more than K = theta + |w| |grad E| / |grad L . d| per unit length in the domain (the norms are those
+ * of kernel_bounds.h). If K < 1, f is a contraction, and by the theorems of Banach and Krawczyk, for a point q of the
+ * domain, with s = f(q) - q:
+ *     one     The ball of radius K / (1 - K) |s| about f(q), if it lies in the domain, is mapped into itself: it
+ *             contains a root, and the domain has no other.
+ *     none    A root x in a convex part D of the domain satisfies |f(q) - x| <= K |q - x|, hence
+ *             |s|^2 <= 2 s . (x - q), which is at most its maximum over the corners of D. If |s|^2 is larger, D has no
+ *             root. With q = f(q) moved to the nearest point of D, that is the case whenever f(q) is outside.
+ * Rounding: f has an error of at most `blur`, from positions, and from the field times |w| / |grad L . d|. Crossings of
+ * faces have rounding errors of their own, which move a root by at most `rim`, including the factor 1 / (1 - K). A root
+ * is accepted if it is inside by more than that, and excluded if the domain widened by rim has none. Rays with a root
+ * closer to a face are decided by intersecting the faces. So the result agrees with that of the faces, in this cell and
+ * in its neighbour. */
 #ifndef RENDER_KERNEL_CONTRACTION_H
 #define RENDER_KERNEL_CONTRACTION_H
 
@@ -40,29 +37,29 @@
 
 enum { KERNEL_CONTRACTION_STEPS = 7 };
 
-/* How far r may be off so that one step of Newton's method is the last: that leaves 2 K / (1 - K) times its square, as
- * f's slope changes by some 4 K a length, 1.8e-7 at most. */
+/* Error of r below which one step of Newton's method is the last. That step leaves 2 K / (1 - K) times the square of
+ * the error, because f's derivative changes by about 4 K per unit length: 1.8e-7 at most. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
-/* A ray as its cell has it: y and w as above, from the ray's place at the depth of vertex 0 on, and L there and its
- * slope. */
+/* A ray in the coordinates of its cell: y and w as above, from the ray's point at the depth of vertex 0 on; L at that
+ * point (level) and its derivative along the ray (rise). */
 typedef struct kernel_sight {
     vf y[3], w[3], level, rise;
 } kernel_sight;
 
-/* Each lane's own cell's (kernel_contractions). */
+/* The coefficients of kernel_contractions, gathered for each ray's own cell. */
 typedef struct kernel_contraction {
     vf offset[3], middle, bent[4][3], field[4], grow, blur, rim;
 } kernel_contraction;
 
-/* Where the crossing is: of lanes of one, to KERNEL_CONTRACTION_END in r, the cell's own coordinates. t from vertex 0
- * on. */
+/* The result for each ray: whether it has exactly one crossing, or none. For rays in `one`, t is the depth relative to
+ * vertex 0 and r the reference coordinates, accurate to KERNEL_CONTRACTION_END. */
 typedef struct kernel_contracted {
     vm one, none;
     vf t, r[3];
 } kernel_contracted;
 
-/* The rays as their cells have them. */
+/* Converts the rays to the coordinates of their cells. */
 SIMD_INLINE void kernel_sight_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_sight *out)
 {
     vf origin[3], normal[3], g[3];
@@ -121,7 +118,7 @@ SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
     }
 }
 
-/* The largest s . x in D. */
+/* Returns the maximum of s . x over the points x of D. */
 SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
 {
     const vf half = 0.5f + rim;
@@ -133,7 +130,7 @@ SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
     return vf_max((vf_max(s[0], vf_set(0)) + vf_max(s[1], vf_set(0))) + s[2], vf_set(0));
 }
 
-/* r as kernel_local.h has it: of a pyramid, a and b are counted from the axis. */
+/* Converts r to the coordinates of kernel_local.h: for a pyramid, a and b are then counted from the axis. */
 SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = r[i];
@@ -141,7 +138,7 @@ SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
     for (int i = 0; i < 2; i++) out[i] -= 0.5f * r[2];
 }
 
-/* How far r is inside of the domain; of wedges and pyramids no more than that. */
+/* Returns a lower bound of the distance from r to the domain's border; it is negative if r is outside. */
 SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
 {
     vf local[3];
@@ -150,14 +147,15 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
     return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
 
-/* Rays on which s at q says that there is no root in D. A root needs
- * |s| of two diameters of D at most, so 8 blur is no less than 2 blur times |s| + 2; what is beyond has room in a
- * thousandth of |s|^2. */
+/* Returns the rays for which s at q proves that D contains no root. If there were a root, |s| would be at most two
+ * diameters of D; so 8 blur is an upper bound of the rounding, 2 blur times (|s| + 2), and a thousandth of |s|^2 covers
+ * the rest. */
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);
     vf blur = 8.0f * c->blur;
-    if (kernel_has_apex(type)) blur = 4.0f * c->rim; /* twice what faces are off by, as D is no wider */
+    /* twice the error of crossings of faces, because D is not widened for a pyramid */
+    if (kernel_has_apex(type)) blur = 4.0f * c->rim;
     return vf_lt(2.0f * most + blur, 0.999f * kernel_dot(s, s));
 }
 
@@ -180,7 +178,8 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
         kernel_contraction_hold(type, c->rim, q);
         kernel_contraction_local(type, q, local);
         kernel_bend_at(type, local, &bend);
-        if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2]; /* kernel_bounds.h has J0 at a b / k² of a half */
+        /* kernel_bounds.h computes J0 with a b / k² = 1/2 instead of 1/4, which leaves this linear term */
+        if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2];
         for (int i = 0; i < 3; i++) {
             vf at = a[i];
             for (int k = 0; k < terms; k++) at -= slope[k][i] * bend.term[k];

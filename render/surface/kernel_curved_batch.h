@@ -1,19 +1,17 @@
-/* Hexes, wedges and pyramids, as many of one type at once as there are lanes, in a tile that traces what is binned
- * there, or finds it itself. A cell of a few pixels leaves most of a block's packet without anything to do, and of the
- * rays in it a half has no crossing to look for. So rays of several cells are put side by side, and what goes on of
- * them is put side by side again:
+/* Traces batches of SIMD_WIDTH hexes, wedges or pyramids of one type in a tile. A cell of a few pixels would leave most
+ * lanes of a block's packet idle, and half of the rays in the cell have no crossing. So rays of several cells are
+ * processed side by side, and after each stage the remaining rays are put side by side again:
+ *     pixels of boxes       is the only crossing known, or is there none?   kernel_contraction.h
+ *     undecided rays        which faces does the ray cross?                 signs of edge functions
+ *     rays with two faces   where, and what is the field there?             bilinear patches
+ *     rays with one root    where is it, and what is its normal?            Newton's method
+ *     other rays            which roots are there?                          kernel_roots.h
+ * If the field is known to be monotone along all of the tile's rays (kernel_roots.h), the signs at the faces decide
+ * whether there is a root. Rays of other cells are searched for roots.
  *
- *     pixels of boxes       is the one crossing known, or none?     kernel_contraction.h
- *     undecided rays        which faces does the ray cross?         signs of edge functions
- *     rays in two faces     where, and what is the field there?     patches
- *     rays with a root      where is it, and its normal?            Newton's method
- *     other rays            what roots are there?                   kernel_roots.h
- *
- * Where the field is known to be monotone along all of the tile's rays (kernel_roots.h), the signs at the faces tell of
- * the root; rays of other cells are searched for roots.
- * Rays of which an edge function is in doubt, or which cross not just two of a cell's faces once each, are for the cell
- * alone (kernel_surface.h). Every operation is that of a cell alone in the same order, so that a hit has the same bits
- * however it came to be found. */
+ * Rays with an edge function of uncertain sign, and rays that do not cross exactly two faces once each, are traced one
+ * by one in the cell (kernel_surface.h). All operations are those for a single cell in the same order, so a hit has the
+ * same bits whichever way it is computed. */
 #ifndef RENDER_KERNEL_CURVED_BATCH_H
 #define RENDER_KERNEL_CURVED_BATCH_H
 
@@ -42,7 +40,8 @@
 #include "render.h"
 #include "simd.h"
 
-enum { KERNEL_CURVED_PIXELS = 64 }; /* a large cell's box has more in the tile */
+/* maximum number of pixels in the box of a wedge or pyramid that is traced in a batch, if the mesh has mixed types */
+enum { KERNEL_CURVED_PIXELS = 64 };
 
 /* Cells of one type that wait to be placed together. */
 typedef struct kernel_curved_batch_pending {
@@ -62,12 +61,13 @@ typedef struct kernel_curved_batch {
     kernel_curved_batch_pending *own;       /* those that are traced */
     kernel_placed_curved placed;
     float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
-    float lines[8][SIMD_WIDTH];   /* of the field of contour lines; likewise */
+    float lines[8][SIMD_WIDTH];   /* field of the contour lines by vertex and lane; set only if the layer has lines */
     kernel_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
     kernel_pixel_list rays, met, found, others;
-    uint8_t faces[KERNEL_LIST_ROOM]; /* which those met cross: the first, and 8 times the second */
+    /* faces crossed by the rays in `met`: the number of the first plus 8 times that of the second */
+    uint8_t faces[KERNEL_LIST_ROOM];
     kernel_curved_ends found_ends, other_ends;
 } kernel_curved_batch;
 
@@ -105,7 +105,8 @@ SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
     for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->placed.vertex[i][n];
 }
 
-/* Rays that are for the cell alone. */
+/* Traces the rays in `wanted` one by one in their cells; rays of one cell and packet are traced together. Returns the
+ * mask of blocks in which a ray has a nearer hit than before. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     const kernel_pixel_list *rays, int first,
                                                                     vi at_lanes, unsigned wanted)
@@ -141,8 +142,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
 
 /* ---- rays ---- */
 
-/* Rays that are far from the slab between the planes that their cells lie between: a face's value has L's sign on
- * these, and there is no root. Depths are from vertex 0's on. */
+/* Returns the rays that are outside the slab that contains the isosurface, throughout the part of the ray between the
+ * cell's bounding planes. On these rays the faces' values have L's sign, so there is no root. Depths are relative to
+ * vertex 0. */
 SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_sight *ray)
 {
     const vf thick = kernel_take(h->bounds.thickness, lane);
@@ -158,8 +160,8 @@ SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane,
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Crossings that are known, at these depths, are found, as places in found_ends[0]; of the others only those that are
- * undecided stay, moved to kept and on. Returns how many are kept then. */
+/* Moves the rays in at->one to the list of found crossings, with their depth and reference coordinates in found_ends;
+ * keeps only the undecided ones of the other rays, from index `kept` on. Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_contracted *at, vf depth,
                                          unsigned undecided, int kept)
 {
@@ -178,7 +180,8 @@ SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const ke
     return kept;
 }
 
-/* What is known of rays without faces. */
+/* Decides as many rays as possible without intersecting faces: by the slab that contains the isosurface, and by
+ * contractions. Found crossings go to `found`; undecided rays stay in `rays`. */
 SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     const kernel_curved cells = kernel_curved_batch_cells(h);
@@ -210,7 +213,8 @@ static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_
     KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_contract_of, t, h);
 }
 
-/* The rays that cross two faces of their cells go on. Returns the blocks in which something is nearer. */
+/* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Traces rays of other
+ * cases one by one. Returns the mask of blocks in which a ray has a nearer hit than before. */
 SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
@@ -244,8 +248,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_meet(kernel_tile_t
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_meet_of, t, h);
 }
 
-/* Finds where rays go in and out of their cells. Those with one root by their ends go to the found ones; those that
- * must be searched for roots to the others. */
+/* Computes the points at which rays enter and leave their cells. Rays with exactly one root, by the values at the ends,
+ * go to `found`; rays that must be searched for roots go to `others`. */
 SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     const kernel_curved cells = kernel_curved_batch_cells(h);
@@ -274,7 +278,7 @@ static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_til
     KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
 }
 
-/* Finds how the lines' field goes along the surface at r in each ray's own cell. */
+/* Computes the contour lines' field, its gradient and the surface's normal at r in each ray's own cell. */
 SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
                                            const vf r[3], kernel_along *out, int type)
 {
@@ -285,7 +289,7 @@ SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const ker
     kernel_map_along(&t->tile, &map, c, r, out);
 }
 
-/* The colours' field of the lanes' cells, in the order of their vertices. */
+/* Reads the colour field at the vertices of the lanes' cells, in the cells' order of vertices. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const kernel_tile_trace *t,
                                                                         kernel_curved_batch *h)
 {
@@ -300,12 +304,13 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
         }
 }
 
-/* The places of hits in lanes: r, in the cells' own coordinates, is used for colours; normal is as in kernel_hits. */
+/* Hits of a vector of rays: r, the reference coordinates, is used for colours; `normal` is a normal or r, as in
+ * kernel_hits. */
 typedef struct kernel_curved_batch_places {
     vf t, normal[3], r[3];
 } kernel_curved_batch_places;
 
-/* The lines' field, likewise. */
+/* Reads the field of the contour lines at the vertices of the lanes' cells. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
                                                                       kernel_curved_batch *h)
 {
@@ -315,7 +320,7 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
             h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->placed.vertex[i][n]);
 }
 
-/* Finds the colours of hits that are not each of their isovalue's colour alone. */
+/* Computes the colours of hits if the surface has a colour field or contour lines. */
 static __attribute__((noinline)) void
 kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batch *h, const uint8_t *lanes,
                             const kernel_lane_rays *p, const kernel_curved_batch_places *places, vf colours[3])
@@ -335,7 +340,8 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
     kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
 }
 
-/* Returns the blocks in which something is nearer. */
+/* Accepts the hits in `hit`, a mask of lanes. Returns the mask of blocks in which a ray has a nearer hit than
+ * before. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
                                                                      const kernel_lane_rays *p, unsigned hit,
@@ -375,7 +381,7 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
     normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
 }
 
-/* Takes hits of the rays found, from n on. */
+/* Accepts hits of the rays in `found` from index n on. Returns the mask of blocks with a nearer hit. */
 SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curved_batch *h, int n,
                                               const kernel_lane_rays *p, const kernel_map_lanes *map,
                                               const kernel_point *at, vm hit)
@@ -387,7 +393,8 @@ SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curve
     return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
 }
 
-/* Polishes the roots that are found, and takes those that are visible. */
+/* Refines the roots of the rays in `found` by Newton's method and accepts those that are visible. Returns the mask of
+ * blocks with a nearer hit. */
 SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
@@ -417,7 +424,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_tr
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h);
 }
 
-/* The crossings that kernel_curved_batch_contract() has found. */
+/* Refines the crossings found by contraction by one step and accepts those that are visible. Returns the mask of blocks
+ * with a nearer hit. */
 SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
@@ -485,7 +493,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
 
 /* ---- batches ---- */
 
-/* The rays that wait are traced. */
+/* Traces all rays in the list `rays`, stage by stage. */
 static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     kernel_pixel_list_close(&h->rays);
@@ -501,7 +509,7 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
     h->rays.count = 0;
 }
 
-/* A lane's rays, and its blocks, of the tile's. */
+/* Lists the rays of a cell's box of pixels, and sets up the packets of its blocks. Traces the list if it is full. */
 SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved_batch *h, int lane, unsigned box,
                                              unsigned blocks)
 {

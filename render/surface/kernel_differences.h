@@ -1,4 +1,4 @@
-/* Normals by central differences. */
+/* Computes normals by central differences of the field. */
 #ifndef RENDER_KERNEL_DIFFERENCES_H
 #define RENDER_KERNEL_DIFFERENCES_H
 
@@ -16,29 +16,29 @@
 #include "render.h"
 #include "simd.h"
 
-/* Normals by central differences (thesis, section 4.3.4): the field half an offset before and behind the hit along each
- * axis. Which cell holds a point is asked of the tree, as a ray of no length: with inverse directions of 1 the box test
- * of kernel_packet.h tells whether the point is in the box. In a leaf, the line through the point along the tile's
- * depth axis meets the cells as any ray does, by the same exact decisions, and the point belongs to the one whose
- * interval [t_in, t_out) holds its depth: to one cell of a mesh or none.
+/* Normals by central differences (thesis, section 4.3.4). The field is sampled half an offset before and behind the hit
+ * along each axis. The cell that contains a sample's point is found in the tree by a ray of length zero: with inverse
+ * directions of 1 the box test of kernel_packet.h tests whether the point is in the box. In a leaf, the line through
+ * the point along the tile's depth axis is intersected with the cells like any ray, by the same exact decisions, and
+ * the point belongs to the cell whose interval [t_in, t_out) contains its depth: to one cell of a mesh or none.
  *
- * The samples are the field less the isovalue, so that the hit's own value is 0. Where cells overlap, several hold a
- * point: the least of their values is the sample, whichever of them is asked first and on whichever rank.
+ * Samples are the field minus the isovalue, so that the hit's own value is 0. If cells overlap, several contain a
+ * point: the sample is the least of their values, whichever is tested first and on whichever rank.
  *
- * Where other ranks have cells, their samples count too. Then hits wait for their normals (render_differences.h), and
- * the second half of this file samples, and lights, those of any pixels, in tiles and packets as they were hit by. */
+ * If other ranks have cells, their samples are needed too. Then hits wait for their normals (render_differences.h); the
+ * second half of this file samples and lights hits of any pixels, in the tiles and packets in which they were hit. */
 
-/* The field at one point of each ray. */
+/* The field at one point per ray. */
 typedef struct kernel_probe {
     const kernel_surface *surface;
-    int layer; /* for the cache */
+    int layer; /* number of the layer, part of the key of cached cells */
     double isovalue;
-    vf z; /* the points' */
+    vf z; /* depths of the points */
     vm found;
     vf sample;
 } kernel_probe;
 
-/* f: the values less the isovalue, of one scale in all cells. */
+/* Sets f to the values minus the isovalue, scaled equally in all cells. */
 SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 {
     for (int i = 0; i < c->count; i++) {
@@ -74,7 +74,8 @@ SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const 
     }
 }
 
-/* Rays whose point may be in the cell: in its box in tile space, widened by more than all rounding. */
+/* Returns the rays whose point may be in the cell: it lies in the cell's bounding box in tile space, widened by more
+ * than all rounding. */
 SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *probe, const kernel_cell *c, vm rays)
 {
     const float *const places[3] = {c->x, c->y, c->z};
@@ -106,8 +107,8 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
     }
 }
 
-/* Sample at the rays' points t moved by offset along a world axis (scaled units). Returns the rays whose point is in a
- * cell. */
+/* Samples the field at the rays' points at depth t, moved by `offset` along a world axis (in scaled units). Returns the
+ * rays whose point is in a cell. */
 SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
 {
     const render_camera *c = &p->frame->job->camera;
@@ -132,13 +133,14 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
     return probe->found;
 }
 
-/* The samples of a packet's hits: before and behind along the first axis, along the second, along the third. */
+/* Samples around a packet's hits: before and behind each hit along the first axis, then along the second and the
+ * third. */
 typedef struct kernel_samples_about {
     vm found[RENDER_DIFFERENCE_SAMPLES];
     vf values[RENDER_DIFFERENCE_SAMPLES];
 } kernel_samples_about;
 
-/* Samples over reach about the hits at t. s: one of the frame's. */
+/* Takes six samples around each hit at depth t, at the distance `reach`. s must be one of the frame's surfaces. */
 static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p, const kernel_surface *s, int value,
                                                           vm hit, vf t, vf reach, kernel_samples_about *out)
 {
@@ -148,12 +150,14 @@ static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p
                           .isovalue = s->layer->values[value]};
     for (int i = 0; i < RENDER_DIFFERENCE_SAMPLES; i++) {
         out->found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
-        out->values[i] = probe.sample + 0.0f; /* 0 instead of -0, which is not less */
+        /* turns -0 into 0, because the sign of a zero sample must not depend on the order of cells */
+        out->values[i] = probe.sample + 0.0f;
     }
 }
 
-/* Replace the cells' gradients in normal (camera axes) on the rays of hit by the samples' differences: one-sided where
- * one sample is in no cell; not where both of an axis are. */
+/* Replaces the cells' gradients in `normal` (camera axes) by differences of the samples, for the rays in `hit`. The
+ * difference is one-sided if one sample of an axis is in no cell. If both are in no cell, the ray keeps its cell's
+ * gradient. */
 SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_samples_about *about, vm hit, vf normal[3])
 {
     const render_camera *c = &p->frame->job->camera;
@@ -172,7 +176,7 @@ SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_sampl
     }
 }
 
-/* Both of these, where there is a reach. */
+/* Takes samples around the hits and computes normals from them, for hits with a reach above 0. */
 SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                                     vf normal[3])
 {
@@ -182,18 +186,18 @@ SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface
     kernel_differentiate(p, &about, hit, normal);
 }
 
-/* Half the offset of differences in scaled units. */
+/* Returns half the distance between two samples of a difference, in scaled units. */
 SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
                                           const kernel_cell *c)
 {
     return (float)(0.5 * layer->difference * kernel_size_of(c->world, c->count) * p->frame->job->space.scale);
 }
 
-/* ---- hits that wait ---- */
+/* ---- hits that wait for samples of other ranks ---- */
 
-/* Some of a list of hits: of one packet and one isovalue, each on its own lane. */
+/* A run of consecutive hits of a list: all are in one packet and of one isovalue, each in its own lane. */
 typedef struct kernel_waiting_run {
-    kernel_tile tile; /* kept from run to run */
+    kernel_tile tile; /* the run's tile, which is kept for the next run */
     kernel_packet packet;
     const kernel_surface *surface;
     int value, count;
@@ -222,7 +226,7 @@ SIMD_INLINE void kernel_waiting_surface(kernel_waiting_run *run, const kernel_fr
     }
 }
 
-/* Sets up the run that begins with the first of the hits; its length becomes run->count. */
+/* Sets up the run that begins with the first of the hits; run->count becomes its length. */
 static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, kernel_thread *thread,
                                 const render_waiting_hit *hits, int64_t count)
 {
@@ -256,7 +260,7 @@ static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, 
     kernel_packet_complete(&run->packet);
 }
 
-/* Samples this rank's cells about all hits. */
+/* Samples this rank's cells around all hits of the list; out[i] gets the samples of hits[i]. */
 static void kernel_sample_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_hit *hits,
                                   render_samples_about *out, int64_t count)
 {

@@ -1,6 +1,6 @@
-/* Lines along the edges of cells' faces that lie in the surface: of tets and pyramids which stand on faces of a mesh
- * (the session's outer surfaces). A hit is as far from an edge as the picture shows it, so that lines have one width
- * whatever way a face is turned. */
+/* Draws lines along edges of cells that lie in the surface. The cells are tets and pyramids that stand on faces of a
+ * mesh (the session's outer surfaces). The distance from a hit to an edge is measured in the picture, so that lines
+ * have the same width for any orientation of a face. */
 #ifndef RENDER_KERNEL_EDGES_H
 #define RENDER_KERNEL_EDGES_H
 
@@ -11,7 +11,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Vertices a and b of a cell in rays' planes, and how far from the rays the edge between them comes, squared. */
+/* Returns the squared distance from each ray to the edge between vertices a and b, which are given in the ray's plane.
+ * Raises *length to the edge's squared length. */
 SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2], vf *length)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -24,14 +25,15 @@ SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2], vf *length)
     return x * x + y * y;
 }
 
-/* Finds the vertex's distance across each ray, at the vertex's depth. */
+/* Computes the vertex's position relative to each ray, at the vertex's depth. */
 SIMD_INLINE void kernel_edge_place(const kernel_packet *p, float x, float y, float z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);
     out[1] = y - (p->origin_y + p->slope_y * z);
 }
 
-/* loop: the polygon's corner count, and its corners. */
+/* Returns the squared distance from each ray to the nearest edge of a polygon. loop: the polygon's number of corners,
+ * then its corners. */
 SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
 {
     vf last[2], next[2], nearest = vf_set(INFINITY);
@@ -48,7 +50,8 @@ SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, con
     return nearest;
 }
 
-/* The nearest edge's squared distance from each ray, and the longest edge's squared length. */
+/* Returns the squared distance from each ray to the nearest edge of the cell's face in the surface. *length: the
+ * squared length of the longest edge. */
 SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c, vf *length)
 {
     const render_part *part = &p->frame->job->parts[c->part];
@@ -64,8 +67,9 @@ SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c,
     return nearest;
 }
 
-/* Hits at t, whose colours are not lit yet. A pixel is covered by as much of a line as goes through its middle; where
- * faces are hardly wider than lines these fade, for else nothing but lines would be seen. */
+/* Draws edge lines over the unlit colours of hits at depth t. A line covers the share of a pixel that a strip of its
+ * width through the pixel covers. On faces that are hardly wider than a line, lines fade, because otherwise only lines
+ * would be visible. */
 static __attribute__((noinline)) void kernel_draw_edges(const kernel_packet *p, const render_surface_layer *layer,
                                                         const kernel_cell *c, vf t, vf colour[3])
 {

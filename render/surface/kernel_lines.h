@@ -1,15 +1,14 @@
-/* Contour lines on surfaces: where another field, interpolated in the cell that is hit, has one of the layer's levels.
+/* Draws contour lines on surfaces: lines on which another field, interpolated in the cell that is hit, equals one of
+ * the layer's levels.
  *
- * A hit is as many pixels away from the line of a level as |f - level| over the change of f from one pixel to the next.
- * That change is along the surface: the rays through the neighbouring pixels meet the surface's tangent plane beside
- * the hit. With a ray of direction d (1 along the view's axis), a surface normal n and the gradient g of f, a step
- * across the view at the hit's depth, and then along the ray back to the plane, changes f by
- *
+ * A hit's distance from the line of a level, in pixels, is |f - level| divided by the change of f from one pixel to the
+ * next. That change is taken along the surface: the rays through the neighbouring pixels meet the surface's tangent
+ * plane next to the hit. With a ray of direction d (1 along the view's axis), a surface normal n and the gradient g of
+ * f, a step across the view at the hit's depth, and then along the ray back to the plane, changes f by
  *      G = (gx, gy) - (nx, ny) (g.d) / (n.d)
- *
- * times the step's length, which is a pixel's size at that depth. A line covers of a pixel what a strip of its width
- * covers of a box of one pixel: a ramp one pixel wide at either side. Where lines are less than two widths apart they
- * fade, and at one width they are gone, for else nothing but lines would be seen.
+ * times the step's length, which is a pixel's size at that depth. A line covers the share of a pixel that a strip of
+ * its width covers of a box of one pixel: a ramp one pixel wide on either side. Lines that are less than two widths
+ * apart fade, and at a distance of one width they vanish, because otherwise only lines would be visible.
  *
  * Everything is computed from the cell and the ray alone, so that lines are the same on any partition. */
 #ifndef RENDER_KERNEL_LINES_H
@@ -27,19 +26,19 @@
 #include "render.h"
 #include "simd.h"
 
-/* The lines' field at hits, by the levels' domain; its gradient per scaled unit, and a vector of any length along the
- * surface's normal, both in camera axes. */
+/* The contour lines' field at hits: its value in the levels' domain; its gradient per scaled unit, and a vector of any
+ * length along the surface's normal, both in camera axes. */
 typedef struct kernel_along {
     vf value, gradient[3], normal[3];
 } kernel_along;
 
-/* Returns the field's value at a vertex, or NaN, in the levels' domain. */
+/* Returns the value, in the levels' domain, of the contour lines' field at a vertex; it may be NaN. */
 SIMD_INLINE double kernel_lines_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
 {
     return (grid_field_value(field, vertex) - s->lines.low) * s->lines.inverse_width;
 }
 
-/* Solves for the gradient of a field that changes by df along d, by Cramer's rule. */
+/* Computes the gradient g of a field that changes by df[i] along the vectors d[i], by Cramer's rule. */
 SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
 {
     double n[3][3];
@@ -51,7 +50,7 @@ SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], doubl
     for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
 }
 
-/* Computes the gradient of a field in the tet of these corners, per scaled unit, in camera axes. */
+/* Computes the gradient of a linear field in the tet with these corners, per scaled unit, in camera axes. */
 SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const corner[4], const double value[4],
                                      double out[3])
 {
@@ -68,7 +67,8 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
     }
 }
 
-/* Finds how the lines' field goes along the surface of a tet. t, normal: of hits, as kernel_tet_normal() has it. */
+/* Computes the contour lines' field, its gradient and the surface's normal at hits in a tet. t, normal: depths of the
+ * hits, and normals from kernel_tet_normal(). */
 static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, const kernel_surface *s,
                                                        const kernel_cell *c, vf t, const vf normal[3],
                                                        kernel_along *out)
@@ -78,7 +78,7 @@ static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, c
     double value[4], g[3];
     for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
     kernel_tet_gradient(p->frame, corner, value, g);
-    /* In tile space the third axis is the middle ray. */
+    /* In tile space the third axis is the tile's middle ray. */
     const double shear[2] = {(double)p->tile->shear_x, (double)p->tile->shear_y};
     const vf x = (p->origin_x + p->slope_x * t) - c->x[3], y = (p->origin_y + p->slope_y * t) - c->y[3];
     const float along = (float)(g[2] + (g[0] * shear[0] + g[1] * shear[1]));
@@ -89,8 +89,8 @@ static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, c
     }
 }
 
-/* Finds how the lines' field goes along the surface at r, each lane in its own cell, of which line has the field's
- * polynomial. */
+/* Computes the contour lines' field, its gradient and the surface's normal at r, each lane in its own cell. line: the
+ * field's polynomial. */
 SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map_lanes *map, const vf line[8], const vf r[3],
                                   kernel_along *out)
 {
@@ -109,7 +109,8 @@ SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map_lane
     out->value = kernel_value_of(line, map->is_pyramid, &m, r);
 }
 
-/* As above, of a packet's hits in one hex, wedge or pyramid. */
+/* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one hex, wedge or
+ * pyramid. */
 static __attribute__((noinline)) void kernel_curved_along(const kernel_packet *p, const kernel_surface *s,
                                                           const kernel_cell *c, const kernel_map_lanes *map,
                                                           const vf r[3], kernel_along *out)
@@ -125,13 +126,14 @@ static __attribute__((noinline)) void kernel_curved_along(const kernel_packet *p
     kernel_map_along(p->tile, map, spread, r, out);
 }
 
-/* The share of each hit's pixel that the nearest line covers, and which line that is. */
+/* The share of each hit's pixel that the nearest line covers, and the index of that line. */
 typedef struct kernel_cover {
     vf share;
     vi line;
 } kernel_cover;
 
-/* The share is 0 where the field does not change, or is not a number. */
+/* Computes which line is nearest to each hit, and the share of the pixel that it covers: 0 if the field is constant or
+ * NaN. */
 static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
                                                                  const kernel_surface *s, const kernel_rays *rays, vf t,
                                                                  const kernel_along *at)
@@ -162,7 +164,7 @@ static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_fr
     return out;
 }
 
-/* Draws the lines over colours that are not lit yet; returns the share that they cover. */
+/* Draws contour lines over unlit colours; returns the share of each pixel that a line covers. */
 SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
                                  const kernel_rays *rays, vf t, const kernel_along *at, vf colour[3])
 {

@@ -1,22 +1,21 @@
-/* Occluders: the cells that an isovalue of this rank's opaque surfaces crosses, by which rays from hits may be blocked.
- * Once a frame they are put into trees of their own, whose nodes have as many children as a vector has lanes. A ray
- * goes down alone and tests all children of a node, or all pieces of a leaf, at once. So rays need nothing in common,
- * and a ray ends at the first root that is found on it.
+/* Occluders are the cells that an isovalue of this rank's opaque surfaces crosses, which may block rays from hits.
  *
- *     tets              their pieces of the surface as triangles, which a ray meets or not
- *     other cells       a box, and two planes that the surface lies between: most rays pass beside
- *     hexes             the faces and the values there then decide, a ray and its hex a lane
+ * Once per frame they are put into trees of their own, whose nodes have as many children as a vector has lanes. A ray
+ * traverses a tree alone and tests all children of a node, or all pieces of a leaf, at once. So rays need not be
+ * coherent, and a ray ends at the first root that is found on it.
+ *     tets              their pieces of the surface are stored as triangles, which a ray meets or not
+ *     other cells       a box, and two planes between which the surface lies: most rays pass outside
+ *     hexes             the faces and the values there decide next, one ray-hex pair per lane
  *                       (kernel_occlusion_hexes.h)
- *     rays in doubt     are traced in the cell, as primary rays are (kernel_occlusion.h)
+ *     undecided rays    are traced in the cell like primary rays (kernel_occlusion.h)
+ * Everything is in tree space in float32, translated to the ray's origin and sheared along its largest axis (Woop,
+ * Benthin and Wald 2013). A triangle's vertices lie on edges of the mesh and are computed from the edge alone. An edge
+ * function is the same number with the other sign in both triangles of an edge, and 0 counts as inside for both: so no
+ * ray passes between two triangles. In tree space positions below 1 are rounded by at most 6e-8: so are vertices, and
+ * the ray's origin; the lift of 4e-6 (render_light.h) is much larger.
  *
- * Everything is in tree space in float32, moved to the ray's origin and sheared along its largest axis (Woop, Benthin
- * and Wald 2013). A triangle's vertices lie on edges of the mesh and are computed from the edge alone; an edge function
- * is the same number with the other sign in both triangles of an edge, and 0 counts for both: nothing slips through
- * between two. In tree space a place rounds by 6e-8 at most where coordinates are below 1: so do vertices, and the
- * ray's origin, which the lift of 4e-6 (render_light.h) outweighs.
- *
- * A box test may let a ray in that misses the box, but never the reverse. Everything else depends on the ray and the
- * cell alone. So answers do not depend on the trees, on the order in them, or on which rank holds a cell. */
+ * A box test may accept a ray that misses the box, but never the reverse. Everything else depends on the ray and the
+ * cell alone. So results do not depend on the trees, on their order, or on which rank holds a cell. */
 #ifndef RENDER_KERNEL_OCCLUDERS_H
 #define RENDER_KERNEL_OCCLUDERS_H
 
@@ -28,17 +27,19 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Rows of a leaf, each of as many floats as there are lanes. */
+/* Indices of the rows of a leaf, each of which has one float per lane. There is one list of rows for triangles, and one
+ * for slabs. */
 enum {
-    KERNEL_TRIANGLE_CORNERS = 0, /* x, y, z of three */
+    KERNEL_TRIANGLE_CORNERS = 0, /* x, y, z of the three corners */
     KERNEL_TRIANGLE_REACH = 9,
     KERNEL_TRIANGLE_ROWS,
-    KERNEL_SLAB_LOWER = 0, /* the cell's box */
+    KERNEL_SLAB_LOWER = 0, /* bounding box of the cell: lower and upper corner */
     KERNEL_SLAB_UPPER = 3,
-    KERNEL_SLAB_GRADIENT = 6, /* L = gradient . place + level; where the surface is, |L| is no more than thickness */
+    /* coefficients of L = gradient . position + level; on the surface |L| is at most `thickness` */
+    KERNEL_SLAB_GRADIENT = 6,
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
-    KERNEL_SLAB_BLUR, /* what L rounds by, times the size of places */
+    KERNEL_SLAB_BLUR, /* rounding error of L, divided by the size of positions */
     KERNEL_SLAB_REACH,
     KERNEL_SLAB_ROWS
 };
@@ -46,38 +47,40 @@ enum {
 /* A hex's record: 8 vertices with their values less the isovalue, corners and turned as in kernel_placed_curved. */
 enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_TURNED = 38, KERNEL_CURVED_RECORD_WORDS = 40 };
 
-/* A cell with one of its isovalues. */
+/* A cell, and one of the isovalues that cross it. */
 typedef struct kernel_occluder {
-    int32_t surface, value, part; /* among the frame's opaque surfaces; of the surface's */
+    /* index of the surface in the frame, of the isovalue in the surface's layer, and of the mesh part */
+    int32_t surface, value, part;
     uint32_t cell;
-    int32_t record; /* among hexes; -1: it has none */
+    int32_t record; /* index of the cell's record among those of hexes; -1 if it has none */
 } kernel_occluder;
 
-/* Nodes have as many children as there are lanes, lanes without one an empty box. */
+/* A tree whose nodes have one child per lane. Lanes without a child have an empty box. */
 typedef struct kernel_occluder_tree {
-    int32_t node_count, leaf_count; /* 0: nothing is in it */
-    float *boxes;                   /* node_count × 6 rows: lower, upper */
-    int32_t *children;              /* node_count × lanes: a node, or ~leaf */
-    float *leaves;                  /* rows of all leaves */
-    int32_t *sources;               /* leaves × lanes: of a triangle its surface, of a slab its occluder; -1: none */
-    float size;                     /* no coordinate is larger */
+    int32_t node_count, leaf_count; /* numbers of nodes and leaves; 0 if the tree is empty */
+    float *boxes;                   /* boxes of the nodes' children: per node 6 rows of lanes, lower and upper corner */
+    int32_t *children;              /* per node and lane: the index of a child node, or ~index of a leaf */
+    float *leaves;                  /* the rows of all leaves */
+    /* per leaf and lane: a triangle's surface or a slab's occluder; -1 if the lane is empty */
+    int32_t *sources;
+    float size; /* upper bound of the magnitude of all coordinates */
 } kernel_occluder_tree;
 
 typedef struct kernel_occluders {
-    int width; /* lanes of the kernels that go down the trees */
+    int width; /* number of lanes of the kernels that traverse the trees */
     kernel_occluder_tree triangles, slabs;
     kernel_occluder *cells;
-    float *hexes; /* records */
+    float *hexes; /* records of hexes (KERNEL_CURVED_RECORD_WORDS floats each) */
 } kernel_occluders;
 
-/* A ray in tree space. */
+/* A ray from a hit, in tree space. It ends at the distance `far`, and is open until something blocks it. */
 typedef struct kernel_straight {
-    float origin[3], direction[3]; /* unit length */
+    float origin[3], direction[3]; /* the direction has unit length */
     float far;
     bool is_open;
 } kernel_straight;
 
-/* A ray that must be traced in a cell. */
+/* A ray that the trees cannot decide for a cell, so that it must be traced in that cell. */
 typedef struct kernel_doubt {
     int32_t ray, occluder;
 } kernel_doubt;
@@ -86,20 +89,21 @@ typedef struct kernel_straights {
     int count;
     kernel_straight *rays;
     int64_t doubt_count, capacity;
-    kernel_doubt *doubts; /* in the order of rays */
+    kernel_doubt *doubts; /* undecided ray-cell pairs, sorted by ray */
     bool (*grow)(struct kernel_straights *rays);
 } kernel_straights;
 
-/* ---- a ray, ready to go down ---- */
+/* ---- a ray, prepared for traversal ---- */
 
 typedef struct kernel_plumb {
     const kernel_straight *ray;
-    /* Planes are met at plane * inverse + shift; boxes are widened by what that rounds by. */
+    /* A plane is met at the distance plane * inverse + shift. The shifts of near and far planes extend boxes by their
+     * rounding. */
     vf inverse[3], near_shift[3], far_shift[3];
     int near_row[3], far_row[3];
-    int kx, ky, kz; /* kz: the direction's largest axis */
+    int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
     float shear_x, shear_y, stretch;
-    float size; /* for places: for what slabs round by */
+    float size; /* size of positions, for the rounding of L in slabs */
 } kernel_plumb;
 
 SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)
@@ -113,7 +117,8 @@ SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)
     p->shear_y = ray->direction[p->ky] * p->stretch;
 }
 
-/* Two products and a difference round by at most 3 units of the positions' size, the inverse by one more. */
+/* Prepares a ray for a tree. The distance to a plane, two products and a difference, rounds by at most 3 units of the
+ * positions' size, the inverse by one more; boxes are extended by more than that. */
 SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size, kernel_plumb *p)
 {
     float size = tree_size;
@@ -133,7 +138,7 @@ SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size,
     kernel_plumb_axes(ray, p);
 }
 
-/* Returns the boxes, given in six rows, that the ray meets, and the distances between which it is in them. */
+/* Returns the boxes, given in six rows, that the ray meets; stores the distances at which it enters and leaves them. */
 SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);
@@ -147,7 +152,7 @@ SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *
 
 /* ---- triangles ---- */
 
-/* Returns the leaf's triangles that the ray meets, and where. */
+/* Returns the triangles of a leaf that the ray meets, and stores the distances of the crossings in *t. */
 SIMD_INLINE vm kernel_plumb_triangles(const kernel_plumb *p, const float *rows, vf *t)
 {
     const float *o = p->ray->origin;
@@ -170,7 +175,7 @@ SIMD_INLINE vm kernel_plumb_triangles(const kernel_plumb *p, const float *rows, 
 
 /* ---- slabs ---- */
 
-/* L on the ray is level + rise t. */
+/* Computes L of each slab along the ray, level + rise * t, and the slab's thickness including rounding. */
 SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf *level, vf *rise, vf *thickness)
 {
     *level = vf_load(rows + KERNEL_SLAB_LEVEL * SIMD_WIDTH);
@@ -184,7 +189,8 @@ SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf
         vf_load(rows + KERNEL_SLAB_BLUR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
 }
 
-/* Returns the leaf's cells in which the ray may meet the surface. */
+/* Returns the cells of a leaf in which the ray may meet the surface: it meets the cell's box, and the slab within the
+ * box. */
 SIMD_INLINE vm kernel_plumb_slabs(const kernel_plumb *p, const float *rows, vf *level, vf *rise, vf *thickness)
 {
     vf low, high;
@@ -194,7 +200,7 @@ SIMD_INLINE vm kernel_plumb_slabs(const kernel_plumb *p, const float *rows, vf *
     low = vf_max(0.9999f * vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH), low);
     kernel_plumb_level(p, rows, level, rise, thickness);
     const vf first = *level + *rise * low, last = *level + *rise * high;
-    /* A ray without an end leaves the box before, so that high is a number. */
+    /* A ray without an end leaves the box at a finite distance, so `high` is finite. */
     const vm beside = vm_or(vf_lt(*thickness, vf_min(first, last)), vf_lt(vf_max(first, last), -*thickness));
     return vm_andnot(vm_and(met, vf_le(low, high)), beside);
 }

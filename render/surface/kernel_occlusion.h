@@ -1,6 +1,6 @@
-/* Decides whether opaque surfaces hide a light or the sky from a hit. Any root in [t_near, t_far) blocks the ray, so
- * the answer does not depend on which cell is traced first or on which rank. Roots are found as those of primary rays
- * are, but they need no normal, no colour and no order. */
+/* Tests exactly whether a cell's opaque surface blocks rays from hits to lights or to the sky. Any root in [t_near,
+ * t_far) blocks the ray, so the result does not depend on the order of cells or on the partition. Roots are found as
+ * for primary rays, but no normal, no colour and no order is needed. */
 #ifndef RENDER_KERNEL_OCCLUSION_H
 #define RENDER_KERNEL_OCCLUSION_H
 
@@ -28,13 +28,13 @@ typedef struct kernel_occlusion {
     const kernel_surface *surface;
     int layer;
     const kernel_bundle *bundle;
-    int first; /* the packet's first ray in the bundle */
-    /* The cell that the rays are traced in. */
+    int first; /* index in the bundle of the packet's first ray */
+    /* The cell in which the rays are traced: its vertices in world coordinates. */
     double (*world)[3];
     int vertex_count;
 } kernel_occlusion;
 
-/* Returns the rays whose root is farther from the hit than the layer's contact. */
+/* Returns the rays whose root at t is farther from the hit than the layer's `contact` distance. */
 static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
 {
     const double size = kernel_size_of((const double(*)[3])o->world, o->vertex_count);
@@ -43,7 +43,7 @@ static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet 
     return vf_le(vf_set((float)reach), (t - p->t_near) * length);
 }
 
-/* Returns the rays whose root no clip cuts away. */
+/* Returns the rays whose root at t is kept by all clips of the layer. */
 static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_packet *p, const kernel_occlusion *o,
                                                                 vm hit, vf t)
 {
@@ -59,7 +59,7 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_pac
     return vm_from_bits(kept);
 }
 
-/* Ends the rays whose roots at t count, and returns these rays. */
+/* Ends the rays whose roots at t block them, and returns these rays. */
 SIMD_INLINE vm kernel_occlusion_take(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
@@ -79,7 +79,7 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
     if (vm_any(change)) kernel_occlusion_take(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
-/* Takes the roots of the interval in turn, until one counts on each ray. */
+/* Finds the roots of the interval one after the other, until each ray is blocked or has no more roots. */
 SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
                                         const kernel_interval *i, vm wanted)
 {
@@ -137,7 +137,8 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     }
 }
 
-/* Cells stay in the cache, in order, from bundle to bundle; each bundle moves them into its own space. */
+/* Tests a polyhedron. Cells stay in the cache, decomposed and sorted, from bundle to bundle; each bundle transforms
+ * them into its own space. */
 static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const int part = occluder->part;
@@ -165,7 +166,7 @@ SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, 
     c->has_lines = c->has_normal = false;
 }
 
-/* Ends the rays of the packet that the cell's surface blocks. */
+/* Removes the rays that the cell's surface blocks from the packet's active rays. */
 static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const render_surface_layer *layer = o->surface->layer;
@@ -186,7 +187,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
         kernel_occlusion_curved(p, o, c, p->active);
 }
 
-/* Closes the bundle's open rays that the cell blocks. */
+/* Clears the open bits of the bundle's rays that the cell's surface blocks. */
 static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread, kernel_bundle *b,
                                    const kernel_occluder *occluder)
 {

@@ -1,7 +1,7 @@
-/* Rays and hexes in pairs, one a lane: does the hex's surface block the ray? Where the ray crosses two faces, the
- * values there tell in most cases; what is left is in doubt, and asked of the cell as primary rays ask it. A face is
- * crossed by the operations of kernel_curved_rays.h on places that are the ray's and the vertex's alone, so that of two
- * hexes that share the face, on whichever ranks, one has what the other leaves. */
+/* Tests whether hexes block rays from hits, one ray-hex pair per lane. If the ray crosses two faces, the values there
+ * decide in most cases; the remaining pairs are undecided, and are traced in the cell like primary rays. Crossings of
+ * faces are computed by the operations of kernel_curved_rays.h, from positions that depend on the ray and the vertex
+ * alone. So if two hexes share a face, on whichever ranks, the ray leaves one exactly where it enters the other. */
 #ifndef RENDER_KERNEL_OCCLUSION_HEXES_H
 #define RENDER_KERNEL_OCCLUSION_HEXES_H
 
@@ -30,10 +30,10 @@ SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occ
     return true;
 }
 
-/* Rays in lanes: the origin and the shear along each one's own axes. */
+/* Rays in lanes: origin and shear along each ray's own axes. */
 typedef struct kernel_plumb_lanes {
-    int32_t record[SIMD_WIDTH]; /* where it begins */
-    float axis[SIMD_WIDTH];     /* kz; kx and ky follow it in turn */
+    int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
+    float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
 } kernel_plumb_lanes;
 
@@ -58,7 +58,8 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
     return out;
 }
 
-/* Vertices as their rays see them: across it x and y, with the ray at the origin, and along it the distance. */
+/* Computes the vertices as seen by their rays: x and y across the ray, which is at the origin, and the distance along
+ * it. */
 SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays)
 {
     kernel_placed_curved *h = &pairs->placed;
@@ -116,18 +117,19 @@ SIMD_INLINE void kernel_pairs_lines(kernel_placed_curved *h)
     vf_store(h->doubt, vf_set(0));
 }
 
-/* What is known of pairs: blocked, or in doubt; the others are open. */
+/* The result for pairs: blocked, or in doubt; other pairs are open. */
 typedef struct kernel_pair_verdict {
     vm blocked, doubt;
 } kernel_pair_verdict;
 
-/* L at the distance. */
+/* Returns L at the distance t along each ray. */
 SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
 {
     return vf_load(pairs->level) + vf_load(pairs->rise) * t;
 }
 
-/* L is farther from 0 than where the surface is, on one side all the way. */
+/* Returns the pairs for which |L| exceeds the slab's thickness with the same sign at both distances, so that the
+ * surface is not met between them. */
 SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf to)
 {
     const vf first = kernel_pairs_level(pairs, from), last = kernel_pairs_level(pairs, to);
@@ -135,7 +137,8 @@ SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf 
     return vm_or(vf_lt(thick, vf_min(first, last)), vf_lt(vf_max(first, last), -thick));
 }
 
-/* The field is monotone along the ray, and at neither end so near 0 that what it jumps by at faces may matter. */
+/* Returns the pairs for which the field is monotone along the ray and at both ends farther from 0 than the jumps at
+ * faces: its signs at the ends then decide. */
 static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pairs *pairs, const kernel_point ends[2])
 {
     static const kernel_beam beam = {.spread = 0};

@@ -1,4 +1,4 @@
-/* Rays from hits go down the trees of occluders (kernel_occluders.h), each alone. */
+/* Traverses the trees of occluders (kernel_occluders.h) with rays from hits, one ray at a time. */
 #ifndef RENDER_KERNEL_OCCLUSION_RAYS_H
 #define RENDER_KERNEL_OCCLUSION_RAYS_H
 
@@ -10,8 +10,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* The stack of nodes, and of leaves as ~leaf, that a ray has yet to visit. Each node on the way down leaves all its
- * children but one on it, and the tree is no deeper than a binary tree whose leaves are divided once more. */
+/* Size of the stack of nodes, and of leaves stored as ~leaf, that a ray has yet to visit. Each level of the tree leaves
+ * at most all its children but one on the stack, and the tree is no deeper than a binary tree whose leaves are divided
+ * once more. */
 enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
 typedef struct kernel_path {
@@ -41,7 +42,7 @@ SIMD_INLINE int32_t kernel_path_next(kernel_path *path, const kernel_plumb *p)
     return -1;
 }
 
-/* Do the clips keep the ray's crossing of any of the surfaces? */
+/* Returns whether the clips keep the ray's crossing of at least one of the surfaces in `met`. */
 static __attribute__((noinline, cold)) bool kernel_straight_kept(const kernel_frame *f, const kernel_straight *ray,
                                                                  const int32_t *surfaces, unsigned met, vf t)
 {
@@ -76,13 +77,14 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* The results of one ray for the leaf's cells, a cell a lane. */
+/* The results of one ray for the cells of a leaf, one cell per lane. */
 typedef struct kernel_leaf_lanes {
     int ray;
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
 } kernel_leaf_lanes;
 
-/* Queues the ray for the cell in lane i: with other hexes, or as a doubt. Returns false where memory ran out. */
+/* Queues the ray-cell pair in lane i: with other hexes if it is a hex with a record, else as a pair to be traced
+ * exactly. Returns false if memory ran out. */
 static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_curved_pairs *pairs,
                               const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
@@ -125,7 +127,7 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, k
     return is_well;
 }
 
-/* Closes the rays that are blocked for certain, and notes the cells in which the others must be traced. */
+/* Closes the rays that are certainly blocked, and records the cells in which the other rays must be traced. */
 static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o, kernel_straights *s)
 {
     kernel_curved_pairs pairs;

@@ -1,5 +1,5 @@
-/* A packet's nearest opaque hits are lit and written as fragments, and so are hits that waited for other ranks' samples
- * of their surroundings. */
+/* Lights a packet's nearest opaque hits and emits them as fragments, and lights hits that waited for other ranks'
+ * samples. */
 #ifndef RENDER_KERNEL_PACKET_SURFACE_H
 #define RENDER_KERNEL_PACKET_SURFACE_H
 
@@ -12,7 +12,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Normals by differences of the nearest opaque hits of a surface. Returns those that have theirs. */
+/* Computes normals by differences for the nearest opaque hits of a surface. Returns the hits that have a normal; the
+ * others wait for samples of other ranks. */
 SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
     vm ready = vm_none();
@@ -26,7 +27,7 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
     return ready;
 }
 
-/* Writes the nearest opaque hits, lit, as fragments. */
+/* Lights the nearest opaque hits and emits them as fragments. */
 SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
 {
     for (int n = 0; n < p->frame->opaque_count; n++) {
@@ -44,7 +45,8 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
     }
 }
 
-/* Lights hits that waited, by the samples of all ranks. out: as many fragments. */
+/* Lights `count` hits of the waiting list from index `first` on, by the merged samples of all ranks. out[i] becomes the
+ * fragment of hit i. */
 static void kernel_light_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_list *list,
                                  const render_samples_about *samples, int64_t first, int64_t count, fragment *out)
 {

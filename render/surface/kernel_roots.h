@@ -1,33 +1,36 @@
-/* All crossings of an isovalue in a cell's interval: each isolated, then polished.
+/* Computes all crossings of an isovalue in a cell's interval: each is isolated, then refined.
  *
- * Along the ray a point has the cell's coordinates r*(u), 0 <= u <= 1, a curve with X(r*(u)) straight, and the field
- * is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic (F is
- * trilinear), of which we know both ends and both end slopes, so its four Bernstein coefficients, which bound it. How
- * far is the curve from the chord? Let Y = J0^-1 X with J0 the Jacobian at the cell's centre: Y(r) = r + N(r) + const,
- * N's derivative at most theta (found at the corners of the cell's domain: a norm is convex along each axis).
- * So |r1 - r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) less the line
- * between its ends: again a cubic with known coefficients 0, e1, e2, 0, hence
+ * Along the ray a point has the reference coordinates r*(u), 0 <= u <= 1, a curve whose image X(r*(u)) is straight, and
+ * the field is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic (F
+ * is trilinear) of which both ends and both end slopes are known, and so its four Bernstein coefficients, which bound
+ * it. The distance from the chord to the curve is bounded as follows. Let Y = J0^-1 X with J0 the Jacobian at the
+ * cell's centre: Y(r) = r + N(r) + const, where N's derivative is at most theta (computed at the corners of the
+ * reference domain, as a norm is convex along each axis). So |r1 - r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And
+ * Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) minus the line between its ends: again a cubic, with the known coefficients 0,
+ * e1, e2, 0. Hence
  *     |c - r*| <= dev = L 3/4 max(|e1|, |e2|),          |F(c) - F(r*)| <= G dev,
  *     |c' - r*'| <= L (K dev |b - a| + |e'|) = dev',    |F(c)' - F(r*)'| <= H dev (|b - a| + dev') + G dev',
- * with G, H, K bounds of F's gradient, F's Hessian and N's. dev falls by four when a piece is halved, and is 0 where
- * the map is affine: there F(c(u)) is the field itself.
+ * with G, H, K bounds of F's gradient, F's Hessian and N's Hessian. dev decreases by a factor of four when a piece is
+ * halved, and is 0 if the map is affine: then F(c(u)) is the field itself.
  *
- * A piece whose coefficients are all farther from 0 than G dev has no root; one whose derivative's coefficients are
- * all of one sign and farther from 0 than their bound has one root where the ends' signs differ, else none; any other
- * piece is halved, the nearer half first. At 2^-12 of the interval bisection ends: a pair of roots that is missed there
- * dips below 0 by at most |F''| (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own rounding of F.
+ * A piece whose coefficients are all farther from 0 than G dev has no root. A piece whose derivative's coefficients are
+ * all of one sign and farther from 0 than their bound has one root if the ends' signs differ, else none. Any other
+ * piece is halved, and the nearer half is processed first. Bisection ends at 2^-12 of the interval: a pair of roots
+ * that is missed there dips below 0 by at most |F''| (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own
+ * rounding of F.
  *
- * Before any of that bounds of the whole cell are asked (kernel_bounds.h): where the field is monotone along every ray
- * in the cell, the signs at the faces tell all, and where it is far from the isovalue at both, there is no root.
+ * Before that, bounds of the whole cell are tested (kernel_bounds.h): if the field is monotone along every ray in the
+ * cell, the signs at the faces decide; if it is far from the isovalue at both faces, there is no root.
  *
- * The pyramid's m = a b / k is no polynomial, but its second derivative along a line has one sign, so that F(c(u)) lies
- * between its chord and its end tangents and e(u) below e's: the same two slopes at the ends bound them.
+ * The pyramid's m = a b / k is not a polynomial, but its second derivative along a line has one sign. So F(c(u)) lies
+ * between its chord and its end tangents, and e(u) below e's tangents: the same two slopes at the ends bound them.
  *
- * The signs at the faces are the face values', as in all of kernel_surface.h: where the interpolant just inside a
- * warped face has the other sign, the crossing is at the face. So crossings alternate along a ray, through all its
- * cells.
+ * The signs at the faces are those of the face values, as in kernel_surface.h: if the interpolant just inside a warped
+ * face has the other sign, the crossing is at the face. So crossings alternate in direction along a ray, through all
+ * its cells.
  *
- * Where theta is 0.9 and more (cells folded or nearly so) nothing is proved: L = 10 and at least 8 pieces are taken. */
+ * If theta is 0.9 or more (the cell is folded or nearly so), nothing is proved: then L = 10, and at least 8 pieces are
+ * used. */
 #ifndef RENDER_KERNEL_ROOTS_H
 #define RENDER_KERNEL_ROOTS_H
 
@@ -40,15 +43,15 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-#define KERNEL_ROOT_BAND 3e-7f /* rounding of F where the largest |F| at a vertex is near 1 */
+#define KERNEL_ROOT_BAND 3e-7f /* rounding error of F if the largest |F| at a vertex is near 1 */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
-/* The verdict on a piece of the interval. */
+/* What is known about a piece of the interval, per ray. */
 typedef struct kernel_verdict {
-    vm clear;    /* no root, and all of side's sign */
-    vm monotone; /* at most one root */
-    vm tiny;     /* all of it rounding */
+    vm clear;    /* the piece has no root: the field has the sign `side` everywhere */
+    vm monotone; /* the field is monotone, so the piece has at most one root */
+    vm tiny;     /* the field is so close to 0 everywhere that its sign is only rounding */
 } kernel_verdict;
 
 /* What kernel_bounds has of each ray's own cell. */
@@ -76,14 +79,15 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
     out->is_monotone = vf_le(vf_set(0), kernel_take(b->jump, lane));
 }
 
-/* The straight way between two points of the map, and the product of the map at each. */
+/* The chord between two points in reference coordinates, and the map's product m at both. */
 typedef struct kernel_chord {
     const kernel_point *from, *to;
     kernel_product m[2];
     vf move[3];
 } kernel_chord;
 
-/* Deviation of the chord from the line in Y: the largest of |e1|, |e2|, and of the derivative's coefficients / 3. */
+/* Computes how far the map bends along the chord: the largest of |e1| and |e2| (*size), and of the coefficients of e's
+ * derivative divided by 3 (*slope). */
 SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const kernel_chord *c, vf *size, vf *slope)
 {
     const vf *from = c->from->r, *to = c->to->r;
@@ -120,7 +124,7 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
     if (is_pyramid) {
-        /* The tangents at the ends meet at this share of the way. */
+        /* The tangents at both ends intersect at this fraction of the piece. */
         const vf turn = d0 - d1;
         const vf at = vf_select(vf_eq(turn, vf_set(0)), vf_set(0), (rise - d1) / turn);
         b1 = b2 = from->value + d0 * vf_clamp(at, vf_set(0), vf_set(1));
@@ -142,7 +146,8 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
     return out;
 }
 
-/* A search under way: pieces [number, number + 1] * size of the interval, in order. */
+/* The state of a search for roots, per ray. The interval is divided into pieces from number * size to (number + 1) *
+ * size, which are processed in order. */
 typedef struct kernel_search {
     kernel_rays rays;
     kernel_map_lanes map; /* set up where more is asked than the interval's ends tell, as the limits are */
@@ -150,11 +155,11 @@ typedef struct kernel_search {
     const kernel_interval *interval;
     int64_t *failures; /* the map's */
     vm open;           /* rays that have pieces left */
-    vm ended;          /* rays that came to the end: side is that of their last piece */
-    vf side;           /* from's: 1 or -1 */
+    vm ended;          /* rays whose last piece has been processed; `side` is then the field's sign at its end */
+    vf side;           /* sign of the field at `from`: 1 or -1 */
     vf number, size, pieces;
     kernel_point from, end;
-    vm found; /* rays with a root between low and high, */
+    vm found; /* rays with a root between the points low and high */
     kernel_point low, high;
 } kernel_search;
 
@@ -163,14 +168,14 @@ SIMD_INLINE vf kernel_side(vf v)
     return vf_select(vf_lt(v, vf_set(0)), vf_set(-1), vf_set(1));
 }
 
-/* The interpolant at a face, or the face's value where that is the same but for rounding. */
+/* Computes the field just inside a face. If it equals the face's value up to rounding, the face's value is used. */
 SIMD_INLINE void kernel_search_face(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
     const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
-/* How far Y at the coordinates that a face gave is from the ray. */
+/* Returns the distance from Y, at the reference coordinates of a face's crossing, to the ray. */
 SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
 {
     const kernel_map_lanes *map = &s->map;
@@ -186,7 +191,7 @@ SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
     return vf_sqrt(sum);
 }
 
-/* Begins a search of which only the interval's ends are known. */
+/* Initializes a search; only the interval's ends are known. */
 SIMD_INLINE void kernel_search_begin(kernel_search *s)
 {
     kernel_point_ends(s->interval, &s->low, &s->high);
@@ -203,7 +208,7 @@ SIMD_INLINE vm kernel_search_changes(const kernel_search *s)
     return vm_xor(vf_lt(s->interval->v_in, vf_set(0)), vf_lt(s->interval->v_out, vf_set(0)));
 }
 
-/* Returns L (kernel_bounds.h) of each ray's cell, on the ray at depth t. */
+/* Returns the linear function L (kernel_bounds.h) of each ray's cell at depth t on the ray. */
 SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
 {
     vf g[3], at[3];
@@ -215,8 +220,8 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
     return (kernel_take(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
 }
 
-/* Decides rays by the ends of their intervals and the bounds of their cells: *found gets those with just one root.
- * Returns those that are left undecided. */
+/* Decides rays by the values at the ends of their intervals and the bounds of their cells. *found: rays with exactly
+ * one root. Returns the rays that remain undecided; all others have no root. */
 SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
                                   const kernel_point *in, const kernel_point *out, vm *found)
 {
@@ -233,7 +238,7 @@ SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *ray
     return vm_andnot(left, vm_and(searched, far));
 }
 
-/* The whole interval first, by the faces' coordinates and values: most rays are done with it. */
+/* Judges the whole interval as one piece, by the coordinates and values at the faces; that decides most rays. */
 SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
@@ -249,7 +254,8 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     if (!vm_any(s->open)) return;
     kernel_search_face(s, s->open, i->v_in, &s->from);
     kernel_search_face(s, s->open, i->v_out, &s->end);
-    /* Just inside a warped face the other sign: a root in no room. */
+    /* If the field just inside a warped face has the other sign than the face's value, there is a root at the face
+     * itself. */
     const vm jumps = vm_andnot(s->open, vf_eq(kernel_side(s->from.value), s->side));
     kernel_point_move(jumps, &s->from, &s->low);
     kernel_point_move(jumps, &s->from, &s->high);
@@ -257,7 +263,7 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     s->found = vm_or(s->found, jumps);
 }
 
-/* Begins it on rays in the cells of their lanes. False where there is nothing to find. */
+/* Begins a search for rays, each in its own cell. Returns false if no ray has a root. */
 static __attribute__((noinline)) bool kernel_search_in(kernel_search *s, const kernel_curved *c,
                                                        const kernel_rays *rays, vi lane, const kernel_interval *i,
                                                        vm wanted, int64_t *failures)
@@ -276,7 +282,7 @@ static __attribute__((noinline)) bool kernel_search_in(kernel_search *s, const k
     return true;
 }
 
-/* The end of the current piece. */
+/* Computes the end of each ray's current piece. */
 SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_point *to)
 {
     const kernel_interval *i = s->interval;
@@ -290,7 +296,7 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     kernel_point_move(inner, &at, to);
 }
 
-/* Goes on to the next piece, the longest that starts there. */
+/* Advances rays to the next piece, which is the longest that begins at this position. */
 SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_point *to)
 {
     kernel_point_move(rays, to, &s->from);
@@ -303,7 +309,7 @@ SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_p
     s->ended = vm_or(s->ended, over);
 }
 
-/* To the next root of each open ray. */
+/* Searches for the next root of each open ray. */
 SIMD_INLINE void kernel_search_next(kernel_search *s)
 {
     vm going = s->open;
@@ -318,7 +324,8 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
         const vm decided = vm_and(going, vm_or(vm_or(certain, v.tiny), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
-        s->pieces += vf_select(going, vf_set(1), vf_set(0)); /* each ray's own: it is searched as alone */
+        /* counted per ray, so that a ray's result does not depend on the other rays */
+        s->pieces += vf_select(going, vf_set(1), vf_set(0));
         kernel_point_move(roots, &s->from, &s->low);
         kernel_point_move(roots, &to, &s->high);
         s->found = vm_or(s->found, roots);
@@ -330,7 +337,8 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     }
 }
 
-/* Rays that have come to their end with the other sign than the face's: a root in no room there. */
+/* Tests the exit faces of rays whose last piece is done: if the field just inside has the other sign than the face's
+ * value, there is a root at the face itself. */
 SIMD_INLINE void kernel_search_end(kernel_search *s)
 {
     s->found = vm_andnot(s->ended, vf_eq(kernel_side(s->interval->v_out), s->side));
@@ -339,7 +347,7 @@ SIMD_INLINE void kernel_search_end(kernel_search *s)
     kernel_point_move(s->found, &s->end, &s->high);
 }
 
-/* Goes on to further roots. Returns false where there can be none. */
+/* Continues the search with the next roots. Returns false if there are none. */
 static __attribute__((noinline)) bool kernel_search_on(kernel_search *s)
 {
     if (vm_any(s->open))
@@ -351,14 +359,15 @@ static __attribute__((noinline)) bool kernel_search_on(kernel_search *s)
     return true;
 }
 
-/* No more of these rays. */
+/* Ends the search for the given rays. */
 SIMD_INLINE void kernel_search_close(kernel_search *s, vm rays)
 {
     s->open = vm_andnot(s->open, rays);
     s->ended = vm_andnot(s->ended, rays);
 }
 
-/* Regula falsi that halves the value of an end that stays (Illinois), within low and high. */
+/* Refines roots between low and high by regula falsi in the Illinois variant, which halves the value of an end that is
+ * kept; every third step is a bisection. */
 SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *out)
 {
     kernel_point low = s->low, high = s->high;
@@ -377,7 +386,7 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
     }
 }
 
-/* ---- the last step ---- */
+/* ---- the last step of a refinement ---- */
 
 SIMD_INLINE kernel_half kernel_half_value(const kernel_half c[8], const kernel_half r[3], kernel_half m)
 {
@@ -410,7 +419,7 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map_lane
     }
 }
 
-/* How far a place is off the four equations X(r) = ray(t), F(r) = 0, and the product of the map there. */
+/* The residuals of the four equations X(r) = ray(t), F(r) = 0 at a point, and the map's product m there. */
 typedef struct kernel_residual {
     kernel_product m;
     vf off[3], value;
@@ -455,7 +464,8 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_la
     kernel_residual residual;
     residual.m = kernel_product_at(map->is_pyramid, out->r);
     kernel_residuals(rays, map, out, residual.off, &residual.value);
-    /* At a double root the field's slope is rounding, and a step by it leads away. */
+    /* At a double root the field's derivative is only rounding, so a step that uses it leads away; such a step is not
+     * taken. */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }
@@ -497,7 +507,8 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
     return open;
 }
 
-/* Polishes the roots that are found. Where Newton's steps do not converge, the bracket alone is halved. */
+/* Refines the roots that have been found. Rays for which Newton's method does not converge are refined by
+ * bracketing. */
 static __attribute__((noinline)) void kernel_polish(const kernel_search *s, kernel_point *out)
 {
     const vm open = kernel_polish_lanes(&s->rays, &s->map, s->found, &s->low, &s->high, out);

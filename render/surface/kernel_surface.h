@@ -1,10 +1,10 @@
-/* Isosurfaces in cells: which crossings a ray has, and what becomes of a hit (thesis, sections 4.3.3 to 4.3.5).
+/* Intersects rays with isosurfaces in cells, and accepts the hits (thesis, sections 4.3.3 to 4.3.5).
  *
- * Within a cell, values are taken relative to the isovalue in double before they are rounded, so that their signs are
- * exact, and scaled by a power of two. Whether the surface crosses an interval an odd number of times is decided by the
- * signs at its two faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a
- * face exactly one has a crossing next to it. kernel_roots.h finds all crossings of an interval. The second half has
- * polyhedra (kernel_polyhedron.h). */
+ * Within a cell, the isovalue is subtracted from values in double before they are rounded, so that their signs are
+ * exact, and they are scaled by a power of two. Whether the surface crosses an interval an odd number of times is
+ * decided by the signs at its two faces alone (non-negative counts as inside). Both signs are those of the faces
+ * themselves, so of two cells that share a face exactly one has a crossing next to it. kernel_roots.h computes all
+ * crossings of an interval. The second half of this file handles polyhedra (kernel_polyhedron.h). */
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
 
@@ -35,8 +35,8 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Finds the hits' normals by differences and returns the hits; or, where other ranks may have samples, lets hits wait
- * and returns the others. */
+/* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples, hits are moved to
+ * the waiting list instead, and only the remaining ones are returned. */
 SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                              kernel_look *look)
 {
@@ -45,16 +45,16 @@ SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int valu
     return hit;
 }
 
-/* Hits of one isovalue in one cell. */
+/* The hits of one isovalue in one cell. */
 typedef struct kernel_accepted {
     int value;
     vf t, reach;
-    vf opacity; /* of transparent surfaces */
+    vf opacity; /* used only by transparent surfaces */
     kernel_look look;
     kernel_hit_cells cells;
 } kernel_accepted;
 
-/* Writes hits at the same depth as the nearest ones as fragments of their own. */
+/* Emits hits with the same depth as the nearest ones as fragments of their own. */
 static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                                const kernel_accepted *h)
 {
@@ -65,7 +65,7 @@ static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p,
     kernel_emit_tied(p, s, h->value, ready, h->t, own.normal, own.colour);
 }
 
-/* Keeps the nearest hits. */
+/* Stores hits of an opaque surface as the nearest ones of their rays. */
 SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *state, vm hit, const kernel_accepted *h)
 {
     const kernel_surface *s = state->surface;
@@ -90,7 +90,7 @@ SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *st
     hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + h->value)), hits->kind);
 }
 
-/* Writes the hits of a transparent surface. */
+/* Lights the hits of a transparent surface and emits them as fragments. */
 SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_state *state, vm hit, kernel_accepted *h)
 {
     const kernel_surface *s = state->surface;
@@ -105,8 +105,8 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
     kernel_emit(p, hit, kind, &f);
 }
 
-/* Draws contour lines over the hits' colours, unless these are numbers. Returns the hits that are seen: where lines are
- * alone, those that one covers. */
+/* Draws contour lines over the hits' colours, unless numbers are painted. Returns the visible hits: if only lines are
+ * drawn, those that a line covers. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
                                                         const kernel_hit_places *at, kernel_accepted *h)
 {
@@ -123,7 +123,8 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
     return vm_and(hit, vf_lt(vf_set(0), share));
 }
 
-/* Takes hits: the nearest are kept; those of a transparent surface are written at once. c: NULL of polyhedra. */
+/* Accepts hits: those of an opaque surface are kept as the nearest ones; those of a transparent surface are emitted at
+ * once. c: the cell; NULL for polyhedra. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
                                const kernel_hit_places *at)
 {
@@ -131,7 +132,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     kernel_accepted h = {.value = value, .t = at->t};
     for (int a = 0; a < 3; a++) h.look.normal[a] = at->normal[a];
     h.cells = (kernel_hit_cells){vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
-    /* Polyhedra have their own gradient always, or come with what their vertices make. */
+    /* Polyhedra do not use differences: they have gradients of their own, or normals from their vertices. */
     h.reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, at->w, h.look.colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
@@ -146,7 +147,8 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         kernel_accept_transparent(p, state, hit, &h);
 }
 
-/* This is a function of its own so that its vectors stay in registers; the one for other cells needs more. */
+/* Traces the isosurface in a tet. This is a function of its own so that its vectors stay in registers; the one for
+ * other cells needs more of them. */
 static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kernel_surface_state *state,
                                                          const kernel_cell *c, int value, vm rays)
 {
@@ -174,7 +176,8 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     kernel_accept(p, state, c, value, hit, &at);
 }
 
-/* As kernel_maps_value(), in one function for all types. */
+/* Returns a field at r in each ray's own cell, as kernel_maps_value(), but as one function for all types that is not
+ * inlined. */
 static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
                                                               int type)
 {
@@ -206,7 +209,8 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
     return hit;
 }
 
-/* Takes the crossings of the interval in turn. A ray ends at an opaque surface's first visible one. */
+/* Accepts the crossings of the interval one after the other. A ray ends at the first visible one of an opaque
+ * surface. */
 SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                       const kernel_curved *curved, int value, const kernel_interval *i, vm wanted)
 {
@@ -233,14 +237,15 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
     out->t += kernel_take(c->at[2][0], lane);
 }
 
-/* Decides the rays of a packet in a cell. */
+/* Decides the rays of a packet in one cell by contraction (kernel_contraction.h), without its faces. */
 static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
                                                              vm wanted, kernel_contracted *out)
 {
     KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out);
 }
 
-/* Takes the crossings that a contraction knows (kernel_contraction.h); returns the rays that are decided by it. */
+/* Accepts the crossings that are computed by contraction (kernel_contraction.h). Returns the rays that contraction has
+ * decided. */
 static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel_surface_state *state,
                                                         const kernel_cell *c, const kernel_curved *curved, int value,
                                                         vm wanted)
@@ -271,7 +276,8 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
-        /* Where a ray crosses both halves of a quad but not its patch, both ends are one place beside the ray. */
+        /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
+         * outside the ray; such an interval is skipped. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         asked[n] = vm_and(kernel_is_near(p, i), room);
         any = vm_or(any, asked[n]);
@@ -289,8 +295,8 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
     }
 }
 
-/* Traces an isovalue's surface in a cell with finite values that is no polyhedron. The cell is in the
- * frame's coordinates. */
+/* Traces one isovalue's surface in a cell with finite values that is not a polyhedron. The cell must have been
+ * transformed into tile space. */
 SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                      kernel_curved *curved, int value, vm rays)
 {
@@ -300,21 +306,24 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *sta
         kernel_curved_surface(p, state, c, curved, value, rays);
 }
 
-/* Isosurfaces in polyhedra: the places on the profile where the sign changes. They are exact: a linear piece has one
- * root at most. All of them are taken, on rays too that are on one side of the isovalue at both faces.
+/* Isosurfaces in polyhedra are the points of a ray's profile at which the sign changes. They are exact, because a
+ * linear piece has at most one root. All of them are computed, even on rays that are on the same side of the isovalue
+ * at both faces.
  *
- * Most such rays stay on that side, and need not be followed. A bound says which do, from the faces' values alone:
+ * Most such rays stay on that side, and need not be followed. A bound identifies many of them, from the faces' values
+ * alone:
  *
- *      v |                               along the tile's rays the field of no tet falls faster than fall, nor rises
- *        | in                . out       faster than rise, so between the faces' triangles it is above both lines. They
- *        |   '.           .'             meet below the isovalue where
+ *      v |                               along the tile's rays no tet's field falls faster than `fall` or rises faster
+ *        | in                . out       than `rise`. So between the faces' triangles the field is above both lines,
+ *        |   '.           .'             which meet below the isovalue if
  *        |      '.     .'  rise
  *        |   fall  '.'                       rise v_in + fall v_out < fall rise (t_out - t_in),
  *        +-----------------------> t
- *                                        and alike below it. A field that nowhere turns has fall or rise 0.
+ *                                        and likewise for rays below the isovalue.
  *
- * What is beyond the range of the vertices' values is not looked for: where tets overlap their sum may go there, but no
- * isovalue that the vertices do not straddle has a surface in the cell, as the tree and the plan have it. */
+ * Isovalues outside the range of the vertices' values are not searched for: if tets overlap, their sum may exceed that
+ * range, but trees and the session's plan assume that only isovalues between vertex values have a surface in the
+ * cell. */
 
 SIMD_INLINE bool kernel_polyhedron_straddles(const polyhedron *c, double value)
 {
@@ -350,7 +359,7 @@ static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, in
     c->g[c->vertex_count] = (float)sum;
 }
 
-/* Computes the gradient of the field in a tet, in camera axes and in double. */
+/* Computes the gradient of the field in the tet of a surface triangle, in camera axes and in double. */
 static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
 {
     const double *corner[4];
@@ -364,7 +373,8 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
     for (int a = 0; a < 3; a++) out[a] = out[a] > 1e18 ? 1e18 : out[a] >= -1e18 ? out[a] : -1e18;
 }
 
-/* Finds the signed sum of gradients where tets overlap. Returns the rays that have one. */
+/* Computes the signed sum of the gradients of overlapping tets at the hits. Returns the rays for which the signs sum to
+ * 1, so that the sum is valid. */
 static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit,
                                         vf t, vf out[3])
 {
@@ -381,7 +391,8 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron
     return vm_and(hit, vf_eq(cover, vf_set(1)));
 }
 
-/* Finds the gradient at the hits: that of the positive tet that holds a hit or comes nearest to holding it. */
+/* Computes the gradient at the hits: that of the tet with positive sign that contains the hit or is nearest to it along
+ * the ray. */
 static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit, vf t,
                                      vf out[3])
 {
@@ -402,7 +413,8 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c
 
 /* ---- gradients at vertices ---- */
 
-/* Computes the mean of the vertices' gradients, in camera axes. It is the centre's, as the mean of values is. */
+/* Computes the mean of the vertices' gradients, in camera axes. It is the gradient at the centre, just as the centre's
+ * value is the mean of values. */
 static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhedron *c,
                                             const render_vertex_gradients *gradients, double out[3])
 {
@@ -414,7 +426,8 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
     }
 }
 
-/* Returns the tet that holds the hit or is nearest to it, among those that do not lie outside; -1: there is none. */
+/* Finds, for each hit, the tet of non-negative sign that contains it or is nearest to it along the ray; -1 if there is
+ * none. */
 static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
@@ -430,7 +443,7 @@ static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int3
     memcpy(out, &facet, sizeof facet);
 }
 
-/* Finds the normals of RENDER_VERTEX. */
+/* Computes normals by interpolating the vertices' gradients in the tets (RENDER_VERTEX). */
 static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
                                                                const render_surface_layer *layer,
                                                                const kernel_passage *r, vm hit, vf t, vf out[3])
@@ -462,9 +475,10 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
     }
 }
 
-/* ---- which rays to follow ---- */
+/* ---- selection of the rays to follow ---- */
 
-/* Widens fall and rise by the steepest slopes of the tet's field along rays of the tile, per unit of depth. */
+/* Computes upper bounds of the rates, per unit of depth, at which a tet's field falls and rises along the tile's
+ * rays. */
 static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
                               double *rise)
 {
@@ -483,7 +497,8 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
     *rise = aside + g[2];
 }
 
-/* Bounds the slopes of all tets. A tet without a volume may have any slope. */
+/* Computes the bounds of falling and rising rates over all tets of the cell. A tet without volume gives an infinite
+ * bound. */
 static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
@@ -497,15 +512,16 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
     }
 }
 
-/* Scales the bound as the values are scaled, and holds it so that products of two are finite. */
+/* Scales the bound like the values, and limits it so that products of two bounds are finite. */
 SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
     return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
 }
 
-/* Returns the rays that have one sign at both faces and may have the other between. The bound does not hold where tets
- * overlap, or where a ray meets a quad's triangles and not its patch, or the reverse. */
+/* Returns the rays that may be on the other side of the isovalue between two faces of the same sign. The bound is not
+ * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
+ * returned. */
 SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_passage *r,
                                        const kernel_stay *stay)
 {
@@ -524,15 +540,16 @@ SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, co
 
 /* ---- along the profile ---- */
 
-/* A ray that follows its profile from crossing to crossing. Where tets overlap at a face, the field behind it may be on
- * the other side of the isovalue than the face's own value, which decides: it jumps there, and the jump is a crossing.
- */
+/* The state of rays that follow their profiles from crossing to crossing. If tets overlap at a face, the field just
+ * behind it may be on the other side of the isovalue than the face's own value, which decides. The field then jumps at
+ * the face, and the jump is a crossing. */
 typedef struct kernel_walk {
-    vm open;                    /* rays whose profile goes on */
-    vm below;                   /* rays below the isovalue at the end of the piece */
-    vm jump_in, jump_out;       /* rays whose face value and profile's end are on different sides */
-    kernel_profile_piece piece; /* each ray's own */
-    vf t, w;                    /* the crossing that was found, and the colour field there */
+    vm open;  /* rays whose profile continues */
+    vm below; /* rays that are below the isovalue at the end of the current piece */
+    /* rays whose face value and profile are on different sides of the isovalue, at the entry and at the exit */
+    vm jump_in, jump_out;
+    kernel_profile_piece piece; /* current piece of each ray */
+    vf t, w;                    /* depth of the crossing that was found, and the colour field there */
 } kernel_walk;
 
 static void kernel_walk_begin(const kernel_stay *stay, vm rays, kernel_walk *walk)
@@ -557,10 +574,10 @@ SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, ke
     to->w1 = vf_select(rays, from->w1, to->w1);
 }
 
-/* Goes to the next piece. Returns the rays of left whose profile goes on behind it; a jump at the last face is a
- * piece. A value inside the cell that is the isovalue but for rounding stays on the side that the ray comes from: where
- * a ray meets several sheets in one place, each has a value rounded on its own, and their signs would alternate. The
- * values at the faces decide as they are. */
+/* Advances the rays in `left` to the next piece. Returns those whose profile continues behind it; a jump at the last
+ * face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it were on
+ * the side from which the ray comes: a ray may meet several sheets at one point, each with its own rounding, and their
+ * signs would alternate. The values at the faces are not changed. */
 SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
@@ -603,7 +620,8 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
     return found;
 }
 
-/* Finds how the lines' field goes along the surface at the hits: in the tet that holds the hit or is nearest to it. */
+/* Computes the contour lines' field, its gradient and the surface's normal at the hits, in the tet that contains the
+ * hit or is nearest to it. */
 static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packet *p, const kernel_surface *s,
                                                               const kernel_passage *r, vm hit, vf t, kernel_along *out)
 {
@@ -657,7 +675,7 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
     kernel_accept(p, state, NULL, value, hit, &at);
 }
 
-/* Takes the crossings of a stay. A ray ends at an opaque surface's first one in front of the eye. */
+/* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */
 static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
                                     kernel_passage *r, kernel_stay *stay)
 {
@@ -706,9 +724,9 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
     }
 }
 
-/* ---- the blocks of a tile that a cell may show in ---- */
+/* ---- the blocks of a tile that a cell may meet ---- */
 
-/* Traces the cell on the block's rays; cell is NULL for a polyhedron, of which all surfaces are traced. */
+/* Traces the cell with the block's rays. cell is NULL for a polyhedron, for which all isovalues are traced. */
 SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
                                    int value)
 {

@@ -1,14 +1,12 @@
-/* Isosurfaces of a tile that goes down the trees itself, about from the nearest nodes on, and fetches nothing behind
- * what its pixels already know to be nearer:
- *
- *     nodes, one a lane:  ranges, depths, box of pixels ---> stack, the nearest on top
- *     from the stack:     is any pixel of the box open that far?
- *     leaves' cells:      in lanes, as the picture's are (kernel_candidates.h), but within the tile's pixels
- *     cells with pixels:  batches (render_kernels.c), whose hits close pixels
- *
- * A node between the pixels' centres is left out too. Boxes of pixels are those of the node's box between two planes
- * through the tile's borders, divided by its farthest depth: what is beyond a border is so nearer to it than any of the
- * box in front of the eye. Pads are more than all rounding. */
+/* Traces isosurfaces in a tile that traverses the trees itself, roughly beginning with the nearest nodes, and fetches
+ * nothing behind the hits that its pixels already have:
+ *     nodes, one per lane:  ranges, depths, box of pixels ---> stack, the nearest on top
+ *     from the stack:       has any pixel of the box no nearer hit?
+ *     leaves' cells:        tested in lanes (kernel_candidates.h), restricted to the tile's pixels
+ *     cells with pixels:    traced in batches (render_kernels.c), whose hits hide what is behind
+ * A node that lies between the pixels' centres is skipped, too. The box of pixels is computed from the distances of the
+ * node's box to the planes through the tile's borders, divided by the box's farthest depth: that gives a lower bound of
+ * how far beyond a border the box is. Margins are larger than all rounding. */
 #ifndef RENDER_KERNEL_TILE_SURFACE_H
 #define RENDER_KERNEL_TILE_SURFACE_H
 
@@ -22,7 +20,7 @@
 #include "render.h"
 #include "simd.h"
 
-/* Planes of the tile's (kernel_tile.h), one a number. */
+/* Numbers of the planes of the tile (kernel_tile.h) that classify nodes. */
 enum {
     KERNEL_FIND_LEFT,
     KERNEL_FIND_RIGHT,
@@ -38,32 +36,33 @@ typedef struct kernel_find_plane {
 } kernel_find_plane;
 
 typedef struct kernel_tile_finder {
-    /* Looks at a leaf's cells, of the layer under way. */
+    /* Callback for a leaf's cells, for the current layer. */
     void (*look)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
-    float column_scale, row_scale; /* pixels a slope, or a scaled unit where the camera is orthographic */
-    float pad[2];                  /* for columns and rows, in pixels */
+    /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
+    float column_scale, row_scale;
+    float pad[2]; /* margins by which columns and rows are extended, in pixels */
     kernel_find_plane planes[KERNEL_FIND_PLANES];
 } kernel_tile_finder;
 
-/* ---- nodes ---- */
+/* ---- traversal of nodes ---- */
 
-/* Nodes are looked at one a lane, children beside their siblings; each has what it needs on its way from memory while
- * others are looked at. */
+/* Nodes are tested one per lane, with siblings in neighbouring lanes. While some are tested, the data of others are
+ * prefetched. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
 
-/* A node that may show: its first cell or its left child. */
+/* A node that may be visible. ref: its first cell if it is a leaf, else its left child. */
 typedef struct kernel_tile_node {
     int64_t ref;
     float near;
-    uint16_t box, count; /* how many cells a leaf has; 0: an inner node */
+    uint16_t box, count; /* number of cells of a leaf; 0 for an inner node */
 } kernel_tile_node;
 
-/* Boxes and ranges of nodes in lanes. */
+/* The boxes and value ranges of one node per lane. */
 typedef struct kernel_node_lanes {
     vf low[3], high[3], range_low, range_high;
 } kernel_node_lanes;
 
-/* Nodes of any layout, one by one. */
+/* Reads boxes and ranges of nodes of any layout, one by one. */
 static __attribute__((noinline)) void kernel_nodes_slowly(const mmbvh *tree, const mmbvh_ranges *ranges,
                                                           const int64_t node[SIMD_WIDTH], kernel_node_lanes *out)
 {
@@ -86,7 +85,8 @@ static __attribute__((noinline)) void kernel_nodes_slowly(const mmbvh *tree, con
     out->range_high = vf_load(range[1]);
 }
 
-/* Nodes that a gather reaches are fetched together: compact_decode() in lanes. */
+/* Reads boxes and ranges of one node per lane. Compact nodes within the reach of a gather are decoded in lanes (the
+ * version in lanes of compact_decode()). */
 SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *ranges, const int64_t node[SIMD_WIDTH],
                                     kernel_node_lanes *out)
 {
@@ -113,7 +113,8 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
     out->range_high = vf_gather((const float *)(const void *)ranges->high, pair);
 }
 
-/* The nodes' places: depths, their order along the tile, and the pixels that they may show in. */
+/* Where nodes are: their least depths, their boxes of pixels, their positions along the tile, and a mask of those that
+ * may be visible. */
 typedef struct kernel_node_places {
     float near[SIMD_WIDTH];
     int32_t box[SIMD_WIDTH];
@@ -121,8 +122,9 @@ typedef struct kernel_node_places {
     unsigned shown;
 } kernel_node_places;
 
-/* Adds the first and the last column, or row, to the boxes: low is from the tile's first border on, high from its last.
- * Returns the lanes that have any. What is not a number may be anywhere. */
+/* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the distance
+ * from the tile's first border; high: upper bound of that from its last border. Returns the lanes that meet a pixel. A
+ * NaN counts as meeting all pixels. */
 SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box, int shift)
 {
     const vf end = vf_set(KERNEL_TILE), zero = vf_set(0);
@@ -133,7 +135,7 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
     return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
 }
 
-/* Finds where the nodes are, and those that may show. */
+/* Computes where the nodes are, and which of them may be visible. */
 SIMD_INLINE void kernel_tile_find_places(const kernel_tile_trace *t, const kernel_node_lanes *nodes,
                                          kernel_node_places *out)
 {
@@ -167,7 +169,8 @@ SIMD_INLINE void kernel_tile_find_places(const kernel_tile_trace *t, const kerne
     out->shown = vm_bits(shown);
 }
 
-/* Adds a node to the stack, and prefetches what is looked at next. */
+/* Pushes a node on the stack if it may be visible, and prefetches what is read next. Returns the number of nodes
+ * pushed, 0 or 1. */
 SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
                                       const kernel_node_places *places, int lane, kernel_tile_node *to)
 {
@@ -186,8 +189,8 @@ SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ran
     return 1;
 }
 
-/* Adds the children of so many inner nodes, the first of which is the nearest, to the stack; the nearest are on top.
- * Returns how many are added. */
+/* Tests the children of `count` inner nodes, the nearest node first, and pushes those that may be visible; the nearest
+ * are on top. Returns how many are pushed. */
 SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
                                           const int64_t *left, int count, kernel_tile_node *stack)
 {
@@ -211,7 +214,8 @@ SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbv
     return top;
 }
 
-/* Finds the part's cells. One node at once needs no more room than the tree is deep. */
+/* Finds the cells of a mesh part. If the stack is almost full, it takes one node at a time, which needs no more space
+ * than the tree's depth. */
 SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
 {
     const mmbvh *tree = t->frame->job->parts[part].tree;
@@ -245,7 +249,7 @@ static void kernel_tile_parts(kernel_tile_trace *t, int unused, const uint32_t *
     for (int n = 0; n < count; n++) kernel_tile_find_cells(t, (int)parts[n]);
 }
 
-/* Traces the surface of all parts. Opaque hits stand in the packets afterwards. */
+/* Traces the current layer's surface on all mesh parts. Opaque hits are then stored in the packets. */
 SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
@@ -256,7 +260,7 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
     for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_tile_parts(t, 0, &part, 1, t->wanted);
 }
 
-/* Takes the planes out of the tile's. */
+/* Copies six of the tile's planes out of the vectors in which kernel_planes stores them. */
 SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_plane out[KERNEL_FIND_PLANES])
 {
     static const int lanes[KERNEL_FIND_PLANES] = {0,
@@ -276,7 +280,7 @@ SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_pla
     }
 }
 
-/* Begins a tile. `look` stands already. */
+/* Sets up the search for a tile. The callback `look` must already be set. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
     kernel_tile_finder *s = t->search;

@@ -1,5 +1,7 @@
-/* mmbvh's builder makes a binary tree of the pieces' boxes, and nodes are taken together: a node opens its largest
- * child until it has as many as there are lanes, or all of them fit into leaves. A binary leaf of more is divided. */
+/* Builds a tree with one child per lane. mmbvh first builds a binary tree over the pieces' boxes; then its nodes are
+ * merged: a node's child with the largest surface is repeatedly replaced by its two children, until the node has as
+ * many children as there are lanes, or all of them fit into leaves. A binary leaf with more pieces than lanes is
+ * divided. */
 #include "render_occluder_tree.h"
 
 #include <math.h>
@@ -26,12 +28,13 @@ static void box_of(const occluder_pieces *p, int64_t i, float *lower, float *upp
     }
 }
 
-/* A binary tree on its way to a wide one. */
+/* The data for converting a binary tree to a wide one. */
 typedef struct widening {
     const occluder_pieces *of;
     const mmbvh *binary;
-    int64_t *first, *count; /* the first and the count of the occluder_pieces below each node, among the tree's cells */
-    float *boxes;           /* for each node, lower and upper */
+    /* per node, the index of the first of the pieces below it in the binary tree's list of cells, and their number */
+    int64_t *first, *count;
+    float *boxes; /* per node, lower and upper corner of its box */
     int width;
     kernel_occluder_tree *out;
 } widening;
@@ -44,7 +47,8 @@ static void grow_box(float box[6], const float *lower, const float *upper)
     }
 }
 
-/* Children come after their parents. */
+/* Computes the boxes and the numbers of pieces of all nodes, from the last node to the first, because children come
+ * after their parents. */
 static void sum_up(widening *w)
 {
     for (int64_t node = w->binary->node_count - 1; node >= 0; node--) {
@@ -68,9 +72,9 @@ static float area_of(const float box[6])
     return x * y + y * z + z * x;
 }
 
-/* A run of pieces in the binary tree's order: all below a node, or some of a leaf. */
+/* A range of pieces in the binary tree's order: all pieces below a node, or some pieces of a leaf. */
 typedef struct span {
-    int64_t node; /* -1: some of a leaf */
+    int64_t node; /* the node; -1 for some pieces of a leaf */
     int64_t first, count;
     float box[6];
 } span;
@@ -93,7 +97,7 @@ static span some_of(const widening *w, int64_t first, int64_t count)
     return out;
 }
 
-/* Divides a span of more pieces than there are lanes. */
+/* Divides a range that has more pieces than there are lanes into two. */
 static void divide(const widening *w, const span *whole, span out[2])
 {
     const int64_t half = whole->count / 2;
@@ -105,7 +109,8 @@ static void divide(const widening *w, const span *whole, span out[2])
     memcpy(out, both, sizeof both);
 }
 
-/* Divides the largest span until there are as many spans as lanes. */
+/* Divides the range with the largest box, repeatedly, until there are as many ranges as lanes or each fits into a leaf.
+ * Returns their number. */
 static int divide_all(const widening *w, const span *whole, span *out)
 {
     int count = 1;
@@ -124,7 +129,8 @@ static int divide_all(const widening *w, const span *whole, span *out)
     return count;
 }
 
-/* Sources are the pieces' numbers. Lanes without a piece are met by no ray. */
+/* Makes a leaf and returns ~index. Its sources are the pieces' indices. Lanes without a piece get NaN or empty boxes,
+ * so that no ray meets them. */
 static int32_t make_leaf(widening *w, const span *of)
 {
     const int32_t leaf = w->out->leaf_count++;
@@ -160,7 +166,8 @@ static int32_t make_node(widening *w, const span *of)
     return node;
 }
 
-/* Reserves address space for the largest wide tree that the binary tree may become; unused pages take no memory. */
+/* Reserves address space for the largest wide tree that the binary tree can become; pages that stay unused take no
+ * memory. */
 static bool reserve(const widening *w, size_t nodes, size_t leaves)
 {
     const size_t width = (size_t)w->width;

@@ -1,9 +1,11 @@
-/* Threads go through the subtrees of the meshes' trees, and each gathers the occluders in its cells. The lists are
- * joined, and render_occluder_tree.c makes trees of them. Their order does not matter (kernel_occluders.h).
+/* Collects occluders. Threads go through the subtrees of the meshes' trees, and each lists the occluders in its cells.
+ * The lists are joined, and render_occluder_tree.c builds trees of them. Their order does not matter
+ * (kernel_occluders.h).
  *
- * A slab holds the part of the surface in a cell: it lies between two planes on which a linear function L is constant.
- * L is the one nearest to the values at the vertices. The position and the value of any point of the cell are means of
- * the vertices' with the same weights, so the field differs from L nowhere by more than at some vertex. */
+ * A slab contains the part of the surface in a cell. It lies between two planes on which a linear function L is
+ * constant. L is the linear function closest to the values at the vertices. The position and the value of any point of
+ * the cell are means of the vertices' with the same weights, so the field differs from L by no more than at some
+ * vertex. */
 #include "render_occluders.h"
 
 #include <math.h>
@@ -35,19 +37,19 @@ typedef struct hex_record {
     float words[KERNEL_CURVED_RECORD_WORDS];
 } hex_record;
 
-/* A list that grows. */
+/* A growing list of items of one size. */
 typedef struct list {
     int64_t count, room;
     void *items;
 } list;
 
-/* The occluders that one thread has found, or all threads. */
+/* The occluders that one thread has found, or those of all threads. */
 typedef struct finds {
     list triangles, slabs, hexes;
     bool out_of_memory;
 } finds;
 
-/* Makes room for one more occluder and returns it; NULL where memory ran out. */
+/* Appends an item to a list and returns it; NULL if memory ran out. */
 static void *add(finds *f, list *l, size_t size)
 {
     if (l->count == l->room) {
@@ -72,13 +74,13 @@ static void free_finds(finds *f)
 
 /* ---- a cell --------------------------------------------------------------------------------------------------- */
 
-/* The current cell, and the isovalue that is looked for in it. */
+/* The current cell, and the isovalue that is searched for in it. */
 typedef struct subject {
     finds *into;
     const kernel_frame *frame;
     int surface, part, value;
     uint32_t index;
-    int count; /* vertices; a polyhedron's come more than once */
+    int count; /* number of vertices; those of a polyhedron occur several times */
     list places, values;
     double reach;
 } subject;
@@ -103,7 +105,7 @@ static void bounds_of(const subject *s, double low[3], double high[3])
         }
 }
 
-/* Returns the distance from a hit within which the cell hides nothing (kernel_occlusion_beyond()), in tree space. */
+/* Returns the distance from a hit within which the cell blocks nothing (kernel_occlusion_beyond()), in tree space. */
 static double reach_of(const subject *s, double contact)
 {
     return contact > 0 ? contact * kernel_size_of((const double(*)[3])s->places.items, s->count) : 0;
@@ -132,7 +134,8 @@ static bool straddles(const subject *s, double isovalue)
 
 /* ---- tets ------------------------------------------------------------------------------------------------------ */
 
-/* Finds where the surface crosses the edge between two vertices, given in the order of coordinates. */
+/* Computes where the surface crosses the edge between two vertices. They must be given in the order of coordinates, so
+ * that all cells of the edge compute the same bits. */
 static void cross_edge(const subject *s, double isovalue, int i, int j, float out[3])
 {
     const double *a = place_of(s, i), *b = place_of(s, j);
@@ -151,7 +154,8 @@ static void add_triangle(subject *s, float a[3], float b[3], float c[3])
     t->surface = s->surface;
 }
 
-/* The vertices are in the order of coordinates. */
+/* Adds the pieces of the isosurface in a tet, one or two triangles. The vertices must be in the order of
+ * coordinates. */
 static void add_tet(subject *s, double isovalue)
 {
     float at[4][3];
@@ -161,7 +165,8 @@ static void add_tet(subject *s, double isovalue)
             below[belows++] = i;
         else
             above[aboves++] = i;
-    /* The corners go around the piece, so the second vertex below takes those above in reverse. */
+    /* The corners must be in cyclic order around the piece, so the second vertex below the isovalue takes those above
+     * in reverse. */
     for (int i = 0; i < belows; i++)
         for (int k = 0; k < aboves; k++) {
             const int j = i % 2 ? aboves - 1 - k : k, p = below[i], q = above[j];
@@ -173,7 +178,7 @@ static void add_tet(subject *s, double isovalue)
 
 /* ---- slabs ----------------------------------------------------------------------------------------------------- */
 
-/* Solves m x = b for a symmetric m. x is 0 where m is nearly singular; the slab is then the whole cell. */
+/* Solves m x = b for a symmetric matrix m. x is 0 if m is nearly singular; then the slab is the whole cell. */
 static void solve(double m[3][3], const double b[3], double x[3])
 {
     double inverse[3][3];
@@ -191,7 +196,8 @@ static void solve(double m[3][3], const double b[3], double x[3])
     }
 }
 
-/* Finds L's gradient by least squares about the mean of the vertices. The values are less the isovalue, times scale. */
+/* Computes L by least squares about the mean of the vertices. Values are taken minus the isovalue, times scale. *level:
+ * L at the origin. */
 static void fit(const subject *s, double isovalue, double scale, double gradient[3], double *level)
 {
     double mean[3] = {0, 0, 0}, value = 0, m[3][3] = {{0}}, b[3] = {0, 0, 0};
@@ -238,7 +244,8 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
         out->rows[KERNEL_SLAB_GRADIENT + a] = (float)gradient[a];
     }
     out->rows[KERNEL_SLAB_LEVEL] = (float)level;
-    /* Values round to 6e-8 of the largest. Roots may be off by KERNEL_ROOT_BAND and by the rounding of positions. */
+    /* Values are rounded to 6e-8 of the largest. Roots have an error of KERNEL_ROOT_BAND and of the rounding of
+     * positions. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
     out->rows[KERNEL_SLAB_BLUR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
@@ -270,7 +277,7 @@ static bool collapses(const kernel_cell *c)
     return false;
 }
 
-/* Returns the number of the hex's record, or -1 where the hex must be traced on its own. */
+/* Appends the hex's record and returns its index; -1 if the hex must be traced one ray at a time. */
 static int32_t add_hex(subject *s, const kernel_cell *c, double isovalue)
 {
     const double scale = scale_of(s, isovalue);
@@ -294,9 +301,10 @@ static void add_slab(subject *s, const kernel_cell *c, double isovalue)
     out->cell = (kernel_occluder){s->surface, s->value, s->part, s->index, record};
 }
 
-/* ---- finding --------------------------------------------------------------------------------------------------- */
+/* ---- collecting
+ * --------------------------------------------------------------------------------------------------- */
 
-/* Lists the vertices of a cell other than a polyhedron in the order in which kernels have them. */
+/* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
 static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
@@ -376,7 +384,7 @@ static bool list_subtrees(const kernel_frame *frame, render_subtrees *out)
     return true;
 }
 
-/* Appends one list to another. */
+/* Moves the items of `from` to the end of `to`. Returns false if memory ran out. */
 static bool join(list *to, list *from, size_t size)
 {
     if (!to->items) {
@@ -422,7 +430,8 @@ static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees,
     return is_well;
 }
 
-/* ---- all of it -------------------------------------------------------------------------------------------------- */
+/* ---- building the trees
+ * ------------------------------------------------------------------------------------------- */
 
 static insitu_status build_trees(const finds *f, int threads, kernel_occluders *out, base_error *error)
 {

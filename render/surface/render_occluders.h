@@ -1,4 +1,4 @@
-/* The trees of kernel_occluders.h, built for a frame. */
+/* Builds the trees of kernel_occluders.h for a frame. */
 #ifndef RENDER_RENDER_OCCLUDERS_H
 #define RENDER_RENDER_OCCLUDERS_H
 
@@ -7,8 +7,8 @@
 #include "kernel_occluders.h"
 #include "kernel_types.h"
 
-/* Finds the cells that the frame's opaque surfaces cross, for kernels of this many lanes. The caller frees the result,
- * after an error too. Parallel. */
+/* Collects the cells that the frame's opaque surfaces cross, and builds their trees for kernels with `width` lanes. The
+ * caller must free the result with occluders_free(), even after an error. Parallel. */
 insitu_status occluders_build(const kernel_frame *frame, int width, int threads, kernel_occluders *out,
                               base_error *error);
 void occluders_free(kernel_occluders *occluders);
