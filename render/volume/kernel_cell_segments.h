@@ -1,4 +1,4 @@
-/* Cuts a cell's interval on each ray into segments (kernel_segments.h), between surfaces. */
+/* Divides the interval of each ray in a cell, between surfaces, into segments (kernel_segments.h). */
 #ifndef RENDER_KERNEL_CELL_SEGMENTS_H
 #define RENDER_KERNEL_CELL_SEGMENTS_H
 
@@ -52,13 +52,14 @@
  * bisection suffices: a subinterval whose T error, from s1 - s0 alone, is at most 1/32 of a (interval / reach) is left
  * as it is. A cubic has two extrema, and four such subintervals use the remaining eighth. */
 
-/* KERNEL_BISECTION_DEPTH: 2^-40 of an interval is negligible in any medium. KERNEL_BISECTION_SEGMENTS is a guard that
- * no function in use reaches: after that many segments the rest of the interval is not cut further. */
+/* KERNEL_BISECTION_DEPTH limits bisection, because 2^-40 of an interval is negligible in any medium.
+ * KERNEL_BISECTION_SEGMENTS is a safeguard that no function in use reaches: after that many segments the rest of the
+ * interval is not divided further. */
 enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTION_SEGMENTS = 8192 };
 
 /* ---- the field on a ray ---- */
 
-/* A point of the ray: depth, field, and reference coordinates in the cell. */
+/* A point of the ray: depth t, value v of the field, and reference coordinates r in the cell. */
 typedef struct kernel_knot {
     double t, v, r[3];
 } kernel_knot;
@@ -67,10 +68,11 @@ typedef struct kernel_knot {
 typedef struct kernel_bisection {
     const kernel_segment_state *state;
     const kernel_span *span;
-    const kernel_exact_map *map; /* NULL: the field is linear between the interval's ends */
-    double u, v, slope, shift;   /* the ray's position at depth t is (u, v) (slope t + shift) */
-    kernel_knot in, out;         /* the interval's ends, from the crossings of the faces */
-    double per_t, length, light; /* unit distances per t; the interval's length; light that reaches the subinterval */
+    const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
+    double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
+    kernel_knot in, out;         /* ends of the interval, at the crossings of the faces */
+    /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
+    double per_t, length, light;
     int64_t *map_failures;
     int count;
 } kernel_bisection;
@@ -138,12 +140,14 @@ static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_kno
 
 /* ---- effect of a subinterval on the light ---- */
 
-/* Bounds of the transfer function over some values. */
+/* Bounds of the transfer function over a range of values. */
 typedef struct kernel_medium_range {
-    double least, most, slope, colour_slope; /* least, most: of the extinction */
+    /* minimum and maximum of the extinction; maximum slope of the extinction, and of the colours */
+    double least, most, slope, colour_slope;
 } kernel_medium_range;
 
-/* Lower and upper bound of -ln(1 - a): the logarithm's series, and ln(1 + x) <= x (6 + x) / (6 + 4 x). */
+/* Return a lower and an upper bound of the extinction -ln(1 - a): the begin of the logarithm's series, and ln(1 + x) <=
+ * x (6 + x) / (6 + 4 x) with x = a / (1 - a). */
 static inline double kernel_extinction_least(double a)
 {
     return a + 0.5 * a * a;
@@ -180,7 +184,8 @@ static inline void kernel_medium_range_widen(kernel_medium_range *s, const kerne
         s->colour_slope = fmax(s->colour_slope, fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
 }
 
-/* Returns bounds of the transfer function between low and high, from the bins' bounds if there are many bins. */
+/* Returns bounds of the transfer function over the values from low to high. If that range covers several bins, the
+ * bounds of the bins are used; otherwise those of the pieces. */
 static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double low, double high)
 {
     const double last = KERNEL_BOUND_BINS - 1, begin = (double)t->bin_low, per_bin = (double)t->bound_inverse;
@@ -251,7 +256,7 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 
 /* ---- steps ---- */
 
-/* Returns the nearest step strictly between two values, or NULL if there is none. */
+/* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
 static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
     const kernel_step *steps = h->state->pieces->steps + h->span->first_step;
@@ -260,7 +265,7 @@ static const kernel_step *kernel_step_between(const kernel_bisection *h, double 
     return NULL;
 }
 
-/* Range of the float values between the two steps on either side of a value. Pieces end at steps, rounded to float. */
+/* The range of float values between two neighbouring steps of the opacity. Pieces end at steps, rounded to float. */
 typedef struct kernel_side_values {
     float low, high;
 } kernel_side_values;
@@ -271,12 +276,13 @@ static kernel_side_values kernel_step_side(const kernel_bisection *h, double ins
     kernel_side_values out = {-3e38f, 3e38f};
     int n = 0;
     for (; n < h->state->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
-    /* A constant segment at a step's value counts as beyond the step; rounding must not move another segment there. */
+    /* A segment that is constant at a step's value counts as above the step; rounding must not move another segment
+     * there. */
     if (n < h->state->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
     return out;
 }
 
-/* Rounds x to float, clamped to its side of the steps; *rest: the rounding error. */
+/* Rounds x to float and clamps it to its side of the steps; *rest: the rounding error. */
 static void kernel_step_round(const kernel_side_values *side, double x, float *v, double *rest)
 {
     const double active = fmax(fmin(x, (double)side->high), (double)side->low);
@@ -284,8 +290,8 @@ static void kernel_step_round(const kernel_side_values *side, double x, float *v
     *rest = side->low < *v && *v < side->high ? active - (double)*v : 0;
 }
 
-/* Returns bounds of the transfer function over the subinterval's values, of which `inside` is one. step: a step between
- * them, or NULL. */
+/* Returns bounds of the transfer function over the subinterval's values. inside: one of these values, which tells the
+ * side of the steps; step: a step among the values, or NULL. */
 static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, const kernel_subinterval_values *values,
                                                     double inside, const kernel_step *step)
 {
@@ -356,7 +362,7 @@ static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, 
     kernel_segments_add(h->state->pieces, list, lane, &i, list->is_double ? &precise : NULL);
 }
 
-/* ---- an interval ---- */
+/* ---- bisection of an interval ---- */
 
 static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval_values *values,
                                        const kernel_medium_range *s, double length, bool is_cut, bool is_monotone)
@@ -369,7 +375,7 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
     return (is_cut || !is_monotone) && h->light * all <= a * h->length / (32 * reach);
 }
 
-/* Cuts an interval, whose ends and middle are known, into subintervals and adds their segments. */
+/* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
 static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
                                  kernel_subinterval whole)
 {
@@ -456,16 +462,17 @@ static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p,
 
 /* ---- a cell's segments ---- */
 
-/* State of a walk through an interval's equal subintervals: the field at three consecutive ends. */
+/* The state while an interval's equal subintervals are processed in order: the field at three consecutive ends. */
 typedef struct kernel_parts {
     vf t0, t1, span, count;
-    vf last;                 /* field at t1 */
-    vf from, to;             /* ends of the current subinterval */
-    vf before, after, ahead; /* field at these two ends and at the next one */
-    vf bend, next_bend;      /* second differences of the field at the two ends */
+    vf last;     /* field at the interval's end t1 */
+    vf from, to; /* depths of the current subinterval's ends */
+    /* field at the begin and the end of the current subinterval, and at the end of the next one */
+    vf before, after, ahead;
+    vf bend, next_bend; /* second differences of the field at the begin and the end of the current subinterval */
 } kernel_parts;
 
-/* Returns t at the n-th end of the subintervals, and stores the field there. */
+/* Returns t at the n-th boundary between subintervals, and stores the field there in *value. */
 SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_span *span, const kernel_parts *s, vm rays, int n,
                                 vf *value)
 {
@@ -476,8 +483,9 @@ SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_span *span, const
     return t;
 }
 
-/* Returns by how much to raise a subinterval's chord so that its mean is the field's: for a parabola a twelfth of its
- * second difference, which is estimated from the adjacent subintervals. A single subinterval is not raised. */
+/* Returns by how much a subinterval's chord must be raised so that its mean equals the field's mean. For a parabola
+ * that is a twelfth of the second difference, which is estimated from the adjacent subintervals. A single subinterval
+ * is not raised. */
 SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
 {
     const vf zero = vf_set(0), both = 0.5f * (s->bend + s->next_bend);
@@ -485,7 +493,7 @@ SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
     return bend * (-1.0f / 12);
 }
 
-/* Adds a tet's interval from t0 to t1, in double, as one segment if it begins in the window. */
+/* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
 SIMD_INLINE void kernel_span_double(kernel_segment_state *state, const kernel_span *span, vm rays, vf t0, vf t1)
 {
     const kernel_interval *i = span->interval;
@@ -546,7 +554,7 @@ SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *st
     }
 }
 
-/* Adds the segments of the interval's parts between surfaces, if they begin in the window. */
+/* Divides the interval at surfaces, and adds the segments of its parts that begin in the window. */
 SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, const kernel_span *span)
 {
     const kernel_interval *i = span->interval;
@@ -565,7 +573,8 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
     }
 }
 
-/* Adds a tet's segments on rays whose interval is cut by surfaces or is to be mixed with others. */
+/* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
+ * volumes. */
 static __attribute__((noinline)) void kernel_tet_course(kernel_packet *p, kernel_segment_state *state,
                                                         const kernel_cell *c, const kernel_double_cell *double_cell,
                                                         kernel_interval i)
@@ -605,14 +614,14 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     if (!vm_any(mine)) return;
     kernel_double precise;
     if (list->is_double) {
-        /* One ray may have many segments whose ends are equal in float32. */
+        /* A ray may have many segments whose ends are equal in float32, so lengths are compared in double. */
         precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
         mine = vm_and(mine, vf_lt(vf_set(0), precise.length));
     }
     kernel_segments_add(state->pieces, list, mine, &i, list->is_double ? &precise : NULL);
 }
 
-/* Adds the segments of a cell with quads. map: NULL if the field is constant. */
+/* Adds the segments of a cell with quadrilateral faces. map: the cell's inverse map; NULL if the field is constant. */
 static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, kernel_segment_state *state,
                                                              const kernel_cell *c, const kernel_map *map)
 {
@@ -626,15 +635,15 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
     }
 }
 
-/* Volumes in polyhedra are sampled on the piecewise linear profile of the ray. */
+/* The following functions sample volumes in polyhedra, where the field along a ray is a piecewise linear profile. */
 
 SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
 {
     for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
-/* Fills the window's samples begin .. end - 1 that lie in the piece and that the interval owns. A sample that another
- * cell already owns keeps its value, as in kernel_fill(). */
+/* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that
+ * another cell has already set keeps its value, as in kernel_fill(). */
 static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
                                    const kernel_profile_piece *piece, int begin, int end)
 {
@@ -673,7 +682,8 @@ static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state,
     }
 }
 
-/* Returns the cell with its values in the layer's domain, transformed; NULL if it is invisible or memory fails. */
+/* Returns the polyhedron in tile space, with its values in the transfer function's domain; NULL if it is invisible or
+ * memory ran out. */
 static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int part, uint32_t index)
 {
     const kernel_transfer *transfer = &p->frame->volumes[volume];
@@ -698,7 +708,7 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
     while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, &r, &stay);
 }
 
-/* Adds the segments of a polyhedron. They are the pieces of the ray's profile, on which the field is exactly linear. */
+/* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);

@@ -1,7 +1,8 @@
-/* Emission and absorption along a segment on which the field is linear.
+/* Integrates emission and absorption along a segment on which the field is linear.
  *
- * The transfer function is cut into pieces on which opacity and colour are linear in the value, and so along the
- * segment. A ray's march goes from piece to piece, in steps that are short enough for Gauss's rule: with the extinction
+ * The transfer function is divided into pieces on which opacity and colour are linear in the value, and so along the
+ * segment. The integration along a ray goes from piece to piece, in steps that are short enough for Gauss's rule: with
+ * the extinction
  *     sigma = -ln(1 - opacity)
  * at the nodes c_j, the optical depth up to node j is that of the polynomial through all nodes (the coefficients of the
  * Gauss collocation method), and
@@ -12,23 +13,25 @@
  * which costs a step. Three nodes follow the logarithm itself. The sums have only positive terms, so nothing cancels,
  * whether the optical depth is 1e-8 or 1e3.
  *
- * Errors of a step with 3 nodes, in float: with u = 1 - opacity, |u1 - u0| <= 0.3 u0 makes the remainder of sigma's
- * integral, 5e-7 * 120 (du / u)^6 over the length with u at the middle, less than 1.2e-7 of the step's length in unit
- * distances; an optical depth d of at most 0.35 makes that of sigma exp(-depth), whose sixth derivative is below
- * 35 d^3.5 where sigma falls to nothing (the worst case, a Gaussian's), less than 4.4e-7. Where the colour changes by
- * as much with it, the sixth derivative is 720 d^3 and the remainder 3.6e-4 d^3 of the depth d that the change of sigma
- * makes: that is held to 0.1, so that the remainder is less than 9e-7 of d even in one step alone. Towards an opacity
- * of 1, where sigma has a logarithm's pole, steps so become ever shorter; but of a step from the pole itself three
- * nodes miss only 5 % of its length (the integral of -ln s from 0 to 1 comes out as 0.948), so that none need be
- * shorter than KERNEL_SHORT, in unit distances and as a share of the ray's way in the piece.
+ * Errors of a step with 3 nodes, in float. With u = 1 - opacity and |u1 - u0| <= 0.3 u0, the remainder of sigma's
+ * integral is 5e-7 * 120 (du / u)^6 times the length, with u at the middle, which is less than 1.2e-7 of the step's
+ * length in unit distances. With an optical depth d of at most 0.35, the remainder for sigma exp(-depth), whose sixth
+ * derivative is below 35 d^3.5 if sigma decreases to nothing (the worst case, a Gaussian), is less than 4.4e-7. If the
+ * colour changes by as much as sigma, the sixth derivative is 720 d^3, where d is the depth caused by the change of
+ * sigma, and the remainder is 3.6e-4 d^3; that depth is limited to 0.1, so that the remainder is less than 9e-7 of d
+ * even in one step alone. Towards an opacity of 1, where sigma has a logarithmic pole, steps become ever shorter. But
+ * for a step from the pole itself three nodes miss only 5 % of its integral (that of -ln s from 0 to 1 is computed as
+ * 0.948), so no step need be shorter than KERNEL_SHORT, in unit distances and as a share of the ray's interval in the
+ * piece.
  *
  * A ray's position in a piece is stored as its distances to the piece's two ends, and opacity and 1 - opacity are
  * interpolated from both ends. The length in a piece is computed from the values that the ray takes there, not from
- * positions on the segment. Each quantity is then exact to a few units of its own size; a value and a position on the
- * segment would bring the rounding of 1 to the steepest slope of the function and to its narrowest piece.
+ * positions on the segment. Each quantity is then exact to a few units in its own last place. With a value and a
+ * position on the segment instead, the rounding of 1 would affect the steepest slope of the function and its narrowest
+ * piece.
  *
  * Tests compile this file a second time for doubles with more nodes (KERNEL_REAL_IS_DOUBLE), to show that it converges
- * to the integral itself. */
+ * to the exact integral. */
 #ifndef RENDER_KERNEL_INTEGRAL_H
 #define RENDER_KERNEL_INTEGRAL_H
 
@@ -60,30 +63,32 @@ SIMD_INLINE vf kernel_exp(vf x)
     return vf_exp2(x * 1.4426950f);
 }
 
-/* Returns the offset, in floats, of the entry of `swings` for the values from low to high. */
+/* Returns the offset, in floats, into the table `swings` of the entry with the bounds for the values from low to
+ * high. */
 SIMD_INLINE vi kernel_swing_entry(const kernel_pieces *t, vf low, vf high)
 {
     const vf zero = vf_set(0), last = vf_set(KERNEL_SWING_BINS - 1);
     const vf begin = vf_clamp((low - t->bin_low) * t->swing_inverse, zero, last);
     const vf end = vf_clamp((high - t->bin_low) * t->swing_inverse, begin, last);
-    /* The interval's number of bins plus 1 is classified by quarters of an octave. */
+    /* The number of bins that the values cover, plus 1, is classified by quarters of an octave. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
     return (width * KERNEL_SWING_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_swing) / sizeof(float));
 }
 #endif
 
-/* Limits of a step, derived above. */
+/* Limits of an integration step, derived at the top of this file: optical depth, depth caused by the change of
+ * extinction, and relative change of 1 - opacity. */
 #define KERNEL_STEP_DEPTH ((kernel_real)0.35)
 #define KERNEL_STEP_CHANGE ((kernel_real)0.1)
 #define KERNEL_STEP_RATIO ((kernel_real)0.3)
-/* Extinction of a piece whose opacity is 1 everywhere. */
+/* Extinction of a piece whose opacity is 1 everywhere, per unit distance. */
 #define KERNEL_OPAQUE ((kernel_real)1e6)
-/* Least argument of logarithms, and least change of a value that counts as a change. */
+/* Smallest argument of logarithms, and smallest change of a value that counts as a change. */
 #define KERNEL_TINY ((kernel_real)1e-30)
 
-/* Light of a segment: premultiplied colour and transmittance. */
+/* The light of a segment: premultiplied colour and transmittance. */
 typedef struct kernel_light {
-    vf colour[3], depth; /* depth: -ln(transmittance), whose sums round less than products near 1 */
+    vf colour[3], depth; /* depth is -ln(transmittance); sums of depths have less rounding than products near 1 */
     vf transmittance;
 } kernel_light;
 
@@ -93,8 +98,8 @@ SIMD_INLINE kernel_light kernel_clear(void)
 }
 
 /* A segment: its length in unit distances, and the values at its ends in the transfer function's domain. Each value is
- * v + rest; rest is the rounding error of v, as far as it is known. It matters as a step or a pole of the function
- * magnifies it. */
+ * v + rest, where rest is the rounding error of v as far as it is known; it matters because steps and poles of the
+ * function magnify it. */
 typedef struct kernel_run {
     vf length, v_in, v_out, rest_in, rest_out;
 } kernel_run;
@@ -104,7 +109,8 @@ SIMD_INLINE kernel_run kernel_run_of(vf length, vf v_in, vf v_out)
     return (kernel_run){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
-/* The piece that each ray is in. If all rays share a piece, `common` points to it, which saves the gathers. */
+/* The piece of the transfer function that each ray is in. If all rays are in the same piece, `common` points to it,
+ * which saves gathers. */
 typedef struct kernel_piece_place {
     vi at;
     const kernel_piece *common;
@@ -140,8 +146,8 @@ SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const
     return out;
 }
 
-/* Returns the number of the piece that contains x + rest; at a knot the upper one, or the lower one for rays in
- * `falling`. */
+/* Returns the number of the piece that contains the value x + rest. At a boundary that is the upper piece, or the lower
+ * one for rays in `falling`. */
 SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest, vm falling)
 {
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
@@ -163,20 +169,21 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     return piece;
 }
 
-/* A ray's position in a piece. */
+/* A ray's position in a piece of the transfer function. */
 typedef struct kernel_way {
     vf below, above; /* distances of the value to the piece's low and high end */
-    vf todo;         /* change of the value that is left in this piece */
-    vf left;         /* the length of that change, in unit distances */
+    vf todo;         /* change of the value that remains in this piece */
+    vf left;         /* length that corresponds to this change, in unit distances */
     vf shortest;     /* lower limit of a step's length, in unit distances */
-    vf edge, rest;   /* value and rounding error at the end ahead; initially at the segment's begin */
-    vm is_last;      /* the segment ends in this piece */
+    /* value and its rounding error at the end of the piece that is ahead; initially at the segment's begin */
+    vf edge, rest;
+    vm is_last; /* the segment ends in this piece */
 } kernel_way;
 
 /* Properties of a segment that are the same in all its pieces. */
 typedef struct kernel_leg {
     vm falling, level;
-    vf turn; /* sign of the value's change: 1 or -1 */
+    vf turn; /* sign of the value's change along the ray: 1 or -1 */
     vf v_out, rest_out, length, per_value;
 } kernel_leg;
 
@@ -191,7 +198,7 @@ SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
     return out;
 }
 
-/* Sets the positions of the rays of `fresh`, which enter the piece with `ends`. */
+/* Sets the positions of the rays in `fresh`, which enter the piece with the given ends. */
 SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, const kernel_piece_ends *ends)
 {
     const vf v = way->edge, zero = vf_set(0);
@@ -210,7 +217,8 @@ SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fre
     way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
-/* Interpolates from both ends. Near an end with value 0 the result is as exact as the distance to that end. */
+/* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
+ * as the distance to that end. */
 SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -219,11 +227,11 @@ SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf
     return vf_min(from_low + from_high, one);
 }
 
-/* One integration step in a piece. */
+/* One step of the integration in a piece. */
 typedef struct kernel_stretch {
     vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
-    vf rise;           /* change of the opacity over the rest of the piece */
-    vf share;          /* share of the rest of the piece that the step covers */
+    vf rise;           /* change of the opacity over the rest of the ray's interval in the piece */
+    vf share;          /* share of that rest that the step covers */
     vf length;         /* length of the step, in unit distances */
     vm is_opaque;
 } kernel_stretch;
@@ -259,7 +267,8 @@ SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
     st->length = left * st->share;
 }
 
-/* Computes the step's emitted light (e0) and its first moment along the step (e1); returns the optical depth. */
+/* Computes the step's emitted light (*e0) and the first moment of the emission along the step (*e1). Returns the step's
+ * optical depth. */
 SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
@@ -281,8 +290,8 @@ SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
     return depth;
 }
 
-/* Adds the light of a step over which the value changes by `move`. below: the value's distance above the piece's low
- * end at the step's begin. */
+/* Adds the light of a step, over which the value changes by `move`. below: the value's distance from the piece's low
+ * end at the begin of the step. */
 SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_place *at, vm open, vf below, vf move,
                                    const kernel_stretch *st, kernel_light *light)
 {
@@ -299,7 +308,7 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_pl
     light->transmittance = kernel_exp(-light->depth);
 }
 
-/* Integrates the segment and adds it behind the light that `light` holds. */
+/* Integrates the segment and adds its light behind that in *light. */
 SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_run *run, kernel_light *light)
 {
     const kernel_leg leg = kernel_leg_of(run);

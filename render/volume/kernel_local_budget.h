@@ -58,16 +58,17 @@ enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32
 /* Share of the allowed error that the residual of Newton's method may use. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Per lane: bounds of the change of light by a field error, over the cell's values (kernel_swing). */
+/* Bounds, per lane, of how a field error changes the light, over the values of the lane's cell (kernel_swing). sway is
+ * the variation of that change, cost its maximum. */
 typedef struct kernel_local_bounds {
     float cost[SIMD_WIDTH];
     float sway[SIMD_WIDTH];
-    float fade[SIMD_WIDTH]; /* cost + R |s'| */
+    float fade[SIMD_WIDTH]; /* cost + R |s'|, as defined at the top of this file */
     float extinction[SIMD_WIDTH];
     float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* range of values for which the bounds hold */
 } kernel_local_bounds;
 
-/* Error budget of the rays in a vector of cells. */
+/* The error budget of the rays in a vector of cells. */
 typedef struct kernel_local_budget {
     const kernel_pieces *pieces;
     float allowance, reach;
@@ -101,7 +102,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     vf_store(b->bounds.extinction, extinction);
     vf_store(b->bounds.low, low);
     vf_store(b->bounds.high, high);
-    /* The residual may use a share of the error that the ray's length alone allows. */
+    /* The residual of Newton's method may use a share of the error that is allowed for the ray's length alone. */
     const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(b->nonlinear.sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(b->nonlinear.residual_limit));
     vf_store(b->nonlinear.tolerance, tolerance);
@@ -115,19 +116,19 @@ typedef struct kernel_local_pairs {
     kernel_point ends[2];
     kernel_local_deviations off_chord;
     vm active;
-    vf begin;     /* begin of the ray's window */
-    vf count;     /* number of segments */
-    float unseen; /* factor of kernel_local_nonlinear.unseen */
+    vf begin;     /* depth at which the ray's window begins */
+    vf count;     /* number of segments into which the interval is divided */
+    float unseen; /* factor by which kernel_local_nonlinear.unseen is multiplied, 1 for a whole interval */
 } kernel_local_pairs;
 
-/* Returns by how much a single chord is raised so that its mean is the field's. */
+/* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
 SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
 {
     const vf *d = p->off_chord.field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
 }
 
-/* Returns the rays whose single chord would end outside the values over which the bounds hold. */
+/* Returns the rays whose single, raised chord would end outside the values for which the bounds hold. */
 SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
@@ -136,13 +137,13 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_lo
                  vf_lt(kernel_take(b->bounds.high, p->rays.lane), high));
 }
 
-/* Error terms if one segment replaces a ray's whole interval in its cell. */
+/* Error terms, per ray, if one segment replaces the ray's whole interval in its cell. */
 typedef struct kernel_local_wrong {
     vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
-    vf quartic; /* E */
-    vf unknown; /* residual of Newton's method */
-    vf length;  /* unit distances */
-    vf fade;    /* variation of g caused by T and b */
+    vf quartic; /* E, the bound of the field's quartic part */
+    vf unknown; /* error of the field due to the residual of Newton's method */
+    vf length;  /* length of the interval in unit distances */
+    vf fade;    /* variation of g caused by the changes of T and b along the segment */
 } kernel_local_wrong;
 
 SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kernel_local_pairs *p,
@@ -162,14 +163,16 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kerne
     out->fade = kernel_take(b->bounds.fade, lane) * depth;
 }
 
-/* Returns the error of one segment per unit distance: the part that varies along it, and the part of its mean. */
+/* Returns the error of light per unit distance for one segment: the part that varies along the segment, plus the part
+ * of its mean. */
 SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, vf cost)
 {
     const vf half = vf_min(0.5f * (sway + w->fade), cost);
     return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
 }
 
-/* Computes the bounds over the ray's own values, of the field and of chords (see the top of this file). */
+/* Computes the bounds of light's change over the ray's own values, including those of raised chords (see the top of
+ * this file). */
 SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic, vf *sway,
                                         vf *cost)
 {
@@ -180,7 +183,8 @@ SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_loc
     vf_gather_pair(&t->swings->swing, kernel_swing_entry(t, low, high), sway, cost);
 }
 
-/* Sets the number of segments per ray; returns the rays for which no number is enough. */
+/* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. Returns the rays for
+ * which no number is enough. */
 static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_tile_trace *t,
                                                                 const kernel_local_budget *b,
                                                                 const kernel_local_wrong *wrong, vf least,
@@ -194,7 +198,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
     kernel_local_own_bound(b->pieces, p, wrong->quartic, &sway, &cost);
-    /* Per unit distance. */
+    /* The error allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
     const vm few = vf_le(kernel_local_wrong_by_one(wrong, sway, cost), allowed);
     const vf half = vf_min(0.5f * (sway + wrong->fade), cost), made = half * wrong->mean;
@@ -205,8 +209,9 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
     return vm_andnot(fails, few);
 }
 
-/* As kernel_local_count_by_depth(), but first checks, with the ray's length alone and the bounds over all of the cell's
- * values, whether one segment is enough. */
+/* Sets the number of segments per ray; returns the rays for which no number is enough. It first tests whether one
+ * segment is enough, with the ray's length alone and the bounds over all of the cell's values; only other rays use
+ * kernel_local_count_by_depth(). */
 SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_budget *b, kernel_local_pairs *p)
 {
     kernel_local_wrong wrong;

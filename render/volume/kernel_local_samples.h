@@ -1,14 +1,12 @@
-/* Samples of volumes, one per lane, of any rays and cells. A cell of a few pixels leaves most lanes of a packet idle,
- * and a sample's value takes an inverse map; so samples of several cells are put side by side:
- *
+/* Computes samples of volumes, one sample per lane, for any rays and cells. A cell of a few pixels leaves most lanes of
+ * a packet idle, and a sample's value requires an inverse map. So samples of several cells are processed side by side:
  *     cells of one type       where are they, and what map have they?     kernel_local.h
- *     pixels of their boxes   which samples may be in the cell?           by planes about it
+ *     pixels of their boxes   which samples may be in the cell?           by planes around it
  *     samples                 where in the cell, and what is the field?   Newton's method
- *
  * A sample belongs to the cell that contains it by the cell's reference coordinates. At a face one of these is at its
- * limit, so that the crossings of faces give the same result up to rounding: for samples near a face the crossings
- * decide (kernel_crossings.h), as neighbouring cells share their bits. For cells that are bent too much the crossings
- * decide all samples. */
+ * limit, so that the crossings of faces give the same result up to rounding. For samples near a face the crossings
+ * decide (kernel_crossings.h), because neighbouring cells share their bits. For cells with strongly nonlinear maps the
+ * crossings decide all samples. */
 #ifndef RENDER_KERNEL_LOCAL_SAMPLES_H
 #define RENDER_KERNEL_LOCAL_SAMPLES_H
 
@@ -33,37 +31,41 @@
 typedef struct kernel_tile_ray_samples {
     kernel_samples samples;
     kernel_blend blend;
-    vm active; /* the packet's active rays; the packet's own mask is narrowed to lit rays */
+    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that still receive
+     * light */
+    vm active;
 } kernel_tile_ray_samples;
 
 enum {
     KERNEL_LOCAL_SAMPLES = 1024,
     KERNEL_TILE_PIXELS = KERNEL_TILE * KERNEL_TILE,
-    /* bits of a sample: its pixel in the tile from bit 0 on, its cell's lane from this bit on, */
+    /* Layout of a sample's word: its pixel in the tile begins at bit 0, the lane of its cell at bit KERNEL_LOCAL_LANE,
+     * and its number in the window at bit KERNEL_LOCAL_NUMBER. */
     KERNEL_LOCAL_LANE = 8,
-    KERNEL_LOCAL_NUMBER = 16 /* its number in the window from this bit on */
+    KERNEL_LOCAL_NUMBER = 16
 };
 
 typedef struct kernel_local_batch {
-    kernel_tile_ray_samples *packets; /* the tile's packets */
+    kernel_tile_ray_samples *packets; /* packets of the tile */
     kernel_local_lanes lanes;
-    int first, count; /* range of the window's sample numbers */
+    int first, count; /* number of the window's first sample, and number of samples */
     kernel_pixel_list rays;
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
-    /* By packet and lane: depth of sample 0 and the step, side by side; and where the window ends on the ray. */
+    /* By packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which the
+     * window ends on the ray. */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
-    float pad; /* kernel_samples.pad */
+    float pad; /* error bound of sample numbers, as in kernel_samples */
 } kernel_local_batch;
 
-/* Returns whether cells of this type are sampled in lanes. Not if there are surfaces, for which the intervals' ends are
- * needed (kernel_blend_breaks()), nor if samples are separate. */
+/* Returns whether cells of this type are sampled in lanes. They are not if the frame has surfaces, which need the ends
+ * of intervals (kernel_blend_breaks()), nor if samples are separate fragments. */
 SIMD_INLINE bool kernel_local_fits(const kernel_frame *f, int type)
 {
     return !f->surface_count && !f->job->separate_samples && kernel_local_queue_of(type) >= 0;
 }
 
-/* Begins the volume's samples of a window for which the packets of the blocks are set up. */
+/* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */
 SIMD_INLINE void kernel_local_begin(const kernel_tile_trace *t, kernel_local_batch *b, kernel_tile_ray_samples *packets,
                                     unsigned blocks, int volume, kernel_tile_take *take)
 {
@@ -178,8 +180,8 @@ SIMD_INLINE void kernel_local_fill(kernel_tile_trace *t, kernel_local_batch *b, 
 
 /* ---- pixels ---- */
 
-/* Returns the first sample number in the window, from the negated number of the interval's first sample. Rays that miss
- * the window may have any number; they get the number behind the last sample, so that no lane's number overflows an
+/* Returns the first sample number within the window, from the negated number of the interval's first sample. Rays that
+ * miss the window may have any number; they get the number behind the last sample, so that it does not overflow an
  * int. */
 SIMD_INLINE vf kernel_local_first(const kernel_local_batch *b, vf negated)
 {
@@ -236,7 +238,8 @@ static __attribute__((noinline)) unsigned kernel_local_fetch_any(kernel_local_ba
     return KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
 }
 
-/* Processes the first cells of a queue. */
+/* Processes the first vector of cells of a queue: transforms them, and samples them in lanes or, if that is not
+ * possible, one by one. */
 static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_batch *b, int queue)
 {
     kernel_local_queue *q = &b->lanes.queues[queue];

@@ -29,16 +29,17 @@ typedef struct kernel_tile_ray_segments {
     kernel_segments list;
     kernel_segment_state state;
     kernel_blend blend;
-    vf t_last; /* where the ray ends: at an opaque surface, or behind all cells */
-    vm active; /* the packet's active rays; the packet's own mask is narrowed to rays that have not ended */
+    vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
+    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that have not ended */
+    vm active;
 } kernel_tile_ray_segments;
 
-/* Adds the cell's segments on the packet's active rays. map is NULL for a constant field. */
+/* Callback that adds a cell's segments on the packet's active rays. map is NULL for a constant field. */
 typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
                                       const kernel_map *map);
 
-/* Rays that have passed a stage, one word each: bits of the pixel in the tile from bit 0 on, of the cell's lane from
- * KERNEL_LOCAL_CELL on, and of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
+/* A list of rays that have passed a stage, one word per ray: the pixel in the tile from bit 0 on, the lane of the cell
+ * from KERNEL_LOCAL_CELL on, and the numbers of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
 typedef struct kernel_local_list {
     int count;
     float words[KERNEL_LIST_ROOM];
@@ -47,15 +48,17 @@ typedef struct kernel_local_list {
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
 typedef struct kernel_local_stretches {
-    kernel_tile_ray_segments *packets; /* the tile's packets */
+    kernel_tile_ray_segments *packets; /* packets of the tile */
     unsigned blocks;                   /* blocks of the current window */
-    kernel_ray_segments_take *alone;   /* processes rays on the scalar path */
+    kernel_ray_segments_take *alone;   /* callback that processes rays in a single cell */
     kernel_local_lanes lanes;
     kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_pixel_list rays;
-    kernel_local_list met, crossed[2]; /* crossed: two lists, [1] for rays whose first crossed face is a triangle */
-    /* By packet and lane, side by side: begin and end of the window, and of the ray. */
+    /* rays that may meet their cells, and rays that cross two faces; crossed[1] has those whose first face is a
+     * triangle */
+    kernel_local_list met, crossed[2];
+    /* By packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_local_stretches;
 
@@ -110,8 +113,8 @@ SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const
     kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
 }
 
-/* Coefficients of the polynomial; kernel_local_deviation() returns it at u, kernel_local_primitive() its integral from
- * 0 to u. */
+/* Coefficients of a polynomial that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at u,
+ * kernel_local_primitive() its integral from 0 to u. */
 typedef struct kernel_local_polynomial {
     vf a, b, c;
 } kernel_local_polynomial;
@@ -128,7 +131,8 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
     return u * odd + p->b * square * (0.125f - 0.25f * square);
 }
 
-/* Adds one segment per lane, on the given rays. ends: t_in, t_out, v_in, v_out. */
+/* Adds one segment per lane to the lists of the given rays. ends: t_in, t_out, v_in, v_out; places: position of each
+ * ray's pixel among the packets. */
 SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
@@ -149,7 +153,8 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const ke
     kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
 
-/* Adds the segments of rays that need several. */
+/* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
+ * the polynomial through the sampled values. */
 static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
                                                              const kernel_local_pairs *p, vm rays)
 {
@@ -184,15 +189,15 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel
     if (vm_any(more)) kernel_local_emit_more(b, p, more);
 }
 
-/* ---- parts ---- */
+/* ---- parts of an interval ---- */
 
 enum { KERNEL_LOCAL_PARTS = 8 };
 
-/* A division of intervals into equal parts, in order. In the ends of each part, t and v are the part's own and r is the
- * whole interval's. */
+/* The division of rays' intervals into equal parts. In the ends of each part, t and value belong to the part, but r
+ * belongs to the whole interval. */
 typedef struct kernel_local_division {
     kernel_local_chord chord;
-    kernel_local_part at; /* the end of the last part */
+    kernel_local_part at; /* end of the last part that was processed */
     kernel_local_pairs parts[KERNEL_LOCAL_PARTS];
 } kernel_local_division;
 
@@ -214,8 +219,9 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
     }
 }
 
-/* Adds the segments of rays for which one polynomial is not accurate enough: halves, quarters or eighths of their
- * intervals get a polynomial each. Returns the rays for which eighths are not accurate enough either. */
+/* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
+ * quarters or eighths, with a polynomial for each part. Returns the rays for which eighths are not accurate enough
+ * either. */
 SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_stretches *b,
                                      const kernel_local_pairs *whole, vm rays, int type)
 {
@@ -244,7 +250,7 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 
 /* ---- rays ---- */
 
-/* Processes the wanted rays cell by cell on the scalar path. */
+/* Processes the rays in `wanted` in single cells; rays of the same cell and packet are processed together. */
 static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                   const kernel_local_queue *q,
                                                                   const kernel_local_rays *rays, unsigned wanted)
@@ -290,8 +296,8 @@ SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kerne
     return all;
 }
 
-/* Lists the rays of a vector, from index n on, that cross two faces of their cells; processes doubtful ones on the
- * scalar path. */
+/* Finds, for a vector of rays from index n on, the faces of their cells that they cross. Rays that cross two faces are
+ * listed in `crossed`; uncertain rays are processed in single cells. */
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_stretches *b,
                                              const kernel_local_queue *q, int type, int n)
 {
@@ -307,7 +313,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     if (__builtin_expect(vm_any(crossed.alone), 0)) kernel_local_segments_alone(t, b, q, &rays, vm_bits(crossed.alone));
 }
 
-/* Adds the segments of rays from index n on that cross two faces. */
+/* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
 SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
                                              const kernel_local_queue *q, const kernel_local_list *list, int type,
                                              int n)
@@ -334,7 +340,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
 }
 
-/* Lists the rays from index n on that may meet their cells in the window. */
+/* Lists those of the rays from index n on that may meet their cells within the window. */
 SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
 {
     const int left = b->rays.count - n;
@@ -408,7 +414,7 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
     return showing;
 }
 
-/* Returns the lanes whose cells have a step of the opacity or a steep ramp among their values. */
+/* Returns the lanes whose cells have values at a step of the opacity or on a steep ramp. */
 SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
 {
     const kernel_segment_state state = {.pieces = b->pieces};
@@ -429,7 +435,7 @@ static __attribute__((noinline)) unsigned kernel_local_segments_place(const kern
     return showing;
 }
 
-/* Returns the farthest end of window of the block's active rays. */
+/* Returns the farthest depth at which the window of one of the block's active rays ends. */
 SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kernel_tile_ray_segments *packets,
                                           int block)
 {
@@ -457,7 +463,8 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
     }
 }
 
-/* Processes the first cells of a queue. */
+/* Processes the first vector of cells of a queue: transforms them, and adds their segments in lanes or, if that is not
+ * possible, one by one. */
 static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                 int queue)
 {

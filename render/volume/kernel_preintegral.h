@@ -39,17 +39,18 @@
 /* Maximum number of subintervals of a segment. */
 #define KERNEL_PRE_PARTS 32.0f
 
-/* A value's position in the tables. */
+/* The position of a value in the tables of sums. */
 typedef struct kernel_pre_end {
-    vf value, bin, place; /* place: position in the bin, 0 .. 1; may be outside in the first and the last bin */
+    /* place: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
+    vf value, bin, place;
     vf own[4], rough;     /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
     vi before[4], colour; /* before: the sums of all earlier bins */
 } kernel_pre_end;
 
-/* A segment, or a subinterval of it. */
+/* The light of a segment or of a subinterval of it, and bounds of its error. */
 typedef struct kernel_pre_subinterval {
     vf colour[3], depth, absorbed;
-    /* error: of the absorption within the segment; rough: of the tables; allowed: the budget */
+    /* error: due to absorption within the segment; rough: due to the tables; allowed: error budget */
     vf error, rough, allowed;
 } kernel_pre_subinterval;
 
@@ -72,7 +73,8 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
     e->colour = vi_from_bits(rest[0]);
 }
 
-/* Returns 1 - exp(-y); *share: that divided by y. Near 0 it uses the series, whose first omitted term is y^6 / 5040. */
+/* Returns 1 - exp(-y); *share: that divided by y. For small y the series is used, whose first omitted term is y^6 /
+ * 5040. */
 SIMD_INLINE vf kernel_gone(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
@@ -119,7 +121,7 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
     }
     out->depth = sum[0] * t->depth_unit;
     const vf gone = kernel_gone(0.5f * out->depth, &mean);
-    mean *= 1.0f - 0.5f * gone; /* A / D */
+    mean *= 1.0f - 0.5f * gone; /* the mean transmittance along the segment, A / D */
     const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
     mean *= t->light_unit;
     out->absorbed = gone * (2.0f - gone);
@@ -202,8 +204,9 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }
 
-/* Returns the result of kernel_integrate() for the segment alone, within the error budget. *end: the end of the rays'
- * last segments; it becomes the end of this one. */
+/* Returns the light of the segment alone, within the error budget; kernel_integrate() would compute it exactly. *end:
+ * table position of the end of the rays' previous segments, which is reused if it is the begin of this one; it becomes
+ * the end of this one. */
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_run *run,
                                               kernel_pre_end *end)
 {

@@ -1,8 +1,9 @@
-/* Samples of volumes in one cell (thesis, section 4.4). In a cell the rays' intervals are computed once, and each
- * sample that an interval owns, t_in <= t < t_out, gets its value.
+/* Computes samples of volumes in one cell (thesis, section 4.4). The rays' intervals in the cell are computed once, and
+ * each sample in an interval, t_in <= t < t_out, gets its value.
  *
- * A sample's position depends only on its number and its ray, so that all ranks use the same samples. Each sample has
- * one owner, as neighbouring cells share the bits of t at their face; only if cells overlap it has several. */
+ * A sample's position depends only on its number and its ray, so that all ranks use the same samples. Each sample
+ * belongs to one cell, because neighbouring cells share the bits of t at their face; only if cells overlap it belongs
+ * to several. */
 #ifndef RENDER_KERNEL_SAMPLES_H
 #define RENDER_KERNEL_SAMPLES_H
 
@@ -20,20 +21,21 @@
 #include "render_face_error.h"
 #include "simd.h"
 
-/* Light below which a rank drops a sample and everything behind it. Colours of at most 1 change by at most this much
- * light, so that a channel errs by at most this: a tenth of the 1e-6 by which partitions may differ, of which rounding
- * takes most. A rank counts only its own cells. Other ranks' cells absorb more light, so a rank drops less than one
- * rank with all cells would, and the bound holds for all ranks together: at the first sample that any rank drops, its
- * own cells already leave no more light than this. */
+/* Share of light below which a rank drops a sample and everything behind it. Colours of at most 1 change by at most
+ * this much light, so that a channel errs by at most this: a tenth of the 1e-6 by which partitions may differ, of which
+ * rounding takes most. A rank counts only its own cells. Other ranks' cells absorb more light, so a rank drops less
+ * than one rank with all cells would, and the bound holds for all ranks together: at the first sample that any rank
+ * drops, its own cells already leave no more light than this. */
 #define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
-/* The samples of a window; NaN if this rank has none. */
+/* The samples of a packet in a window; a value is NaN if no cell of this rank contains the sample. */
 typedef struct kernel_samples {
     int first, count;
-    float pad; /* error bound of sample numbers that are computed from t */
+    float pad; /* error bound of sample numbers that are computed from depths */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
-    vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* the owning interval's ends; only if contact matters */
-    vf marked; /* depth of the ray's nearest sample with two owners, in this window and earlier ones */
+    /* ends of the interval that contains the sample; set only if the frame needs_contact */
+    vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP];
+    vf marked; /* depth of the ray's nearest sample that lies in two cells, in this window and earlier ones */
 } kernel_samples;
 
 typedef struct kernel_volume_state {
@@ -57,7 +59,8 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
     s->pad = 1e-4f + 4e-7f * ((float)((first < 0 ? -first : first) + count) + base);
 }
 
-/* Finds the window's samples that may be in the interval of some ray, as indices begin .. end - 1 into the window. */
+/* Finds the window's samples that may lie in the interval of some ray, as indices *begin .. *end - 1 into the
+ * window. */
 SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
                                     int *begin, int *end)
 {
@@ -72,10 +75,10 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     *end = (int)last;
 }
 
-/* Emits a sample as a fragment of its own, in front of opaque surfaces. If another cell already owns the sample, this
- * marks the ray as overlapping (render.h). Only the nearest such sample is emitted, as others may be behind another
- * rank's opaque surface; a clear fragment is emitted with it, so that there is something that it overlaps. cell: the
- * ray's interval in the sample's cell. */
+/* Emits a sample as a fragment of its own, if it is in front of opaque surfaces. Unless samples are separate, this
+ * happens because another cell already contains the sample, and it marks the ray as overlapping (render.h). Only the
+ * nearest such sample is emitted, because others may be behind another rank's opaque surface. A clear fragment is
+ * emitted with it, so that the two overlap. cell: the ray's interval in the sample's cell. */
 static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
@@ -90,7 +93,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     if (!p->frame->job->separate_samples) {
         mask = vm_and(mask, vf_lt(t, state->samples->marked));
         state->samples->marked = vf_select(mask, t, state->samples->marked);
-        const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero; /* render_fold.h */
+        /* marks the fragment for render_fold.h */
+        const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero;
         const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), sign};
         const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, sign};
         kernel_emit(p, mask, FRAGMENT_VOLUME, &clear);
@@ -105,8 +109,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     kernel_emit(p, mask, kind, &sample);
 }
 
-/* Fills those of the window's samples begin .. end - 1 that are in the interval. A sample keeps its first owner's
- * value. */
+/* Sets those of the window's samples begin .. end - 1 that lie in the interval. A sample keeps the value of the first
+ * cell that contains it. */
 SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
                                   const kernel_interval *i, int begin, int end)
 {
@@ -146,20 +150,21 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
-/* The current fragment of each ray, to which samples or segments are added. */
+/* The fragment under construction of each ray, to which samples or segments are added front to back. */
 typedef struct kernel_blend {
     vm open;
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
-    vf depth, lost[3]; /* for segments: -ln(transmittance), and the sums' accumulated rounding errors */
-    vf light;          /* light that passes all of this rank's samples so far */
-    /* Used if all samples and segments go to the fold (render_fold.h): the last sample's interval of
-     * FRAGMENT_STRETCHES, and the light that passes all samples so far. `light` is then the light at the end of the
-     * last interval. */
+    /* used for segments: -ln(transmittance), and the accumulated rounding errors of the colour sums */
+    vf depth, lost[3];
+    vf light; /* share of the light that passes all of this rank's samples so far */
+    /* Used if all samples and segments are folded (render_fold.h). stretch: number of the last sample's interval of
+     * length 1 / FRAGMENT_STRETCHES; within: light that passes all samples so far. `light` is then the light at the end
+     * of the last interval. */
     vf stretch, within;
 } kernel_blend;
 
-/* Ends the fragments of the rays in mask. */
+/* Ends the current fragments of the rays in mask, and emits them if they are visible. */
 SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vm closing = vm_and(b->open, mask);
@@ -170,8 +175,8 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     b->open = vm_andnot(b->open, closing);
 }
 
-/* Emits each sample or segment as a fragment for the fold, and marks those before which another rank may have
- * fragments. The current fragment then has no light of its own, so that closing it emits nothing. */
+/* Emits each sample or segment as a fragment for the fold, and marks those in front of which another rank may have
+ * fragments. The current fragment then has no light of its own, so that nothing is emitted when it ends. */
 SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
                                     vf clear)
 {
@@ -189,8 +194,8 @@ SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, v
     b->open = vm_or(b->open, has);
 }
 
-/* Returns the rays whose fragment must end before the sample at t, because a surface lies in between, or may lie there
- * on another rank. */
+/* Returns the rays whose current fragment must end before the sample at t, because a surface lies in between, or may
+ * lie there on another rank. */
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
                                    const kernel_hits *hits, vf t)
 {

@@ -1,5 +1,6 @@
-/* Segments that a ray keeps until everything in front of them is known: one unsorted list of bounded length per ray,
- * and the depths at which surfaces cut them. kernel_segments.h explains how windows make do with this length. */
+/* Stores the segments of each ray until everything in front of them is known: one unsorted list of bounded length per
+ * ray, and the depths at which surfaces cut them. kernel_segments.h explains how windows of depth work with this
+ * bounded length. */
 #ifndef RENDER_KERNEL_SEGMENT_LIST_H
 #define RENDER_KERNEL_SEGMENT_LIST_H
 
@@ -22,8 +23,8 @@ typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
 
-/* Additional data of a segment if no error is allowed (one lane of kernel_double). It is as large as kernel_segment, so
- * that one index serves both. */
+/* Exact length and rounding errors of a segment, used if no error is allowed (one lane of kernel_double). It is as
+ * large as kernel_segment, so that one index serves both. */
 typedef struct kernel_segment_double {
     float length, rest_in, rest_out, unused;
 } kernel_segment_double;
@@ -32,35 +33,36 @@ typedef struct kernel_segment_double {
  * fewer. */
 typedef struct kernel_cuts {
     int row_count;
-    bool is_whole;       /* if false, cuts are searched in the fragments */
-    int64_t first, last; /* range of the tile's surface fragments */
+    /* false if a ray has more cuts than there are rows; its cuts are then searched for in the fragments */
+    bool is_whole;
+    int64_t first, last; /* indices of the tile's surface fragments in the thread's list */
     float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
 } kernel_cuts;
 
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
-    kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* each ray's segments, unsorted */
+    kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* segments of each ray, unsorted */
     kernel_segment_double precise[SIMD_WIDTH][KERNEL_WINDOW];
-    bool is_double; /* the segments' ends are known in double */
-    int room;       /* capacity per ray; halved in double, so that a tile's lists stay in the cache */
+    bool is_double; /* whether the segments' ends are known in double */
+    int room;       /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
     kernel_double_rays rays;
-    /* Overflow for meshes that overlap many times. Segments that begin at the same t have no order; those that do not
-     * fit into the list are integrated here at once and blended behind the window. */
+    /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
+     * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
     kernel_light heap;
-    vf t_begin, t_end; /* the window's interval */
-    bool is_shortened; /* t_end has been lowered since this flag was last cleared */
-    vf per_t;          /* unit distances per t */
+    vf t_begin, t_end; /* depth interval of each ray's window */
+    bool is_shortened; /* set when t_end has been lowered since the flag was last cleared */
+    vf per_t;          /* unit distances per t on each ray */
     kernel_cuts cuts;
 } kernel_segments;
 
-/* Returns whether segments can be integrated one ray-cell pair per lane: not if transparent surfaces cut them, nor if
- * each becomes a fragment of its own. */
+/* Returns whether segments can be integrated one ray-cell pair per lane. They cannot if transparent surfaces cut them,
+ * or if each becomes a fragment of its own. */
 SIMD_INLINE bool kernel_segments_fit(const kernel_frame *f)
 {
     return !f->has_transparent && !f->job->separate_samples;
 }
 
-/* Returns the lane of the pixel, or -1 if it is not in the packet. */
+/* Returns the lane of the packet that holds the pixel, or -1 if the pixel is not in the packet. */
 SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
 {
     const int width = p->frame->job->camera.width, left = width - p->x0;
@@ -71,7 +73,8 @@ SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
     return -1;
 }
 
-/* Collects the cuts of the packet's rays. first: the tile's first fragment in the thread's list. */
+/* Collects the depths at which transparent surfaces cut the packet's rays. first: index of the tile's first fragment in
+ * the thread's list. */
 SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_cuts *cuts)
 {
     int count[SIMD_WIDTH] = {0};
@@ -81,7 +84,8 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     cuts->last = p->thread->out->count;
     for (int64_t i = first; p->frame->has_transparent && i < cuts->last; i++) {
         const fragment *hit = &p->thread->out->items[i];
-        if (hit->kind < FRAGMENT_SURFACE) continue; /* a volume's fragment, of an earlier interval between clips */
+        /* skips fragments of volumes, which come from an earlier interval between clips */
+        if (hit->kind < FRAGMENT_SURFACE) continue;
         const int lane = kernel_lane_of(p, hit->pixel);
         if (lane < 0) continue;
         int at = count[lane];
@@ -99,7 +103,8 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     }
 }
 
-/* Finds the next cuts of rays that have more cuts than there are rows, by a search of all the tile's fragments. */
+/* Finds the next cuts of the rays by searching all of the tile's fragments, if some ray has more cuts than there are
+ * rows. */
 static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
@@ -116,7 +121,7 @@ static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts
     return vf_load(next);
 }
 
-/* Returns each ray's first cut at or behind t; only behind t if `beyond` is set. */
+/* Returns the depth of each ray's first cut at or behind t; only behind t if `beyond` is set; +inf if there is none. */
 SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
 {
     vf next = vf_set(INFINITY);
@@ -161,8 +166,8 @@ SIMD_INLINE void kernel_heap_clear(kernel_light *heap, int lane)
     heap->transmittance[lane] = 1;
 }
 
-/* Makes space in a full list: ends the window at the begin of one of its farther segments, and drops those from there
- * on. Returns false if all segments begin where the new one does. */
+/* Makes space in a full list: the window ends at the begin of one of its farther segments, and all segments from there
+ * on are dropped. Returns false if all segments, including the new one, begin at the same depth. */
 static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane,
                                                                     const kernel_segment *s)
 {
@@ -237,7 +242,7 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
 typedef struct kernel_sorted {
     int row_count;
     vf t_in[KERNEL_WINDOW]; /* +inf if a ray has fewer segments */
-    vi item[KERNEL_WINDOW]; /* index of the segment, in floats from list->items on */
+    vi item[KERNEL_WINDOW]; /* position of the segment, in floats from list->items on */
 } kernel_sorted;
 
 SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
@@ -245,15 +250,16 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
     return vf_gather(&list->items[0][0].t_in + member, item);
 }
 
-/* Returns the rays whose two segments begin at the same t and whose `item` ends before `earlier`: it has length 0 in
- * float32 and comes first. */
+/* Returns the rays on which the two segments begin at the same t and `item` ends before `earlier`: it has length 0 in
+ * float32 and must come first. */
 static __attribute__((noinline, cold)) vm kernel_segments_tied(const kernel_segments *list, vm same, vi item,
                                                                vi earlier)
 {
     return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
 }
 
-/* Sorts by insertion, for all rays at once. Cells come nearly in order, as the traversal is front to back. */
+/* Sorts the segments of all rays by insertion. They are nearly sorted already, because the traversal is front to
+ * back. */
 static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out)
 {
     enum { FLOATS = sizeof(kernel_segment) / sizeof(float) };
@@ -292,37 +298,41 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
     }
 }
 
-/* A ray's interval in a cell: how the field is known on it, and how finely it is cut into segments with a linear field
- * each (kernel_segments.h). It is cut into equal subintervals or, if these do not suffice, by bisection
+/* The following part decides how a ray's interval in a cell is divided into segments, each with a linear field
+ * (kernel_segments.h): into equal subintervals or, if these are not accurate enough, by bisection
  * (kernel_cell_segments.h). */
 
-/* Maximum number of equal subintervals. */
+/* Maximum number of equal subintervals of an interval. */
 enum { KERNEL_MAX_SUBDIVISIONS = 256 };
-/* Optical depth at which exp(-depth) is KERNEL_BLACK or slightly more. */
+/* Optical depth at which the transmittance exp(-depth) is KERNEL_BLACK or slightly more. */
 #define KERNEL_DARK_DEPTH 18.4f
 
 typedef struct kernel_segment_state {
     kernel_segments *list;
     const kernel_pieces *pieces;
     int volume;
-    /* error allowed per unit distance and per unit of optical depth; 0: subintervals have the sampling step's length */
+    /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
+     * step */
     float allowance;
-    float mixing; /* > 0: segments are emitted at once, to be mixed with others (kernel_span_mixed()) */
-    float reach;  /* upper bound of a ray's length in the cells, in unit distances */
+    /* > 0: error allowed by mixing; segments are then emitted at once, to be mixed with other volumes
+     * (kernel_span_mixed()) */
+    float mixing;
+    float reach; /* upper bound of a ray's length in the cells, in unit distances */
 } kernel_segment_state;
 
-/* A ray interval in the current cell: how the field is known on it, and the accuracy that it needs. */
+/* A ray's interval in the current cell: how the field is computed on it, and how accurate it must be. */
 typedef struct kernel_span {
-    const kernel_map *map;   /* NULL: linear */
-    const kernel_cell *cell; /* NULL: a tet or a polyhedron; if there is no map, the cell is constant */
+    const kernel_map *map;   /* inverse map of the cell; NULL if the field is linear */
+    const kernel_cell *cell; /* the cell; NULL for a tet or a polyhedron; without a map the cell is constant */
     const kernel_interval *interval;
-    const kernel_double *precise; /* a tet's interval in double, or NULL */
+    const kernel_double *precise; /* exact length and values of a tet's interval, or NULL */
     float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
-    int first_step, step_count; /* range of the opacity's steps that lie among the cell's values */
-    bool is_steep, is_narrow;   /* a steep ramp, a narrow ramp lies among the cell's values */
+    int first_step, step_count; /* the opacity's steps that lie within the range of the cell's values */
+    /* whether a steep ramp, and a narrow ramp, lies within the range of the cell's values */
+    bool is_steep, is_narrow;
 } kernel_span;
 
-/* Returns bounds of the transfer function over the values from low to high, apart from steps. */
+/* Returns bounds of the transfer function over the values from low to high, except at steps. */
 SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
 {
     const float last = KERNEL_BOUND_BINS - 1;
@@ -345,7 +355,7 @@ SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *
     return simd_min(t->contrast * b->extinction_slope + b->extinction_high * b->colour_slope, 1e30f);
 }
 
-/* Sets the maximum of this cost over the cell's values, and the steps and ramps that lie among these values. */
+/* Computes the maximum of this cost over the cell's values, and finds the steps and ramps within these values. */
 SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const float *values, int count, kernel_span *out)
 {
     const kernel_pieces *t = state->pieces;
@@ -373,7 +383,7 @@ SIMD_INLINE vf kernel_span_value(kernel_packet *p, const kernel_span *span, vm r
     return span->map ? kernel_value_at(p, span->map, i, rays, t) : kernel_line_value(i, t);
 }
 
-/* Returns the rays whose value range, low to high, meets a steep ramp; if is_narrow is set, a narrow one. */
+/* Returns the rays whose values from low to high meet a steep ramp, or, if is_narrow is set, a narrow one. */
 SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
 {
     vm any = vm_none();
@@ -385,7 +395,7 @@ SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, v
     return any;
 }
 
-/* Returns the rays whose value range, low to high, holds a step of the opacity. */
+/* Returns the rays whose values from low to high contain a step of the opacity. */
 SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel_span *span, vf low, vf high)
 {
     vm any = vm_none();
@@ -402,11 +412,13 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
 
 enum { KERNEL_STRETCH_LOOKS = 8 };
 
-/* Deviation of the field from the chord between its values at the interval's ends, sampled at eighths. */
+/* Deviation of the field from the chord between its values at the interval's ends, sampled at each eighth of the
+ * interval. */
 typedef struct kernel_span_deviation {
     vf most;
-    vf bend;    /* middle deviation of a parabola whose second derivative has the field's mean size */
-    vf opacity; /* mean opacity, from the quarters */
+    /* deviation at the middle of a parabola whose second derivative is the mean absolute one of the field */
+    vf bend;
+    vf opacity; /* mean opacity along the interval, from samples at its quarters */
 } kernel_span_deviation;
 
 /* Returns the mean size of the field's second derivative, as a deviation (kernel_span_deviation.bend). Subintervals of
@@ -442,14 +454,17 @@ SIMD_INLINE void kernel_span_deviate(kernel_packet *p, const kernel_segment_stat
     out->bend = kernel_span_bend(off);
 }
 
-/* Returns into how many subintervals, as a real number, the interval must be cut, and stores how far its field deviates
- * from the chord of its end values. By error: a subinterval deviates from its chord by its square's share of the bend,
- * two thirds of that on average; the bound takes half as much again. Second differences accumulate the values'
- * rounding, which is subtracted, but the bend is never less than the largest deviation. The error allowed is the
- * interval's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity
- * as a lower bound of the extinction. No number is enough if a step of the opacity lies among the values, if a steep
- * ramp does and too many subintervals would be needed, or if a narrow ramp does in which the values' rounding alone
- * would take an eighth of the allowed error. */
+/* Returns the number of subintervals, as a real number, into which the interval must be divided, and stores the largest
+ * deviation of its field from the chord.
+ *
+ * With n subintervals, each deviates from its chord by 1 / n^2 of the bend, two thirds of that on average; the bound
+ * uses 1.5 times as much. Second differences accumulate the values' rounding, which is subtracted, but the bend is
+ * never less than the largest deviation. The error allowed is the interval's share of the ray's length and of its
+ * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as a lower bound of the extinction.
+ *
+ * No number is enough in three cases: if a step of the opacity lies among the values; if a steep ramp does and too many
+ * subintervals would be needed; or if a narrow ramp does in which the values' rounding alone would use an eighth of the
+ * allowed error. */
 SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
                                   const kernel_interval *stretch, vf *deviation)
 {
@@ -460,7 +475,7 @@ SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *
     const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
     const vf distance = length * state->list->per_t, depth = distance * off.opacity;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = bend * span->cost * distance; /* 3/2 of 2/3 */
+    const vf made = bend * span->cost * distance; /* the product of 3/2 and 2/3 is 1 */
     *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
@@ -491,7 +506,8 @@ SIMD_INLINE vf kernel_span_mixed(const kernel_segment_state *state, const kernel
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
-/* Returns the number of equal subintervals. *halved: the rays for which no number is enough. */
+/* Returns the number of equal subintervals into which the interval is divided. *halved: the rays for which no number is
+ * enough, which must be bisected. */
 SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
                                         vm rays, const kernel_interval *stretch, vm *halved)
 {
@@ -518,7 +534,7 @@ SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_s
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
-/* Returns a + b and its rounding error (Knuth). */
+/* Returns a + b; *lost: the rounding error of the sum, computed exactly (Knuth). */
 SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
 {
     const vf sum = a + b, other = sum - a;
@@ -526,7 +542,7 @@ SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
     return sum;
 }
 
-/* Returns the part of a segment between the shares `from` and `to` of its length. */
+/* Returns the part of a segment from `from` to `to`, which are shares of its length. */
 SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to)
 {
     const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);
@@ -541,8 +557,8 @@ SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to
 }
 
 /* Emits a segment as a fragment of its own. kernel_integrate() stops once all but KERNEL_BLACK of the light is
- * absorbed, and its depth is then too small; but compositing mixes fragments by their depth. So a segment that dense is
- * bisected until its parts are not, and emission ends where light does. */
+ * absorbed, so that its depth is then too small; but compositing mixes fragments by their depth. So a segment that is
+ * so dense is bisected until its parts are not, and emission ends when no light is left. */
 static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
                                 const kernel_run *whole)
 {

@@ -34,10 +34,10 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* ---- the ray ---- */
+/* ---- blending a ray's segments ---- */
 
-/* Returns the depth up to which another interval's begin is safely in front of this end: t_out minus the error bound of
- * crossings. render_fold.c uses the same margin. */
+/* Returns t_out minus the error bound of crossings: an interval that begins before this depth really begins in front of
+ * t_out. render_fold.c uses the same margin. */
 SIMD_INLINE vf kernel_segment_end(vf t_out)
 {
     return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;
@@ -128,7 +128,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }
 
-/* Begins a window at list->t_begin. */
+/* Begins a window at list->t_begin with empty lists. t_end: depth at which each ray's window ends. */
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
     memset(list->count, 0, sizeof list->count);

@@ -10,7 +10,7 @@
 #include "kernel_tile_trace.h"
 #include "simd.h"
 
-/* Most pixels of a tet that is listed. */
+/* Maximum number of pixels in the box of a tet that is processed in lanes. */
 enum { KERNEL_TET_PIXELS = 48 };
 
 _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vector of tets has room");

@@ -18,7 +18,7 @@
 
 enum { KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
 
-/* The middle of u and v per block, and half of their extent. */
+/* The (u, v) at the middle of each block, and half of their extent in a block. */
 typedef struct kernel_block_rays {
     vf u[KERNEL_BLOCK_VECTORS], v[KERNEL_BLOCK_VECTORS];
     float half_u, half_v;

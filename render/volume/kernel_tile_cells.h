@@ -39,21 +39,21 @@ enum {
     KERNEL_WAIT_ROOM = SIMD_WIDTH + 2 * KERNEL_WAIT_AHEAD
 };
 
-/* Callback: traces those tets of the given lanes for which one ray-tet pair per lane is faster. Returns the remaining
- * lanes. */
+/* Callback that traces those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the
+ * remaining lanes. */
 typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
 
-/* The tile's cells of a volume. The first open_count items begin before the last window's end and end behind its begin;
- * `next` is the first item that no window has reached. Only the first `sorted` items are sorted: a tile that becomes
- * dark early does not sort the others. `ends` are partition points of the quicksort, the last one nearest: no item
- * before such a point is farther than any item behind it. */
+/* The cells of a volume in the tile. The first open_count items begin before the end of the last window and end behind
+ * its begin; `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a
+ * tile that soon becomes dark does not need the others. `ends` are the partition points of the quicksort, the nearest
+ * one last: no item before such a point is farther than any item behind it. */
 typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    kernel_cell cell;     /* the current cell */
-    kernel_map map;       /* its map */
-    kernel_arrays arrays; /* the volume's field on the current part */
+    kernel_cell cell;     /* the cell that is being traced */
+    kernel_map map;       /* inverse map of that cell */
+    kernel_arrays arrays; /* arrays of the volume's field on the current mesh part */
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
@@ -66,8 +66,8 @@ typedef struct kernel_tile_cells {
     kernel_tile_take_tets *take_tets; /* NULL: each tet is processed alone */
 } kernel_tile_cells;
 
-/* Prepares the fetched cell for the rays of the blocks; returns the blocks in which it may be visible. is_pencil: the
- * rays are a pencil (kernel_packet.h). */
+/* Transforms the fetched cell and prepares it for the rays of the blocks. Returns the blocks in which it may be
+ * visible. is_pencil: the rays are the tile's own primary rays (kernel_packet.h). */
 SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
 {
@@ -86,8 +86,9 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     return meets;
 }
 
-/* Makes a batch's cell `cell`, in lane `lane`, the tile's current cell, ready for the rays of all blocks, unless it
- * already is. Returns false if it is invisible. *alone: the lane whose cell is the current one, or -1. */
+/* Makes a batch's cell the tile's current cell, ready for the rays of all blocks, unless it already is. cell: its
+ * index; lane: its lane in the batch. Returns false if it is invisible. *alone: the lane whose cell is the current one,
+ * or -1. */
 static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_trace *t, int volume, int part,
                                                                     uint32_t cell, bool is_pencil, int lane, int *alone)
 {
@@ -119,8 +120,8 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
 
 enum { KERNEL_ALL_PIXELS = -1 };
 
-/* Returns a box of pixels, ends included, in a candidate's format (kernel_types.h): `box` itself, or the bounding box
- * of the blocks if box is KERNEL_ALL_PIXELS. */
+/* Returns a box of pixels in the format of candidates (kernel_types.h): `box` itself, or the bounding box of the blocks
+ * if box is KERNEL_ALL_PIXELS. */
 SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
 {
     if (box >= 0) return (unsigned)box;
@@ -148,7 +149,7 @@ SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transf
         }
 }
 
-/* Returns the lanes whose cells are visible and reach into the window; stores the depths at which they begin. */
+/* Returns the lanes whose cells are visible and reach into the window; stores the least depth of each cell. */
 SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
                                            const kernel_interest *interest, float near[SIMD_WIDTH])
 {
@@ -179,8 +180,8 @@ SIMD_INLINE void kernel_tile_learn_pending(kernel_tile_cells *cells, int end)
                                cells->wait_vertices[0] + cells->known, KERNEL_WAIT_ROOM);
 }
 
-/* Transforms the first `count` pending tets; returns the lanes of those that are visible and whose blocks have a ray
- * that reaches them. */
+/* Transforms the first `count` pending tets. Returns the lanes of those that are visible in a block in which some ray
+ * has no nearer end. */
 SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
 {
     t->thread->volume_cells += count;
@@ -216,7 +217,7 @@ SIMD_INLINE void kernel_tile_pop_pending(kernel_tile_cells *cells)
         memmove(cells->wait_vertices[i], cells->wait_vertices[i] + SIMD_WIDTH, LEFT * sizeof *cells->wait_vertices[i]);
 }
 
-/* Transforms the first pending tets and passes them to take_tets or, one by one, to `take`. */
+/* Transforms the first vector of pending tets, and passes them to take_tets or, one by one, to take(). */
 static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                             kernel_tile_take *take)
 {
@@ -240,8 +241,9 @@ SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cell
     while (cells->pending) kernel_tile_take_some(t, cells, take);
 }
 
-/* Makes the volume and part the ones of pending tets. Returns whether the part's tets are processed in lanes: not if
- * the field is constant per cell, as it is not interpolated then. */
+/* Makes the volume and mesh part those of the pending tets; tets of another part are processed first. Returns whether
+ * the part's tets are processed in lanes: they are not if the field is constant per cell, because it is not
+ * interpolated then. */
 SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
                                       kernel_tile_take *take)
 {
@@ -255,7 +257,7 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
     return cells->arrays.has_lanes && !cells->arrays.is_by_cell;
 }
 
-/* Queues a tet, and processes some pending ones if the queue is full. box: kernel_tile_box(). */
+/* Queues a tet. If the queue is full, some tets are processed. box: its box of pixels (kernel_tile_box()). */
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
                                   unsigned box, kernel_tile_take *take)
 {
@@ -267,7 +269,7 @@ SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells
     if (cells->pending == KERNEL_WAIT_ROOM) kernel_tile_take_some(t, cells, take);
 }
 
-/* ---- from trees ---- */
+/* ---- cells found by traversing trees ---- */
 
 /* Callbacks that process a volume's cells. */
 typedef struct kernel_cell_visitor {
@@ -293,7 +295,7 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_v
             kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
 
-/* Traverses the trees of the parts, with the ranges of the volume's field. */
+/* Traverses the trees of the given mesh parts, skipping nodes whose values are invisible in the volume. */
 SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
                                           unsigned blocks, kernel_tile_visit *visit)
 {
@@ -306,7 +308,7 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
     }
 }
 
-/* Traverses all trees of the frame, through the tree over them if there is one. `take` receives their cells. */
+/* Traverses the trees of all mesh parts, or the tree over the parts if there is one. take() receives their cells. */
 SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
                                        kernel_tile_take *take)
 {
@@ -318,7 +320,7 @@ SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, ke
     kernel_tile_take_pending(t, t->thread->tile_cells, take);
 }
 
-/* Processes a leaf's cells. */
+/* Processes a leaf's cells: queues those whose types are processed in lanes, and transforms the others. */
 SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
                                    const uint32_t *cells, int count, unsigned blocks)
 {
@@ -331,7 +333,7 @@ SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visit
     if (left) kernel_tile_meet_leaf(t, visitor, volume, part, others, left, blocks);
 }
 
-/* ---- cells known from the candidates ---- */
+/* ---- cells found before, as candidates of the tile ---- */
 
 /* Partitions the items by depth: those before the returned index are no farther than the others. Neither part is
  * empty. */
@@ -372,7 +374,7 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
     }
 }
 
-/* Sorts at least one more item. */
+/* Continues the incremental quicksort until at least one more item is sorted. */
 static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items + cells->sorted;
@@ -386,7 +388,7 @@ static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *
     cells->end_count--;
 }
 
-/* Begins the tile, before its first window; returns false if it is known to have no cells. */
+/* Begins a tile, before its first window. Returns false if the tile is known to have no cells. */
 SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_tets *take_tets)
 {
     const kernel_frame *f = t->frame;
@@ -404,7 +406,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_
     return cells->count > 0;
 }
 
-/* Makes the cells that overlap the window the first open_count items. */
+/* Moves the cells that overlap the window to the front of the list and sets open_count to their number. */
 SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items;
@@ -420,7 +422,7 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     cells->open_count = count;
 }
 
-/* Processes one of the window's cells. */
+/* Processes one of the cells that overlap the window. */
 SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
                                        const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
                                        kernel_tile_take *take)
@@ -433,8 +435,8 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }
 
-/* Prefetches the next open cells: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, the vertices of
- * KERNEL_OPEN_PIECE. */
+/* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of
+ * KERNEL_OPEN_PIECE cells. */
 SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
 {
     const render_job *job = t->frame->job;
@@ -451,7 +453,7 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
     }
 }
 
-/* Processes the window's cells. */
+/* Processes all candidates of the tile that overlap the window. */
 SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visitor *visitor, unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -466,15 +468,15 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
     kernel_tile_take_pending(t, cells, visitor->take);
 }
 
-/* ---- windows ---- */
+/* ---- windows of depth ---- */
 
-/* Returns the depth at which the tile's first cell begins if it is known, else +inf. */
+/* Returns the depth at which the tile's first cell begins; +inf if the cells are not known before. */
 SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
 {
     return t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
 }
 
-/* Returns the blocks that any tree's bounding box may meet, and the range of depths of these boxes. */
+/* Returns the blocks that some tree's bounding box may meet, and the range of depths of these boxes. */
 SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
@@ -489,7 +491,7 @@ SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
     return all;
 }
 
-/* Sets up the blocks' packets; lists them and returns their number. */
+/* Sets up the packets of the given blocks for volumes; lists them and returns their number. */
 SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
 {
     int count = 0;

@@ -1,19 +1,19 @@
 /* Chooses the depth of a tile's next window of samples. A window's cells are transformed and traced for all of its
- * depth, so that in a dense medium, in which no light reaches most of the window, most of that work would be wasted:
+ * depth. In a dense medium no light reaches most of a deep window, so most of that work would be wasted:
  *
  *     light   1 \__                                   windows of as many samples as fit:  |===============|=====...
- *                  \___                               as deep as light goes:              |====|=|
+ *                  \___                               as deep as light reaches:          |====|=|
  *             0 --------x----------------->  depth
  *
- * Neighbouring tiles lose their light at much the same depth, so this tile is expected to be dark at the last tile's
- * depth. If light is left there, the brightest ray is expected to continue losing it at the rate of the previous
- * window. Rays that keep their light have the deepest windows that fit, as cells at every boundary between windows are
+ * Neighbouring tiles become dark at similar depths, so this tile is expected to be dark at the last tile's depth. If
+ * light is left there, the brightest ray is expected to continue losing it at the rate of the previous window. Rays
+ * that keep their light have the deepest windows that fit, because cells at every boundary between windows are
  * transformed twice.
  *
- * Samples do not depend on windows (kernel_tile_volume.h). But windows decide which cells are seen to overlap behind
- * the place where all light is absorbed, and so whether a pixel is drawn a second time. So that windows do not depend
- * on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILE_RUN tiles, which one
- * thread draws in order. */
+ * Samples do not depend on windows (kernel_tile_volume.h). But windows decide which overlaps of cells are detected
+ * behind the depth at which all light is absorbed, and so whether a pixel is drawn a second time. So that windows do
+ * not depend on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILE_RUN tiles,
+ * which one thread draws in order. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
@@ -23,22 +23,22 @@
 #include "simd.h"
 
 typedef struct kernel_tile_depth {
-    /* Depth behind the last tile's begin at which at least half of its rays that lost light were dark; +inf: they were
-     * not. */
+    /* Depth, relative to the last tile's begin, at which at least half of its rays that lost light were dark; +inf if
+     * they did not become dark. */
     float dark;
-    /* of the current tile: */
-    float own_dark; /* the same depth for this tile; +inf until it is known */
-    float begin;    /* depth of the first cell, if known, or of the first sample; +inf before any sample */
-    bool has_met;   /* some ray has lost light */
+    /* The state of the current tile: */
+    float own_dark; /* depth, relative to `begin`, at which this tile became dark; +inf until it is known */
+    float begin;    /* depth of the first cell if it is known, else of the first sample; +inf before any sample */
+    bool has_met;   /* set if some ray of the tile has lost light */
     float expected; /* expected further depth until the rays are dark, from the light left after the last window */
-    float before;   /* the brightest ray's light before the last window */
-    /* of the last window, over rays that have lost light: */
+    float before;   /* light of the brightest ray before the last window */
+    /* Numbers of the last window's rays that have lost light, and of those that are dark: */
     int met, ended;
     /* first: least depth of their samples; last: greatest depth at which one of them became dark */
     float brightest, first, last;
 } kernel_tile_depth;
 
-/* Begins a run of tiles. */
+/* Begins a run of tiles, in which no earlier tile's depth is known. */
 SIMD_INLINE void kernel_depth_forget(kernel_tile_depth *d)
 {
     d->dark = INFINITY;
@@ -64,14 +64,15 @@ SIMD_INLINE void kernel_depth_begin(kernel_tile_depth *d, float begin)
     kernel_depth_begin_window(d);
 }
 
-/* Returns the depth of the next window, which begins at depth `at`: an eighth more than expected. */
+/* Returns the depth of the next window, which begins at depth `at`: an eighth more than the depth at which the tile is
+ * expected to become dark. */
 SIMD_INLINE float kernel_depth_wanted(const kernel_tile_depth *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);
 }
 
-/* Adds the light that a packet's rays have after the window. */
+/* Adds the light that is left on a packet's rays after the window. */
 SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_blend *b)
 {
     const vf far = vf_set(INFINITY);
@@ -85,7 +86,7 @@ SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_bl
     d->last = simd_max(vf_reduce_max(vf_select(ended, b->t_last, -far)), d->last);
 }
 
-/* Updates the expectation after all rays of a window of this depth were added. */
+/* Updates the expected depth after all rays of a window have been added. depth: the depth of that window. */
 SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
 {
     const bool fades = d->brightest > 0 && d->brightest < 0.9f * d->before;
@@ -93,7 +94,7 @@ SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
     d->before = d->brightest > 0 ? d->brightest : 1;
     d->begin = simd_min(d->first, d->begin);
     d->has_met = d->has_met || d->met;
-    if (d->begin == INFINITY) d->dark *= 2; /* no sample yet, so the last tile's depth says little */
+    if (d->begin == INFINITY) d->dark *= 2; /* there is no sample yet, so the last tile's depth is a poor estimate */
     if (d->own_dark == INFINITY && d->ended > 0 && 2 * d->ended >= d->met) d->own_dark = d->last - d->begin;
     kernel_depth_begin_window(d);
 }

@@ -1,16 +1,16 @@
-/* Segments of a volume for a whole tile, window by window, for all the tile's blocks at once. A cell is fetched and
- * transformed once per window (kernel_tile_cells.h) and passed to the packets of the blocks that it may meet. Their
- * rays keep the segments that begin in their window (kernel_segments.h), and sort and integrate them at the end of the
- * window.
+/* Integrates a volume by segments for a whole tile, window by window, for all the tile's blocks at once. A cell is
+ * fetched and transformed once per window (kernel_tile_cells.h) and passed to the packets of the blocks that it may
+ * meet. Their rays store the segments that begin in their window (kernel_segments.h), and sort and integrate them at
+ * the end of the window.
  *
  * Windows are depth intervals in which some ray has most of its list filled: so as many cells as possible lie in a
  * single window, and the lists of all of a tile's rays stay in the cache. A ray with more segments than its list holds
- * ends its window before the tile's ends, and begins the next one there:
+ * ends its window before the tile's window ends, and begins the next one there:
  *
  *     ray 0  |--s-s-s--s--s---s--|--s--s-...
  *     ray 1  |ssssssssssss|ssssss|sssssss...   full: the rest comes in the tile's next window
- *     ray 2  |--s---s--s--|--x  opaque hit       (which begins where the first of its rays' does)
- *            ^ tile's window 1   ^ tile's window 2 would be here, and is ray 1's begin
+ *     ray 2  |--s---s--s--|--x  opaque hit       (which begins where the first ray's next window begins)
+ *            ^ tile's window 1   ^ end of the tile's window 1; window 2 begins at ray 1's next window
  *
  * The depth of windows is adapted from window to window and from tile to tile; the picture does not depend on it. */
 #ifndef RENDER_KERNEL_TILE_SEGMENTS_H
@@ -45,13 +45,13 @@ typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_double_cell precise;
     kernel_local_stretches stretches;
-    int volume;  /* the current volume */
-    float depth; /* depth of windows; 0: not known yet */
+    int volume;  /* index of the current volume */
+    float depth; /* depth of the next window; 0 if it is not known yet */
 } kernel_tile_segments;
 
 /* ---- cells ---- */
 
-/* Adds the cell's segments on the rays of the blocks. */
+/* Adds the cell's segments on the rays of the given blocks. */
 static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                       unsigned blocks)
 {
@@ -105,14 +105,15 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
 
 /* ---- small tets ---- */
 
-/* Returns whether tets may be processed one ray-tet pair per lane. Not in double, whose ends are computed per packet;
- * nor if tets are few enough to be binned by tile, as they are then so large that packets are as fast. */
+/* Returns whether tets may be processed one ray-tet pair per lane. They may not in double, in which ends are computed
+ * per packet; nor if tets are few enough to be binned by tile, because they are then so large that packets are as
+ * fast. */
 SIMD_INLINE bool kernel_tet_segments_fit(const kernel_frame *f)
 {
     return kernel_segments_fit(f) && !f->is_double && !f->volume_candidates;
 }
 
-/* Adds the segments of rays that begin or end inside their tet. */
+/* Adds the segments of rays that begin or end inside their tet; `rays` is a mask of lanes. */
 static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_trace *t, kernel_tile_segments *s,
                                                                     vi places, vi lanes, unsigned rays)
 {
@@ -128,7 +129,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
     }
 }
 
-/* Adds the segments of the given lanes' pending tets that are small. Returns the lanes of the others. */
+/* Adds the segments of those of the given lanes' pending tets that are small. Returns the lanes of the others. */
 static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
@@ -176,7 +177,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     kernel_segments_set_double(p, &r->list, f->is_double && !f->job->separate_samples);
 }
 
-/* Makes the volume the current one of the packet. */
+/* Makes the volume the packet's current one: sets its error limits and unit distances. */
 SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_segments *r, int volume)
 {
     const kernel_frame *f = p->frame;
@@ -221,7 +222,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     kernel_local_segments_end(t, &s->stretches);
 }
 
-/* Sets the next window's depth from this window's lists, so that the fullest list will be three quarters full. */
+/* Chooses the next window's depth from the lengths of this window's lists, so that the fullest list will be three
+ * quarters full. */
 SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *packets, int count, float begin,
                                             float end)
 {
@@ -237,8 +239,8 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Makes the volume the current one of all packets; sets the tile's t_near to the begin of the first ray, +inf if all
- * rays have ended. */
+/* Makes the volume the current one of all packets. Sets the tile's t_near to the least depth at which a ray's window
+ * begins; +inf if all rays have ended. */
 SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
                                          int volume, float near)
 {
@@ -248,7 +250,7 @@ SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segme
     t->t_near = front < INFINITY ? fmaxf(front, near) : front;
 }
 
-/* Emits all segments of all volumes as separate fragments at once, without windows. */
+/* Emits all segments of all volumes as fragments of their own, at once and without windows. */
 static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_tile_trace *t, kernel_tile_segments *s,
                                                                        const int *packets, int count,
                                                                        const kernel_placement *reach)
@@ -259,7 +261,7 @@ static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_ti
     }
 }
 
-/* Integrates the first volume's segments, window by window. */
+/* Integrates the segments of the first volume, window by window. */
 SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                               int count, const kernel_placement *reach)
 {

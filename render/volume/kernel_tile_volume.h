@@ -39,7 +39,7 @@
 
 typedef struct kernel_tile_volume {
     kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
-    int volume; /* the current volume */
+    int volume; /* index of the current volume */
     kernel_tile_depth depth;
     kernel_local_batch batch;
 } kernel_tile_volume;
@@ -62,7 +62,7 @@ static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *
     for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
 }
 
-/* Fills the cell's samples on the rays of the blocks. */
+/* Sets the samples of the cell on the rays of the given blocks. */
 static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                 unsigned blocks)
 {
@@ -91,19 +91,19 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
     return true;
 }
 
-/* ---- small tets: samples by the operations of kernel_samples.h, to the same bits ---- */
+/* ---- small tets: sampled by the operations of kernel_samples.h, to the same bits ---- */
 
-/* Tets with larger boxes are sampled as fast by packets. */
+/* Maximum number of pixels in the box of a tet that is sampled in lanes. Larger tets are sampled as fast by packets. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
-/* Returns whether tets may be sampled one ray-tet pair per lane: not if surfaces may end rays, nor if each sample
- * becomes a fragment of its own. */
+/* Returns whether tets may be sampled one ray-tet pair per lane. They may not if surfaces may end rays, or if each
+ * sample becomes a fragment of its own. */
 SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
 {
     return !f->surface_count && !f->job->separate_samples;
 }
 
-/* Emits a sample that another cell already owns as a fragment of its own. */
+/* Emits a sample that also lies in another cell as a fragment of its own. */
 static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_trace *t, kernel_local_batch *b, int at,
                                                                     float depth, float value)
 {
@@ -114,7 +114,8 @@ static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_
                        vf_set(value));
 }
 
-/* Stores the values of samples, one per lane, in the window; emits those that another cell already owns. */
+/* Stores the values of samples, one per lane, in the window. Samples that already have a value from another cell are
+ * emitted instead. */
 SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch *b, vm own, vi places, vi numbers,
                                         vf depth, vf value)
 {
@@ -134,7 +135,7 @@ SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch
     }
 }
 
-/* Computes the values of the samples that the rays' intervals own. */
+/* Computes the values of the samples that lie in the rays' intervals. */
 SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batch *b, const kernel_interval *i, vi at)
 {
     vf base, step;
@@ -154,7 +155,7 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
     }
 }
 
-/* Samples the small tets among the given lanes' pending tets. Returns the lanes of the others. */
+/* Samples those of the given lanes' pending tets that are small. Returns the lanes of the others. */
 static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_local_batch *b = &t->thread->tile_volume->batch;
@@ -186,7 +187,8 @@ static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uin
     kernel_tile_volume_trees(t, t->thread->tile_volume->volume, parts, count, blocks, kernel_tile_volume_leaf);
 }
 
-/* Sets up the packet; widens first .. last to the numbers of its rays' samples between the two depths. */
+/* Sets up the packet for samples. Extends *first .. *last to include the numbers of its rays' samples between the
+ * depths near and far. */
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, float near, float far,
                                           int *first, int *last)
 {
@@ -204,8 +206,8 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samp
     *last = highest > *last ? highest : *last;
 }
 
-/* Prepares the packet for the window. Returns the farthest depth of its rays' samples in the window, -inf if there are
- * none, and lowers *near to the nearest. */
+/* Prepares the packet for a window. Returns the farthest depth of its rays' samples in the window, -inf if there are
+ * none, and lowers *near to the least depth. */
 SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r, int volumes, float *near)
 {
     kernel_samples *s = &r->samples;
@@ -220,7 +222,7 @@ SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r
     return vf_reduce_max(vf_select(p->active, t_end, vf_set(-INFINITY)));
 }
 
-/* Collects samples first .. last of all blocks; returns false if no ray is lit any more. */
+/* Collects the samples with numbers first .. last for all blocks. Returns false if no ray is lit any more. */
 SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first, int last)
 {
     const render_job *job = t->frame->job;
@@ -248,7 +250,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     return true;
 }
 
-/* Returns the number of samples of the window that begins with sample `first`. */
+/* Returns the number of samples in the window that begins with sample number `first`. */
 SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const kernel_packet *p, int first)
 {
     enum { LEAST = 8 };

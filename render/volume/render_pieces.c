@@ -1,13 +1,14 @@
-/* Cuts a transfer function at every point of the opacity and every entry of the colour table, after entries that lie on
- * a line with others have been dropped. Opacity and colour are then linear between cuts, exactly as documented.
+/* Divides a transfer function at every point of the opacity and every entry of the colour table, after entries that lie
+ * on a line with others have been dropped. Opacity and colour are then linear between these cuts, exactly as
+ * documented.
  *
- * A ramp that is straight along a logarithmic scale is curved along the values. It is cut into pieces whose extinction
- * has a relative error of at most e. The effect on a pixel does not grow with the path through the medium: for a pixel
- * C = int T s c dt + T_end B, a change ds of the extinction s makes dC = int T ds (c - b) dt, b being the light from
- * behind, and with |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), R the contrast of colours. Where the
- * ramp rises from an opacity of 0, the relative error of a piece from v to (1 + h) v is h / 2; farther up, g above it
- * in the logarithm, it is h^2 / (8 g). So sqrt(g / 2 e) pieces suffice, and halving makes at most twice as many. Over
- * 12 decades that is 105 pieces for e = 1.25e-3, and 370 for 1e-4. */
+ * A ramp that is straight along a logarithmic scale is curved along the values. It is divided into pieces whose
+ * extinction has a relative error of at most e. The effect on a pixel does not grow with the path through the medium:
+ * for a pixel C = int T s c dt + T_end B, a change ds of the extinction s makes dC = int T ds (c - b) dt, where b is
+ * the light from behind, and with |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), where R is the contrast
+ * of colours. If the ramp rises from an opacity of 0, the relative error of a piece from v to (1 + h) v is h / 2;
+ * farther up, at a distance g in the logarithm, it is h^2 / (8 g). So sqrt(g / 2 e) pieces suffice, and halving makes
+ * at most twice as many. Over 12 decades that is 105 pieces for e = 1.25e-3, and 370 for 1e-4. */
 #include "render_pieces.h"
 #include "kernel_types.h"
 #include "render.h"
@@ -21,9 +22,9 @@
 #include "insitu/status.h"
 #include "memory.h"
 
-/* A value far outside of every domain; it is finite so that 0 times it is 0. */
+/* A value far outside every domain. It is finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;
-/* Upper bound of extinctions and of their slopes. */
+/* Upper bound of extinctions and of their slopes, per unit distance. */
 static const double steepest = 1e6;
 static const double rounding = 1e-7;
 
@@ -52,8 +53,8 @@ static bool is_straight(const render_transfer *t, int from, int to, double toler
     return true;
 }
 
-/* Returns the last entry after i up to which all entries lie on a line; entries are evenly spaced. The search is
- * quadratic, so that lines are limited to FARTHEST entries. */
+/* Returns the last entry after i up to which all entries lie on a line within the tolerance. The search is quadratic,
+ * so lines are limited to FARTHEST entries. */
 static int next_entry(const render_transfer *t, int i, double tolerance)
 {
     enum { FARTHEST = 256 };
@@ -63,15 +64,15 @@ static int next_entry(const render_transfer *t, int i, double tolerance)
     return next;
 }
 
-/* A colour of the table that is kept, and its position in the domain. */
+/* An entry of the colour table that is kept, and its position in the domain. */
 typedef struct kept_entry {
     int index;
     double place;
 } kept_entry;
 
-/* ---- ramps along a scale ---- */
+/* ---- ramps along a nonlinear scale ---- */
 
-/* Relative error of the extinction if no error is allowed on purpose. */
+/* Relative error of the extinction of ramps if the job allows no error. */
 static const double exact_share = 1e-4;
 
 static double extinction_of(double opacity)
@@ -83,7 +84,7 @@ static double extinction_of(double opacity)
 typedef struct ramp_part {
     const render_transfer *transfer;
     int ramp;
-    double low, high; /* shares of the ramp along the scale */
+    double low, high; /* begin and end of the part, as shares of the ramp along the scale */
 } ramp_part;
 
 static double ramp_opacity(const ramp_part *r, double share)
@@ -101,9 +102,8 @@ static double ramp_value(const ramp_part *r, double share)
     return render_domain_of(t, render_unscaled(t->scale, t->threshold, low + share * (high - low)));
 }
 
-/* Returns whether the relative error of the extinction of the part's chord exceeds the tolerance. At an end with
- * opacity 0 the relative error is largest, and the first sample is 1/32 of the part away from it: the factor 1.1 covers
- * that. */
+/* Returns whether the relative error of the extinction along the part's chord exceeds the tolerance. It is largest at
+ * an end with opacity 0, but the first sample is 1/32 of the part away from it; the factor 1.1 covers that. */
 static bool is_bent(const ramp_part *r, double tolerance)
 {
     enum { PLACES = 32 };
@@ -118,7 +118,7 @@ static bool is_bent(const ramp_part *r, double tolerance)
     return false;
 }
 
-/* Stores the values of the cuts within the part, unless cuts is NULL; returns their number. A part is not cut if
+/* Stores the values at which the part must be cut, unless cuts is NULL. Returns their number. A part is not cut if
  * float32 cannot distinguish its middle from its ends. */
 static int cut_part(const ramp_part *r, double tolerance, kernel_real *cuts)
 {
@@ -133,7 +133,7 @@ static int cut_part(const ramp_part *r, double tolerance, kernel_real *cuts)
     return count + cut_part(&right, tolerance, cuts ? cuts + count : NULL);
 }
 
-/* Stores the values of the cuts of all ramps, unless cuts is NULL; returns their number. */
+/* Stores the values at which all ramps must be cut, unless cuts is NULL. Returns their number. */
 static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cuts)
 {
     const double share = tolerance > rounding ? tolerance : exact_share;
@@ -165,7 +165,7 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
     return unique;
 }
 
-/* Returns x as a share of the interval from point i to the next one, along the scale. */
+/* Returns the position of x between opacity point i and the next one, along the scale: 0 .. 1. */
 static double ramp_share(const render_transfer *t, int i, double x)
 {
     double low, inverse_width;
@@ -205,7 +205,7 @@ static void set_colours(const render_transfer *t, const kept_entry *entries, dou
     }
 }
 
-/* Width, as a share of the domain, below which float32's rounding of a ramp's ends and values (3e-8) becomes
+/* Width of a ramp, as a share of the domain, below which float32's rounding of its ends and of values (3e-8) becomes
  * visible. */
 static const double narrow_width = 0.01;
 
@@ -215,8 +215,8 @@ static bool is_narrow(const render_transfer *t, int i)
     return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
 }
 
-/* Returns the exact value of the cut in double if a narrow ramp begins or ends there. Returns the rounded cut if none
- * does, or if several points coincide there (a step). */
+/* Returns the exact value of the cut in double if a narrow ramp begins or ends there. Otherwise, and if several points
+ * coincide there (a step), returns the rounded cut. */
 static double cut_exactly(const render_transfer *t, kernel_real cut)
 {
     double out = (double)cut;
@@ -279,7 +279,7 @@ static double piece_opacity(const kernel_piece *p, double x)
     return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
-/* Computes the minimum and the maximum of the extinction's absolute slope between two values of a piece. */
+/* Computes the minimum and the maximum of the absolute slope of the extinction between two values of a piece. */
 static void steepness_of(const kernel_piece *p, double from, double to, double out[2])
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
@@ -288,7 +288,7 @@ static void steepness_of(const kernel_piece *p, double from, double to, double o
     out[1] = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
 }
 
-/* Widens the bin's bounds by those of the piece between two of its values. */
+/* Widens a bin's bounds by those of the piece between two of its values. */
 static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to);
@@ -312,8 +312,8 @@ static void bound_piece(kernel_pieces *out, const kernel_piece *p)
     }
 }
 
-/* Finds the steps. If several points have the same value, the first one's opacity is the lower side's and the last
- * one's the upper side's. */
+/* Finds the steps of the opacity. If several points have the same value, the first one's opacity belongs to the lower
+ * side and the last one's to the upper side. */
 static void fill_steps(kernel_pieces *out, const render_transfer *t)
 {
     int last;
@@ -328,9 +328,9 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Width of steep ramps, as a share of the domain. Wider ramps need only equal subintervals, up to 1000 optical depths
- * (docs/development/error_budget.md). A ramp along a logarithmic scale is steep only within this distance of 0, as its
- * slope is the inverse of the value. */
+/* Width of ramps that count as steep, as a share of the domain. Wider ramps need only equal subintervals, up to 1000
+ * optical depths (docs/development/error_budget.md). A ramp along a logarithmic scale is steep only within this
+ * distance of 0, because its slope is proportional to the inverse of the value. */
 static const double steep_width = 1.0 / 64;
 
 static void fill_steep(kernel_pieces *out, const render_transfer *t)
@@ -347,7 +347,7 @@ static void fill_steep(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Computes the range of light: from 0 to 1, extended to all colours of the table. */
+/* Computes the range of light intensities: from 0 to 1, extended to all colours of the table. */
 static void range_of_light(const render_transfer *t, float *low, float *high)
 {
     *low = 0, *high = 1;
@@ -375,7 +375,8 @@ static void widen_swing(value_swing *swing, int kind, double low, double high)
     swing->high[kind] = fmax(swing->high[kind], fmin(high, 1e30));
 }
 
-/* Widens a by b. Comparisons are used because fmin() and fmax() are function calls, 200,000 of them per frame. */
+/* Widens the ranges of a by those of b. Comparisons are used because fmin() and fmax() are function calls, of which a
+ * frame would need 200,000. */
 static void unite_swings(value_swing *a, const value_swing *b)
 {
     for (int kind = 0; kind < SWING_KINDS; kind++) {
@@ -393,7 +394,7 @@ static void swing_in_piece(value_swing *swing, const kernel_piece *p, double fro
     double steepness[2];
     widen(&b, p, from, to);
     steepness_of(p, from, to, steepness);
-    /* Minimum and maximum of the extinction's signed slope. */
+    /* Minimum and maximum of the slope of the extinction, with its sign. */
     const double fall = falls ? -steepness[1] : steepness[0], rise = falls ? -steepness[0] : steepness[1];
     const double least = (double)b.extinction_low, most = (double)b.extinction_high;
     swing->extinction = fmax(most, swing->extinction);
@@ -441,8 +442,8 @@ static void sum_up_swing(const value_swing *s, double contrast, kernel_swing *ou
                           .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
 }
 
-/* Fills the table of bounds by class of width and first bin. A value range of a class ends in bin `wanted` or before
- * it, wherever in its first bin it begins. */
+/* Fills the table of bounds by the class of a range's width and its first bin. Wherever in its first bin a range of
+ * this class begins, it ends in bin `wanted` or before it. */
 static void fill_swings(kernel_pieces *out, const double behind[2])
 {
     value_swing bins[KERNEL_SWING_BINS];

@@ -1,4 +1,4 @@
-/* Transfer functions, cut into the pieces by which segments are integrated. */
+/* Divides transfer functions into the pieces by which segments are integrated. */
 #ifndef RENDER_RENDER_PIECES_H
 #define RENDER_RENDER_PIECES_H
 
@@ -7,13 +7,14 @@
 #include "kernel_types.h"
 #include "render.h"
 
-/* Builds the pieces. Colours may deviate from the table's by `tolerance` if that saves pieces; 0 allows only rounding.
- * The caller frees them with render_pieces_free(). */
+/* Builds the pieces. Colours may deviate from the table's by `tolerance` if that saves pieces; at 0 they deviate only
+ * by rounding. The caller must free the pieces with render_pieces_free(). */
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error);
-/* Adds the bounds by which segments of hexes, wedges and pyramids are cut in lanes (kernel_local_segments.h). */
+/* Adds the bounds that decide how segments of hexes, wedges and pyramids are divided in lanes
+ * (kernel_local_segments.h). */
 insitu_status render_swings_build(kernel_pieces *pieces, const render_transfer *t, base_error *error);
-/* Adds the sums for an error of max_error in the light of a ray whose length in the cells is at most `reach`, in unit
- * distances. */
+/* Adds the table of sums for preintegration. max_error: error allowed in the light of a ray whose length in the cells
+ * is at most `reach` unit distances. */
 insitu_status render_preintegral_build(kernel_pieces *pieces, const render_transfer *t, double max_error, double reach,
                                        base_error *error);
 void render_pieces_free(kernel_pieces *pieces);

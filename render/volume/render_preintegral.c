@@ -12,14 +12,14 @@
 
 enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 };
 
-/* Maximum of the sum over all bins: differences are computed in 32 bits. */
+/* Upper bound of the sum over all bins, in units, so that differences of sums fit in 32 bits. */
 static const double most_units = 0x1p30;
-static const double steepest = 1e6; /* kernel_integral.h: KERNEL_OPAQUE */
+static const double steepest = 1e6; /* the value of KERNEL_OPAQUE in kernel_integral.h */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
-/* Returns the number of bins for an error. The least distance between the ends of a segment goes as the square of a
- * bin's width, over the error. The table for 1e-2 has 196 KB, which fits into a core's second-level cache beside a
- * tile's rays. */
+/* Returns the number of bins for an error bound. Segments whose ends are closer than a distance proportional to the
+ * square of a bin's width divided by the error are not accurate enough. The table for 1e-2 has 196 KB, which fits into
+ * a core's second-level cache next to a tile's rays. */
 static int bin_count_for(double max_error)
 {
     int count = LEAST_BINS;
@@ -27,9 +27,9 @@ static int bin_count_for(double max_error)
     return count;
 }
 
-/* A bin's sums, before they are rounded to integers. */
+/* The integrals over a bin, before they are rounded to integers. */
 typedef struct bin_sums {
-    double sum[CHANNELS], low, high; /* low, high: of extinctions */
+    double sum[CHANNELS], low, high; /* minimum and maximum of the extinction in the bin */
     double colour_low[3], colour_high[3];
 } bin_sums;
 
@@ -70,7 +70,8 @@ static double extinction_at(const kernel_piece *p, double x)
     return extinction_of(clear_at(p, x));
 }
 
-/* Cache of the last computed extinction. Consecutive bins share an end, and the function is constant in many bins. */
+/* Caches the last computed extinction, because consecutive bins share an end, and the function is constant in many
+ * bins. */
 typedef struct last_extinction {
     double clear, extinction;
 } last_extinction;
@@ -88,7 +89,7 @@ static double colour_at(const kernel_piece *p, double x, int c)
 }
 
 /* Adds the integrals between two values of a piece, by three Gauss nodes. Intervals are halved repeatedly towards an
- * opacity of 1. If both ends are equal, clear_at() is constant between them. */
+ * opacity of 1. If both ends have the same opacity, it is constant between them. */
 static void integrate(const kernel_piece *p, double from, double to, int depth, last_extinction *last,
                       double sum[CHANNELS])
 {
@@ -120,8 +121,8 @@ static void widen(bin_sums *bin, const kernel_piece *p, double x, last_extinctio
     }
 }
 
-/* Computes the bin's sums and ranges from begin to end. first: the piece that contains begin; returns the piece that
- * contains end. */
+/* Computes the integrals and ranges of the bin from begin to end. first: the piece that contains begin. Returns the
+ * piece that contains end. */
 static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, last_extinction *last,
                     bin_sums *bin)
 {
@@ -142,15 +143,16 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
     }
 }
 
-/* Fills all bins. Before and behind all knots the function is constant; these infinite ranges are represented by one
- * bin width each. */
+/* Fills all bins. Below and above all knots the function is constant; each of these infinite ranges is represented by
+ * one bin. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
-    last_extinction last = {-1, 0}; /* no transmittance is -1, so the cache is empty */
+    last_extinction last = {-1, 0}; /* no transmittance is -1, so the cache begins empty */
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
         piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &last, &bins[i]);
-    /* Replaces the outermost bins, so that rounding of the border does not bring in a neighbouring piece. */
+    /* Computes the outermost bins again from the outermost pieces alone, so that rounding of the border does not
+     * include a neighbouring piece. */
     for (int end = 0; end < 2; end++) {
         const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
@@ -180,7 +182,7 @@ static double colour_change(const bin_sums *bin)
     return change;
 }
 
-/* Stores the sums as integers; returns by how much the colour within a bin deviates from that at its middle. */
+/* Stores the sums as integers. Returns the maximum deviation of the colour in a bin from that at its middle. */
 static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
 {
     double total[2] = {0, 0}, before[CHANNELS] = {0}, change = 0;
@@ -211,8 +213,9 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     return 0.5 * change;
 }
 
-/* Fills in the bends of tables with uneven entries, assuming the sharpest bend at the closest spacing. The bends
- * towards the constant colours beyond the ends count too, as the ends need not be at 0 and 1. */
+/* Sets the bounds of colour bends for tables with unevenly spaced entries, assuming the sharpest bend at the closest
+ * spacing. The bends towards the constant colours beyond the ends count too, because the ends need not be at 0 and
+ * 1. */
 static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
 {
     double bend = 0, closest = 1;
@@ -231,7 +234,7 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
     out->bend = (float)fmin(bend / 4, 1e30);
 }
 
-/* Fills in the bends of the table's colours, which bound their deviation from chords. */
+/* Sets the bounds of bends of the table's colours, which limit their deviation from chords. */
 static void fill_bends(kernel_preintegral *out, const render_transfer *t)
 {
     const int last = t->colour_count - 1;
@@ -282,7 +285,7 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
 {
     kernel_pieces exact;
     if (has_negative_colours(t)) return INSITU_OK;
-    /* Along a scale no pieces are exact: the pieces' error takes the place of the error of merged colours. */
+    /* With a nonlinear scale, pieces are not exact: their error replaces that of merged colours. */
     const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
     const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
