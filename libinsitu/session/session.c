@@ -59,7 +59,7 @@ static bool is_mpi_running(void)
 
 static void free_session(insitu_session *session)
 {
-    session_writer_end(&session->writer); /* must end before the scene that it uses */
+    session_writer_end(&session->writer); /* the writer uses the scene, so it must end before the scene is freed */
     session_meshes_free(&session->meshes);
     session_catalogue_free(&session->catalogue);
     session_trees_free(&session->trees);

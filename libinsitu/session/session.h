@@ -32,12 +32,12 @@ struct insitu_session {
     session_catalogue catalogue;
     session_space space;
     session_trees trees;
-    session_writer writer; /* on rank 0 */
+    session_writer writer; /* writes pictures; used on rank 0 only */
     session_kept_pictures kept;
     session_run_ranges run_ranges;
-    session_cinema cinema;     /* rank 0 */
-    session_montages montages; /* rank 0 */
-    session_news news;         /* rank 0 */
+    session_cinema cinema;     /* databases of pictures; used on rank 0 only */
+    session_montages montages; /* pictures put side by side in one file; used on rank 0 only */
+    session_news news;         /* messages for programs that watch the run; used on rank 0 only */
     session_overwrites overwrites;
     session_events events;
     session_report report;

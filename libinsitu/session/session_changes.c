@@ -14,8 +14,8 @@
 
 enum change_word {
     CYCLE_HIGH,
-    CYCLE_LOW, /* negated, as everything called low */
-    FAILED,    /* ranks - lowest failing rank; 0: none */
+    CYCLE_LOW, /* negated, because the reduction is a maximum; so are all entries called low */
+    FAILED,    /* number of ranks minus the lowest failing rank; 0: none */
     CELLS_CHANGED,
     LEVELS_CHANGED,
     NAMES_CHANGED,
@@ -26,14 +26,15 @@ enum change_word {
     UNWRITTEN,
     FILLED,
     WRITES_AT_ONCE,
-    ISA_LOW, /* and the lowest rank that has it */
+    ISA_LOW, /* lowest instruction set, and the lowest rank that has it, in one word */
     ISA_HIGH,
-    TELLING,   /* session_telling_word() */
-    ROOT_TIME, /* bits of rank 0's time */
+    TELLING,   /* lowest rank with warnings for all ranks (session_telling_word()) */
+    ROOT_TIME, /* the bits of rank 0's time */
     CHANGE_WORDS
 };
 
-static const int64_t more_ranks = (int64_t)1 << 32; /* larger than any number of ranks */
+/* An upper bound of the number of ranks, by which a rank and another number are packed into one word. */
+static const int64_t more_ranks = (int64_t)1 << 32;
 
 static int64_t bits_of(double value)
 {
@@ -64,7 +65,7 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     const session_scene_file *file = &session->scene_file;
     const int64_t names = (int64_t)(session_names_hash(meshes) >> 1);
     words[CYCLE_HIGH] = cycle;
-    words[CYCLE_LOW] = ~cycle; /* negated without overflow */
+    words[CYCLE_LOW] = ~cycle; /* ~ negates without overflow */
     words[FAILED] = session_pending_error(meshes) ? team->ranks - team->rank : 0;
     words[CELLS_CHANGED] = meshes->are_cells_changed || !session->space.has_extent;
     words[LEVELS_CHANGED] = meshes->are_levels_changed;

@@ -4,25 +4,26 @@
 
 #include "session.h"
 
-/* Result of the reduction; the same on every rank. */
+/* The result of the reduction; it is the same on every rank. */
 typedef struct session_changes {
-    int64_t cycle, lowest_cycle; /* equal, unless ranks disagree */
-    double time;                 /* time of rank 0 */
-    int failed_rank;             /* the lowest rank with an error of a set call; -1: none */
+    /* highest and lowest cycle of all ranks; they are equal if all ranks are at the same cycle */
+    int64_t cycle, lowest_cycle;
+    double time;     /* rank 0's time */
+    int failed_rank; /* lowest rank with an error of a set call; -1: there is none */
     bool of_scene, of_cells, of_names;
-    bool of_levels;        /* of blocks with levels of refinement */
-    bool are_names_shared; /* all ranks have the same tables of names */
+    bool of_levels;        /* set if blocks with levels of refinement have changed on some rank */
+    bool are_names_shared; /* set if all ranks have the same tables of names */
     bool are_threads_lacking;
-    bool are_unwritten; /* pictures of earlier steps could not be written */
-    bool is_filled;     /* some field has a fill function, which may call MPI */
-    bool writes_behind; /* this step's pictures are written after it is over */
-    int isa_level;      /* the lowest of the ranks' instruction sets (render_isa.h) */
-    int isa_rank;       /* the lowest rank with that set */
-    int isa_best;       /* the highest of the ranks' instruction sets */
-    int telling_rank;   /* the lowest rank that has warnings for all ranks; -1: none */
+    bool are_unwritten; /* set if pictures of earlier steps could not be written */
+    bool is_filled;     /* set if some field has a fill function, which may call MPI */
+    bool writes_behind; /* set if this step's pictures are written after the step is over */
+    int isa_level;      /* lowest of the ranks' instruction sets (render_isa.h) */
+    int isa_rank;       /* lowest rank with that instruction set */
+    int isa_best;       /* highest of the ranks' instruction sets */
+    int telling_rank;   /* lowest rank that has warnings for all ranks; -1: there is none */
 } session_changes;
 
-/* Performs one small reduction. Collective. */
+/* Determines what has changed on any rank, by one small reduction. Collective. */
 insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
                                    base_error *error);
 

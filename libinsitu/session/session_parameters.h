@@ -1,4 +1,4 @@
-/* The scene's parameters, as read by the simulation. */
+/* Lets the simulation read the scene's parameters. */
 #ifndef SESSION_PARAMETERS_H
 #define SESSION_PARAMETERS_H
 
@@ -7,13 +7,15 @@
 
 enum { SESSION_MOST_ASKED = 256 };
 
-/* Names that the simulation has requested on this rank. */
+/* The names of parameters that the simulation has requested on this rank. */
 typedef struct session_asked {
-    int count; /* names beyond SESSION_MOST_ASKED are not recorded, and no parameter is then reported as unused */
-    uint64_t names[SESSION_MOST_ASKED]; /* hashes */
+    /* number of recorded names; names beyond SESSION_MOST_ASKED are not recorded, and no parameter is then reported as
+     * unused */
+    int count;
+    uint64_t names[SESSION_MOST_ASKED]; /* hashes of the recorded names */
 } session_asked;
 
-/* Finds a parameter, and records that it was requested. On an error *value is unchanged. Local. */
+/* Finds a parameter by its name, and records that it was requested. On an error *value is unchanged. Local. */
 insitu_status session_read_parameter(const session_scene_file *file, session_asked *asked, const char *name,
                                      double *value, base_error *error);
 

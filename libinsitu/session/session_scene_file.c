@@ -34,7 +34,7 @@ static insitu_status read_file(const char *path, scene_file_text *text, base_err
     return INSITU_OK;
 }
 
-/* Reads a file that a scene names. */
+/* Reads a file that a scene names into memory. */
 static insitu_status read_attachment(const char *path, char **text, int64_t *size, base_error *error)
 {
     scene_file_text file = {0};
@@ -110,8 +110,8 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* Copies the caller's text as if it had been read. A text that is cut here is longer than a scene may be, and is
- * refused for that. */
+/* Copies the caller's text as if it had been read from a file. A text that is cut here is longer than a scene may be,
+ * and is therefore refused. */
 static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
@@ -121,8 +121,8 @@ static insitu_status copy_text(const char *given, scene_file_text *text, base_er
     return INSITU_OK;
 }
 
-/* Reads, shares and parses the scene. If memory ran out the file counts as unread, and the next step tries again.
- * given: the scene's text; NULL: it is in the file. */
+/* Reads, shares and parses the scene. If memory runs out, the file counts as unread, and the next step tries again.
+ * given: the scene's text; NULL if it is in the file. */
 static insitu_status read_scene(session_scene_file *file, const session_team *team, const char *given, scene *out,
                                 base_error *error)
 {
@@ -172,7 +172,7 @@ insitu_status session_load_scene(session_scene_file *file, const session_team *t
 bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
-    /* An editor may have removed the file for a moment; it is found at a later step. */
+    /* An editor may have removed the file for a moment; it is then read at a later step. */
     if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
     return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }

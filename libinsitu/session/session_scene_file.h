@@ -1,4 +1,4 @@
-/* The scene of a session: read from a file, and again if that is edited, or given as text. */
+/* Holds the scene of a session: it is read from a file, and again if the file is edited, or it is given as text. */
 #ifndef SESSION_SCENE_FILE_H
 #define SESSION_SCENE_FILE_H
 
@@ -8,33 +8,33 @@
 #include "session_team.h"
 
 typedef struct session_scene_file {
-    char *path;     /* the same on every rank; SESSION_SCENE_TEXT for a scene given as text */
-    bool is_text;   /* on rank 0: there is no file that may be edited */
-    scene scene;    /* the same on every rank */
-    char *warning;  /* the reason why the last edit of the file was refused, or NULL */
-    bool has_stamp; /* on rank 0 */
+    char *path;     /* path of the file, the same on every rank; SESSION_SCENE_TEXT if the scene was given as text */
+    bool is_text;   /* set on rank 0 if the scene was given as text, so that no file can be edited */
+    scene scene;    /* the parsed scene, the same on every rank */
+    char *warning;  /* reason why the last edit of the file was refused; NULL if it was not */
+    bool has_stamp; /* set on rank 0 if the file's time of modification is known */
     struct stat stamp;
 } session_scene_file;
 
-/* The name of a scene given as text in messages, in place of a file's path. */
+/* Replaces a file's path in messages if the scene was given as text. */
 #define SESSION_SCENE_TEXT "scene text"
 
-/* The source of a scene. Only rank 0's is used. */
+/* The source of a scene; only rank 0's is used. */
 typedef struct session_scene_source {
-    const char *call; /* the public call, for messages */
-    const char *path; /* the file's path; NULL if text is given, or nothing */
-    const char *text; /* YAML; NULL if a path is given, or nothing */
+    const char *call; /* name of the public call, for messages */
+    const char *path; /* path of the file; NULL if text is given or there is no scene */
+    const char *text; /* YAML text; NULL if a path is given or there is no scene */
 } session_scene_source;
 
 /* Reads the scene for the first time. *file must be empty before, and must be freed even after an error. Collective. */
 insitu_status session_load_scene(session_scene_file *file, const session_team *team, const session_scene_source *source,
                                  base_error *error);
 
-/* Returns whether the file was edited since it was read; false on ranks other than 0, and if there is no file.
- * Local. */
+/* Returns whether the file was edited since it was read. It returns false on ranks other than 0, and if there is no
+ * file. Local. */
 bool session_is_scene_edited(const session_scene_file *file, int rank);
 
-/* Reads the file again. Returns false if it keeps the old scene; warning then has the reason. Collective. */
+/* Reads the file again. Returns false if the old scene is kept; file->warning then has the reason. Collective. */
 bool session_reload_scene(session_scene_file *file, const session_team *team);
 
 void session_scene_file_free(session_scene_file *file);

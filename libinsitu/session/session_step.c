@@ -37,11 +37,12 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Drops everything that was created for images of the old scene. */
+/* Reads the edited scene, and drops everything that was created for images of the old one. */
 static void reload_scene(insitu_session *s)
 {
     session_writer_drain(&s->writer);
-    session_writer_collect(&s->writer, &s->report); /* pictures that are written no longer need the old scene */
+    /* waits for pictures that are being written, so that the old scene is no longer used */
+    session_writer_collect(&s->writer, &s->report);
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_writer_drop_memory(&s->writer);
     session_run_ranges_free(&s->run_ranges);
@@ -90,7 +91,8 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     const session_derive_basis basis = derive_basis(s);
     if (!needed) return INSITU_OK;
     session_mark_sources(scene, needed, &s->meshes);
-    insitu_status status = session_agree(s->team.comm, error); /* fill functions may be collective */
+    /* agrees on the status, because fill functions may be collective */
+    insitu_status status = session_agree(s->team.comm, error);
     if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
     if (!error->status) session_copy_wanted(&s->meshes, s->team.threads, error);
     if (!status) status = session_agree(s->team.comm, error);
@@ -168,7 +170,7 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
 }
 
 /* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: the error
- * of set calls. Images that need nothing with a fault are drawn, and the error is returned afterwards. */
+ * of set calls. Images that do not use a faulty mesh or field are drawn, and the error is returned afterwards. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                      base_error *refused, base_error *error)
 {
@@ -212,7 +214,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
-    if (!status) { /* errors of these phases, and of those above, are passed to all ranks by the next reduction */
+    if (!status) { /* errors of all these phases are passed to all ranks by the next reduction */
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
         status = session_check_layers(&plan, &s->catalogue, &s->meshes, team, &s->report, error);
@@ -224,7 +226,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     return error->status;
 }
 
-/* Performs the phases of every step except the first reduction, then those above. */
+/* Performs all phases of a step after the first reduction; draws images if any are due. */
 static insitu_status step(insitu_session *s, const session_changes *changes, const session_guard *guard,
                           base_error *error)
 {
@@ -253,7 +255,7 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
     return draw_due_images(s, changes, &moment, &refused, error);
 }
 
-/* Returns the error of earlier steps' pictures that could not be written, if this step has no other error.
+/* Returns the error of earlier steps' pictures that could not be written, unless this step has another error.
  * Collective. */
 static insitu_status tell_unwritten(insitu_session *s, base_error *error)
 {
@@ -264,7 +266,8 @@ static insitu_status tell_unwritten(insitu_session *s, base_error *error)
     return error->status;
 }
 
-/* On rank 0: passes the step's report.json for the databases to the writer. The next step returns an error of this. */
+/* Passes the step's report.json, for the databases, to the writer. Used on rank 0; an error is returned by the next
+ * step. */
 static void tell_news(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;

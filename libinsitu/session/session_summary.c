@@ -1,4 +1,4 @@
-/* Bytes and counts are summed up at the end of a step, instead of being tracked while it runs. */
+/* Adds up bytes and counts for the report at the end of a step, instead of tracking them while it runs. */
 #include "session_summary.h"
 
 #include <stdarg.h>
@@ -48,7 +48,7 @@ static int64_t patch_bytes(const insitu_field *field)
     return bytes;
 }
 
-/* What was copied of a mesh, and why: the bytes of its blocks are added up by the reason. */
+/* The bytes that were copied of a mesh, by the reason why: the bytes of its blocks are added up. */
 enum { MOST_REASONS = 24, REASON_SIZE = 512 };
 
 typedef struct copied_reasons {
@@ -68,7 +68,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     vsnprintf(words, sizeof words, format, arguments);
     va_end(arguments);
     while (at < reasons->count && strcmp(reasons->words[at], words) != 0) at++;
-    if (at == MOST_REASONS) at--; /* counted with the last one */
+    if (at == MOST_REASONS) at--; /* further reasons are added to the last one */
     if (at == reasons->count) {
         memcpy(reasons->words[at], words, sizeof words);
         reasons->bytes[at] = 0;
@@ -199,7 +199,7 @@ static bool is_shown(const session_mesh *mesh)
     return is_any;
 }
 
-/* Fields of blocks are the same on all of them. */
+/* Reports fields that are left out. Blocks of a mesh have the same fields, so each is reported once. */
 static void report_left_out(session_report *out, const session_parts *parts)
 {
     const session_mesh *first = parts->items[0];

@@ -38,15 +38,16 @@ static void convert_background(const scene_file_image *in, float background[4])
     background[3] = alpha;
 }
 
-/* Checks whether the scene leaves the sampling of volumes unspecified. Any key other than method and max_error
+/* Returns whether the scene leaves the sampling of volumes unspecified. Any key other than method and max_error
  * specifies it, even a key that only applies to samples. */
 static bool is_unsaid(const scene_file_sampling *in)
 {
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
 
-/* A single volume is drawn to an error bound by default: samples cost less, but leave noise of unknown size. Several
- * volumes are sampled by default, because their segments would have to be mixed pixel by pixel. */
+/* Chooses the default method for volumes. A single volume is integrated to an error bound, because samples are cheaper,
+ * but leave noise of unknown size. Several volumes are sampled, because their segments would have to be mixed pixel by
+ * pixel. */
 static void choose_method(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
@@ -120,7 +121,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Converts the variants of an image that differ in their layers, each at its first view. */
+/* Converts those variants of an image that differ in their layers, each at its first view. */
 static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
@@ -137,8 +138,8 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
     return status;
 }
 
-/* Adds the views of orbits behind the first views. The loop begins with the last image, because only behind that image
- * there is free space. */
+/* Inserts the views of orbits after the first views. The loop begins with the last image, because only behind it there
+ * is free space. */
 static void add_views(scene *s, int picture_count)
 {
     int end = picture_count;
@@ -199,7 +200,7 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* ---- the whole ---- */
+/* ---- whole scenes ---- */
 
 static insitu_status parse_in_c_locale(const char *text, size_t size, const char *file_name,
                                        scene_attachments *attachments, scene *out, base_error *error)
@@ -248,7 +249,7 @@ static void free_colour_map(scene_colour_map *map)
 
 static void free_image(scene_image *image)
 {
-    if (image->variant.view > 0) return; /* the variant of view 0 owns these arrays */
+    if (image->variant.view > 0) return; /* only the variant of view 0 owns these arrays */
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
         scene_free_field(&surface->field);

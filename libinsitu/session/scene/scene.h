@@ -22,20 +22,22 @@ enum { SCENE_COMPONENT_ONLY = -3, SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_
 /* A field that a layer shows, with the meshes on which it is shown. */
 typedef struct scene_field {
     char *name;
-    int component;      /* 0 .., or one of the above */
-    bool at_vertices;   /* cell values are recentred to the vertices; else they are drawn as they are */
-    bool joins_corners; /* values at cells' corners give way to their means at the vertices */
-    bool is_as_given;   /* hanging vertices keep the values that they were given */
+    int component; /* number of the component, from 0, or one of the constants SCENE_COMPONENT_... */
+    /* set if cell values are averaged to the vertices; otherwise they are drawn as constants per cell */
+    bool at_vertices;
+    bool joins_corners; /* set if different values at the same vertex of several cells are replaced by their mean */
+    bool is_as_given;   /* set if hanging vertices keep the values that the caller gave */
     int line;           /* line in the scene file, for messages about the field */
-    int mesh_count;     /* 0: on the meshes that have the field */
-    char **meshes;      /* a name stands for the meshes below it too: "a" for "a/0" */
-    int meshes_line;    /* for messages about them */
-    uint64_t joined;    /* a hash of the meshes that means at vertices are over; the session's (session_joints.h) */
+    int mesh_count;     /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
+    char **meshes;      /* names of meshes; a name also stands for the meshes below it: "a" for "a/0" */
+    int meshes_line;    /* line of `meshes` in the scene file, for messages */
+    /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_joints.h) */
+    uint64_t joined;
 } scene_field;
 
-/* Checks whether the layer is drawn on a mesh of this name, if the mesh has the field. */
+/* Returns whether the layer is drawn on a mesh of this name, if the mesh has the field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
-/* Checks whether the name stands for the mesh. */
+/* Returns whether the name in a scene stands for the mesh: it is the mesh's name or a part of it up to a slash. */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
 /* The kind of a derived field. All kinds after the expression are computed from gradients at vertices. */
@@ -56,29 +58,34 @@ typedef struct scene_derived {
     char *name;
     int line;
     scene_derivation kind;
-    const char *key;             /* key in the scene file, for messages; "" for an expression without one */
-    int component;               /* component of a gradient or vorticity; SCENE_COMPONENT_DEFAULT: all three */
-    scene_expression expression; /* its inputs are those below */
+    /* key that gives the kind in the scene file, for messages; "" for an expression without a key */
+    const char *key;
+    /* component of a gradient or vorticity; SCENE_COMPONENT_DEFAULT: all three components */
+    int component;
+    scene_expression expression; /* an expression's program, whose inputs are `inputs` below */
     int input_count;
-    scene_field *inputs; /* an expression's inputs; otherwise a vector field, its two or three components, or for a
-                            gradient a scalar */
-    int *made_by;        /* for each input, the index of the derived field it comes from, or -1 */
-    uint64_t joined;     /* as scene_field.joined, of meshes that gradients are over; the session's */
+    /* an expression's inputs; for other kinds a vector field, or its two or three components; for a gradient a
+     * scalar */
+    scene_field *inputs;
+    int *made_by; /* per input, the index of the derived field from which it comes, or -1 */
+    /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
+    uint64_t joined;
 } scene_derived;
 
 /* The source of a range that is not fixed. Each source uses the values on all ranks at each drawn step. */
 typedef enum scene_range_source {
-    SCENE_RANGE_DATA, /* the minimum and the maximum */
-    /* minimum and maximum over all steps drawn so far, kept in a file across restarts (session_run_ranges.h) */
+    SCENE_RANGE_DATA, /* the minimum and the maximum of the values */
+    /* the minimum and the maximum over all steps drawn so far, which are kept in a file across restarts
+     * (session_run_ranges.h) */
     SCENE_RANGE_RUN,
     SCENE_RANGE_SYMMETRIC,  /* from -m to m, where m is the largest absolute value */
     SCENE_RANGE_PERCENTILES /* the values that `low` and `high` percent of the cells do not exceed */
 } scene_range_source;
 
 typedef struct scene_range {
-    bool is_fixed; /* low and high are values of the field */
+    bool is_fixed; /* whether low and high are values of the field given by the scene */
     double low, high;
-    scene_range_source source; /* used unless is_fixed */
+    scene_range_source source; /* how the range is found; used unless is_fixed */
 } scene_range;
 
 /* The scale by which values are spaced along a colour map: linear; logarithmic; or, for values of both signs, linear up
@@ -86,32 +93,36 @@ typedef struct scene_range {
 typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 
 /* A colour map converts a value into a colour, for all kinds of layers. The position of a value is (s(value) - s(low))
- * / (s(high) - s(low)), s being the scale and [low, high] the range. Positions below 0 and above 1 have the colours of
- * 0 and 1, or the colours in `outside`. The colour of a position is interpolated linearly between entries of the table;
- * with bands it is the colour of entry floor(position × count). */
+ * / (s(high) - s(low)), where s is the scale and [low, high] the range. Positions below 0 and above 1 have the colours
+ * of 0 and 1, or the colours in `outside`. The colour of a position is interpolated linearly between entries of the
+ * table; with bands it is the colour of entry floor(position × count). */
 typedef struct scene_colour_map {
-    char *name;     /* name of a built-in map or path of a map file; "" for a list of colours */
-    int count;      /* at least 2 colours, or 1 for bands */
-    float *colours; /* count × 3, linear light, evenly spaced over the places from 0 to 1; reversed where asked for */
-    bool is_banded; /* the colours are those of bands of equal width */
+    char *name; /* name of a built-in map, or path of a file with a map; "" for a list of colours */
+    int count;  /* number of colours: at least 2, or at least 1 for bands */
+    /* table of colours: count × 3 numbers in linear light, evenly spaced over the positions from 0 to 1. It is already
+     * reversed if the scene requests that. */
+    float *colours;
+    bool is_banded; /* set if colours belong to bands of equal width and are not interpolated */
     scene_scale scale;
-    double threshold; /* the linear part of SCENE_SYMLOG reaches from -threshold to threshold; > 0 */
+    double threshold; /* end of the linear part of SCENE_SYMLOG, which reaches from -threshold to threshold; > 0 */
     bool has_below, has_above;
-    float outside[3][3]; /* colours below and above the range (by default the map's ends), and of NaN */
+    /* colours of values below and above the range (by default those of the map's ends), and of NaN */
+    float outside[3][3];
     bool has_nan;
     scene_range range;
 } scene_colour_map;
 
 /* A file that the scene names, with the path by which it is opened. */
 typedef struct scene_attachment {
-    char *path, *text; /* text: size bytes, without a terminating NUL */
+    char *path, *text; /* path of the file, and its `size` bytes of text, without a terminating NUL */
     int64_t size;
 } scene_attachment;
 
 /* Files that a scene names. One rank reads these files while it parses the scene, and sends them to the other ranks
  * together with the scene. */
 typedef struct scene_attachments {
-    /* Reads a whole file into *text, allocated with base_alloc(). NULL: only the files in items are available. */
+    /* Callback that reads a whole file into *text, allocated with base_alloc(). NULL: only the files in `items` are
+     * available. */
     insitu_status (*read)(const char *path, char **text, int64_t *size, base_error *error);
     int count;
     scene_attachment *items;
@@ -121,8 +132,8 @@ enum { SCENE_MAX_ATTACHMENTS = 64 };
 void scene_attachments_free(scene_attachments *attachments);
 
 typedef struct scene_opacity_point {
-    double at;     /* position in the range, 0 .. 1, not decreasing; two equal positions make a step */
-    float opacity; /* 0 .. 1, per unit_distance */
+    double at;     /* position in the range, 0 .. 1; positions do not decrease, and two equal ones make a step */
+    float opacity; /* opacity at this position, 0 .. 1, per unit_distance */
 } scene_opacity_point;
 
 typedef struct scene_material {
@@ -133,27 +144,31 @@ enum { SCENE_MAX_LINES = 64 };
 
 /* Contour lines on a layer's surface. */
 typedef struct scene_lines {
-    bool is_given; /* else there are none */
+    bool is_given; /* set if the layer has contour lines */
     scene_field field;
-    bool is_of_colours;                 /* the field is that of the layer's colours */
-    bool has_values;                    /* else they cut a range into parts of equal width */
-    int count;                          /* 1 .. SCENE_MAX_LINES */
-    double values[SCENE_MAX_LINES];     /* rising */
-    float width;                        /* pixels */
-    float colours[3 * SCENE_MAX_LINES]; /* of each line, linear */
-    bool is_alone; /* nothing else is seen of the surface; its own colours are the lines' if a field colours it */
+    bool is_of_colours; /* set if the lines are contours of the field that colours the layer */
+    /* set if the scene gives the values of lines; otherwise lines divide a range into parts of equal width */
+    bool has_values;
+    int count;                          /* number of lines, 1 .. SCENE_MAX_LINES */
+    double values[SCENE_MAX_LINES];     /* value of each line, in increasing order */
+    float width;                        /* width of the lines in pixels */
+    float colours[3 * SCENE_MAX_LINES]; /* colour of each line, linear RGB */
+    /* Set if only the lines of the surface are drawn. If a field colours the surface, its colours are the lines'
+     * colours. */
+    bool is_alone;
 } scene_lines;
 
-/* The width of lines where the scene gives none, in a picture of this height. */
+/* Returns the default width of contour lines, in pixels, in a picture of this height. */
 float scene_line_width(int height);
 
 typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES, SCENE_VERTEX } scene_normal;
 
 typedef struct scene_isosurface {
     scene_field field;
-    int value_count; /* 1 .. 64 */
+    int value_count; /* number of isovalues, 1 .. 64 */
     double *values;
-    /* value_count × 3, linear: the given colours, the last one repeated; or colours of the default cycle */
+    /* one colour per isovalue, value_count × 3 numbers, linear: the given colours, of which the last is repeated, or
+     * colours of the default cycle */
     float *colours;
     bool has_colour_by;
     scene_field colour_by;
@@ -162,32 +177,34 @@ typedef struct scene_isosurface {
     float opacity;
     scene_material material;
     scene_normal normals;
-    double difference; /* distance of the differences in cell sizes, > 0; 1 by default */
-    uint32_t clips;    /* set of the image's clips, one bit each */
-    int number;        /* index in the image's list of layers */
+    double difference; /* distance between the samples of differences, in cell sizes, > 0; 1 by default */
+    uint32_t clips;    /* set of clips that cut the layer: one bit per clip of the image */
+    int number;        /* index of the layer in the image's list */
 } scene_isosurface;
 
 typedef struct scene_volume {
     scene_field field;
     scene_colour_map colour_map;
-    int opacity_count; /* 1 .. 32 */
+    int opacity_count; /* number of opacity points, 1 .. 32 */
     scene_opacity_point *opacity;
-    double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
-    uint32_t clips;       /* set of the image's clips, the same for all its volumes */
+    /* length to which opacities refer, in scene units, > 0; 0: a twentieth of the diagonal of the bounds */
+    double unit_distance;
+    uint32_t clips; /* set of clips, one bit per clip of the image; it is the same for all volumes of the image */
 } scene_volume;
 
-/* The cells in which the values of a field lie from low to high. */
+/* Selects the cells in which the values of a field lie from low to high. */
 typedef struct scene_threshold {
-    bool is_given; /* else all cells are drawn */
+    bool is_given; /* set if there is a threshold; otherwise all cells are drawn */
     scene_field field;
-    double low, high; /* may be infinite */
+    double low, high; /* ends of the range of values; they may be infinite */
 } scene_threshold;
 
 typedef struct scene_surface {
-    scene_field on;    /* the meshes; no field: name is NULL */
-    bool is_of_shells; /* on meshes of shells alone; never of the file */
-    float colour[3];   /* linear */
-    float edge_width;  /* pixels; 0: no edges are drawn */
+    scene_field on; /* meshes whose outer surface is drawn; it has no field, so its name is NULL */
+    /* set for layers on meshes of shells alone, which the session adds; the scene file cannot set it */
+    bool is_of_shells;
+    float colour[3];  /* colour of the edges, linear RGB */
+    float edge_width; /* width of the edges in pixels; 0: no edges are drawn */
     float edge_colour[3];
     scene_threshold threshold;
     bool has_colour_by;
@@ -195,18 +212,21 @@ typedef struct scene_surface {
     scene_colour_map colour_map;
     scene_lines lines;
     float opacity;
-    bool has_material; /* without a material, flat data is drawn without lighting */
+    bool has_material; /* set if the scene gives a material; otherwise flat data is drawn without lighting */
     scene_material material;
-    uint32_t clips; /* set of the image's clips, one bit each */
-    int number;     /* index in the image's list of layers */
+    uint32_t clips; /* set of clips that cut the layer: one bit per clip of the image */
+    int number;     /* index of the layer in the image's list */
 } scene_surface;
 
 typedef struct scene_plane {
-    double normal[3]; /* unit length */
-    bool has_point;   /* else it goes by the middle of the data's bounds */
+    double normal[3]; /* unit normal of the plane */
+    /* set if the scene gives a point; otherwise the plane passes through the middle of the data's bounds */
+    bool has_point;
     double point[3];
-    double offset; /* distance along the normal from the point to the plane */
-    double share; /* without a point: moved by this share of half the data's extent along the normal besides; -1 .. 1 */
+    double offset; /* distance from the point to the plane, along the normal */
+    /* used without a point: additional displacement along the normal, as a share of half the data's extent in this
+     * direction; -1 .. 1 */
+    double share;
 } scene_plane;
 
 enum { SCENE_MAX_PLANES = 64 };
@@ -216,48 +236,51 @@ typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;
 
 enum { SCENE_MAX_CLIPS = 32 };
 
-/* Most surfaces of an image (isovalues, planes and outer surfaces together), and most volumes. */
+/* SCENE_MAX_SURFACES: maximum number of isovalues, planes and outer surfaces of an image together. SCENE_MAX_VOLUMES:
+ * maximum number of its volumes. */
 enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 
-/* A half space, box or sphere: everything outside it is cut away, or, with is_outside, everything inside it. */
+/* A half space, box or sphere by which layers are clipped: what lies outside is cut away or, with is_outside, what lies
+ * inside. */
 typedef struct scene_clip {
     scene_clip_kind kind;
     bool is_outside;
-    scene_plane plane; /* its normal points to the side that is cut away */
+    scene_plane plane; /* bounding plane of a half space; its normal points to the side that is cut away */
     double lower[3], upper[3];
-    double centre[3], radius; /* > 0 */
+    double centre[3], radius; /* centre and radius (> 0) of a sphere */
 } scene_clip;
 
 typedef struct scene_slice {
     scene_field field;
-    int plane_count; /* 1 .. 64 */
+    int plane_count; /* number of planes, 1 .. 64 */
     scene_plane *planes;
     scene_colour_map colour_map;
     scene_lines lines;
     float opacity;
-    scene_material material; /* unlit by default: the colours are exactly those of the map */
-    uint32_t clips;          /* set of the image's clips, one bit each */
-    int number;              /* index in the image's list of layers */
+    scene_material material; /* unlit by default, so that colours are exactly those of the map */
+    uint32_t clips;          /* set of clips that cut the layer: one bit per clip of the image */
+    int number;              /* index of the layer in the image's list */
 } scene_slice;
 
 typedef struct scene_light {
-    double direction[3]; /* towards the light; in camera axes (right, up, backward) unless in_world; unit length */
+    double direction[3]; /* unit vector towards the light; in camera axes (right, up, backward) unless in_world */
     bool in_world;
-    float colour[3]; /* linear, multiplied by the intensity */
+    float colour[3]; /* linear RGB, multiplied by the light's intensity */
 } scene_light;
 
 /* Camera positions on circles around the data, numbered circle by circle: view / view_count is the index of the
  * circle. */
 enum { SCENE_MAX_ELEVATIONS = 32 };
 
-/* The default of step_cells. */
+/* Default distance between the samples of volumes, in cell sizes (scene_image.step_cells). */
 #define SCENE_STEP_CELLS 0.5
 typedef struct scene_orbit {
-    int view_count;                          /* views on each circle; 0: there is no orbit */
-    double axis[3];                          /* unit length */
-    double start;                            /* in degrees: the angle phi of the first view of each circle */
-    int circle_count;                        /* 1 .. SCENE_MAX_ELEVATIONS */
-    double elevations[SCENE_MAX_ELEVATIONS]; /* in degrees above the plane perpendicular to the axis */
+    int view_count;   /* number of views on each circle; 0: there is no orbit */
+    double axis[3];   /* unit vector along the axis of the orbit */
+    double start;     /* angle phi of the first view of each circle, in degrees */
+    int circle_count; /* number of circles, 1 .. SCENE_MAX_ELEVATIONS */
+    /* elevation of each circle above the plane perpendicular to the axis, in degrees */
+    double elevations[SCENE_MAX_ELEVATIONS];
 } scene_orbit;
 
 /* The position of a moving camera at a time or at a cycle. */
@@ -267,31 +290,36 @@ typedef struct scene_camera_point {
 } scene_camera_point;
 
 typedef struct scene_camera {
-    bool is_automatic; /* eye and focal are derived from the global bounds, and the camera looks along -direction */
-    /* Keys that the scene gives; if the data is flat, the other ones are chosen from the data (session_camera.h). */
+    /* set if eye and focal point are computed from the global bounds; the camera then looks along -direction */
+    bool is_automatic;
+    /* Set for keys that the scene gives. If the data is flat, the others are chosen from the data
+     * (session_camera.h). */
     bool has_direction, has_up, has_fit, has_projection;
-    bool has_bounds; /* automatic: the bounds below replace those of the data */
+    bool has_bounds; /* automatic camera: set if the bounds below replace those of the data */
     double lower[3], upper[3];
     double eye[3], focal[3];
-    double direction[3]; /* automatic: direction from the focal point to the eye */
+    double direction[3]; /* automatic camera: direction from the focal point to the eye */
     double up[3];
-    double angle;  /* vertical angle of view in degrees; 40 by default */
-    double zoom;   /* automatic: 1 fits the bounds into the picture; larger values are closer */
-    bool fits_box; /* automatic: the box of the bounds fills the frame; else the sphere around the box does */
+    double angle; /* vertical angle of view in degrees; 40 by default */
+    double zoom;  /* automatic camera: 1 fits the bounds into the picture; larger values are closer */
+    /* automatic camera: set if the box of the bounds fills the frame; otherwise the sphere around the box does */
+    bool fits_box;
     bool is_orthographic;
-    /* orthographic: height of the visible region in scene units; 0: the same height as with a perspective camera */
+    /* orthographic camera: height of the visible region in scene units; 0: the same height as with a perspective
+     * camera */
     double height;
     scene_orbit orbit;
-    double phi, theta; /* angles of an orbit's view in degrees: around the axis, and above the plane across it */
-    bool is_by_cycle;  /* points are at cycles, else at times */
-    int point_count;   /* 0: the camera does not move */
-    scene_camera_point *points; /* rising */
+    /* angles of an orbit's view in degrees: phi around the axis, theta above the plane perpendicular to it */
+    double phi, theta;
+    bool is_by_cycle;           /* set if the points of a moving camera are at cycles; otherwise they are at times */
+    int point_count;            /* number of points of a moving camera; 0: the camera does not move */
+    scene_camera_point *points; /* points of a moving camera, in increasing order of cycle or time */
 } scene_camera;
 
-/* Returns the camera of a step: the position of a moving camera is interpolated between its points. */
+/* Returns the camera to use at a step: the position of a moving camera is interpolated between its points. */
 scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double time);
 
-/* Positions in the picture, the same as insitu_anchor (image_output.h). */
+/* Positions in the picture; the values are the same as those of insitu_anchor (image_output.h). */
 typedef enum scene_anchor {
     SCENE_TOP_LEFT,
     SCENE_TOP,
@@ -304,118 +332,126 @@ typedef enum scene_anchor {
 } scene_anchor;
 
 typedef struct scene_words {
-    char *text; /* the placeholders {time}, {cycle} and {name} are replaced */
+    char *text; /* text to draw, in which the placeholders {time}, {cycle} and {name} are replaced */
     scene_anchor at;
 } scene_words;
 
-/* Words, bars and lines that are drawn beside the data. */
-/* Boxes around all data, around each mesh, or around the data of each rank. */
+/* Titles, colour bars and lines that are drawn in addition to the data. */
+/* What is outlined by boxes: all data, each mesh, or the data of each rank. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
-/* The format of numbers at colour bars: the shortest that distinguishes neighbours, or all as 0.25, or all as
+/* The format of numbers at colour bars: the shortest that distinguishes neighbours, or all like 0.25, or all like
  * 2.5e-1. */
 typedef enum scene_notation { SCENE_SHORTEST, SCENE_FIXED, SCENE_SCIENTIFIC } scene_notation;
 
 typedef struct scene_number_form {
     scene_notation notation;
-    bool has_digits; /* else as many digits as distinguish neighbours */
-    int digits;      /* 0 .. 12, behind the decimal point */
+    /* set if the scene gives the number of digits; otherwise numbers have as many as distinguish neighbours */
+    bool has_digits;
+    int digits; /* number of digits behind the decimal point, 0 .. 12 */
 } scene_number_form;
 
 typedef struct scene_decorations {
-    bool is_given; /* else no decorations are drawn */
-    char *title;   /* NULL: none */
+    bool is_given; /* set if the scene has decorations; otherwise none are drawn */
+    char *title;   /* title of the picture; NULL: none */
     int words_count;
     scene_words *words;
-    bool has_bars; /* a bar for each layer that is coloured by a field */
+    bool has_bars; /* set if a bar is drawn for each layer that is coloured by a field */
     scene_anchor bars_at;
     int tick_count; /* approximate number of ticks per bar */
     int label_count;
-    char **labels; /* one label a bar, in order; further bars are called by their fields */
+    char **labels; /* labels of the bars, in order; further bars are labelled with the names of their fields */
     int unit_count;
-    char **units; /* one unit a bar, in order; a single one holds for all bars */
+    char **units; /* units of the bars, in order; a single one is used for all bars */
     scene_number_form numbers;
     scene_boxes outline;
     bool has_rulers, has_axes;
     bool has_scale_bar;
-    char *scale_unit; /* NULL: none */
+    char *scale_unit; /* unit of length of the scale bar; NULL: none */
     scene_anchor scale_at;
     bool has_colour;
-    float colour[3]; /* linear; where has_colour is not set, light on a dark background and dark on a light one */
-    double size;     /* height of words, as a share of the picture's height */
+    /* colour of text and lines, linear RGB. Without has_colour it is light on a dark background and dark on a light
+     * one. */
+    float colour[3];
+    double size; /* height of text, as a share of the picture's height */
 } scene_decorations;
 
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 
 typedef struct scene_output {
-    char *path;           /* with placeholders (scene_expand()); relative to the working directory of rank 0 */
-    scene_format format;  /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
-    bool has_decorations; /* the image's decorations are drawn, if it has any */
-    bool has_data;        /* an EXR also holds the nearest surface's normal, value and numbers */
-    bool is_deep;         /* an EXR of all that lies behind each other in a pixel */
-    int database;         /* index of the scene's, in which the picture is a line; -1: none */
-    int folder_bytes;     /* bytes of path that are the database's folder and its slash; 0 without a database */
-    int columns, rows;    /* of pictures side by side; 0: the picture has a file of its own */
-    int montage;          /* index of the scene's; -1: none */
-    int first_cell;       /* of the first view */
+    /* path of the file with placeholders (scene_expand()), relative to rank 0's working directory */
+    char *path;
+    /* format by the file name's ending; `bits: 16` selects SCENE_PNG16. EXR files contain float colours and depth. */
+    scene_format format;
+    bool has_decorations; /* set if the image's decorations, if it has any, are drawn into this file */
+    bool has_data;        /* set if an EXR file also contains the nearest surface's normal, value and numbers */
+    bool is_deep;         /* set for an EXR file with all samples of each pixel, in order of depth */
+    int database;         /* index of the database of the scene in which the picture is a row; -1: none */
+    /* number of bytes of `path` that are the database's folder and its slash; 0 without a database */
+    int folder_bytes;
+    int columns, rows; /* numbers of pictures side by side in one file; 0: the picture has a file of its own */
+    int montage;       /* index of the scene's montage that contains the picture; -1: none */
+    int first_cell;    /* number of the montage's cell that shows the first view */
 } scene_output;
 
-/* A file of pictures side by side. */
+/* A file that contains several pictures side by side. */
 typedef struct scene_montage {
-    char *name; /* by which pictures belong together: the path as it comes out at one cycle and time */
+    char *name; /* identifies the pictures that belong together: their path, expanded for one cycle and time */
     int columns, rows;
-    int width, height; /* of each picture */
+    int width, height; /* size of each picture in pixels */
     scene_format format;
-    int cell_count; /* of pictures in a step, at most columns × rows */
+    int cell_count; /* number of pictures in a step, at most columns × rows */
 } scene_montage;
 
-/* A Cinema database of Spec D: a folder of pictures, and a table of what they show. */
+/* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */
 typedef struct scene_database {
-    char *path;      /* the folder, relative to the working directory of rank 0; no slash at its end */
-    int first_image; /* the source of the first image in it */
-    bool has_images, has_orbits, has_isovalues, has_planes, has_fields; /* the table has this column */
+    char *path;      /* the folder, relative to rank 0's working directory, without a slash at its end */
+    int first_image; /* index, in the file, of the first image that writes to the database */
+    bool has_images, has_orbits, has_isovalues, has_planes, has_fields; /* which columns the table has */
 } scene_database;
 
 typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
 
-/* The condition that a statistic of a field lies above one bound and below another. */
+/* A condition on a statistic of a field: it must lie above one bound and below another. */
 typedef struct scene_condition {
-    bool is_given; /* else the condition always holds */
+    bool is_given; /* set if there is a condition; otherwise it always holds */
     scene_field field;
     scene_statistic of;
-    double above, below; /* may be infinite */
+    double above, below; /* bounds of the statistic; they may be infinite */
 } scene_condition;
 
 /* Statistics of a field that are written to a file, one line per step. */
 typedef struct scene_statistics {
     scene_field field;
-    char *path;       /* relative to the working directory of rank 0 */
-    int every;        /* written at cycles that are multiples of it */
-    int bin_count;    /* bins of the histogram; 0: there is no histogram */
-    double low, high; /* range of the bins; low > high: the range of the values */
+    char *path;       /* path of the file, relative to rank 0's working directory */
+    int every;        /* cycles that are multiples of this are written */
+    int bin_count;    /* number of the histogram's bins; 0: there is no histogram */
+    double low, high; /* range of values that the bins divide; if low > high, the range of the step's values is used */
 } scene_statistics;
 
-/* An image of the file makes a picture for each field, isovalue and plane of its sweep and each view of its orbit: in
- * this order, views running fastest. Each is a scene_image. */
+/* Identifies one of the pictures that an image of the file makes: there is one for each field, isovalue and plane of
+ * its sweep and each view of its orbit, in this order, so that views change fastest. Each is a scene_image. */
 typedef struct scene_variant {
-    int source;                 /* which image of the file */
-    int layers;                 /* counts the fields, isovalues and planes of a source through; 0 without a sweep */
-    int field, isovalue, plane; /* which of the sweep's; 0 where there is none */
-    int view; /* pictures of the same source and layers differ in this and the camera alone: those after view 0 point
-               * to what that one owns */
+    int source; /* index of the image in the file */
+    /* number of the combination of field, isovalue and plane among those of the image; 0 without a sweep */
+    int layers;
+    int field, isovalue, plane; /* indices in the sweep's lists; 0 if the sweep has no such list */
+    /* Index of the view. Pictures of the same image and layers differ only in this and the camera. Those with a view
+     * above 0 share the data that view 0 owns. */
+    int view;
 } scene_variant;
 
 typedef struct scene_image {
-    char *name; /* the same for all variants */
+    char *name; /* name of the image, the same for all its variants */
     int line;
     scene_variant variant;
-    bool has_isovalue; /* the sweep sets the isovalue */
+    bool has_isovalue; /* set if the sweep selects the isovalue */
     double isovalue;
-    bool has_plane;    /* the sweep sets the plane */
-    char *swept_field; /* NULL: the sweep has no fields */
-    int width, height; /* 1 .. 32768; 1280 × 720 by default */
+    bool has_plane;    /* set if the sweep selects the plane */
+    char *swept_field; /* the field that the sweep selects; NULL if the sweep has no fields */
+    int width, height; /* size of the picture in pixels, 1 .. 32768; 1280 × 720 by default */
     scene_camera camera;
-    float background[4]; /* linear premultiplied RGBA */
+    float background[4]; /* background colour: linear premultiplied RGBA */
     int isosurface_count;
     scene_isosurface *isosurfaces;
     int volume_count;
@@ -425,64 +461,70 @@ typedef struct scene_image {
     int slice_count;
     scene_slice *slices;
     scene_decorations decorations;
-    int clip_count; /* 0 .. SCENE_MAX_CLIPS, without duplicates */
+    int clip_count; /* number of clips of all layers together, 0 .. SCENE_MAX_CLIPS, without duplicates */
     scene_clip *clips;
-    uint32_t clips_of_all; /* set of the clips that cut all layers, one bit each */
-    bool has_lights;       /* the scene gives lights */
-    int light_count;       /* 1 .. 8; a default head light and fill light if the scene gives none */
+    uint32_t clips_of_all; /* set of the clips that cut all layers: one bit per clip */
+    bool has_lights;       /* whether the scene gives lights */
+    /* number of lights, 1 .. 8; if the scene gives none, there are a default key light and fill light */
+    int light_count;
     scene_light *lights;
-    uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */
-    int occlusion_samples;        /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
-    double occlusion_radius;      /* how far they go, in scene units; 0: by the bounds */
-    scene_sampling_method method; /* default: one volume by segments, several by samples */
-    double max_error; /* error bound of segments in a linear colour channel; 0: by step; default for one volume: 0.01 */
-    bool has_default_samples; /* several volumes are sampled because the scene does not say how */
-    double step;              /* sample distance in scene units; 0: by step_cells */
-    double step_cells;        /* in mean cell sizes: a cell's is the cube root of its volume */
-    bool jitter;              /* true by default */
-    bool is_reproducible;     /* volumes to the last bit */
-    int frames;               /* accumulated; a multiple of antialias; 1 by default, 1 .. 4096 */
-    int antialias; /* places in a pixel that frames go through in turn: 1 (default), 2, 4, 8 or 16. Where there are no
-                    * volumes only pixels at edges take more than one frame */
-    double max_seconds; /* that samples may take by estimate; 3600 by default */
-    int output_count;   /* 0: for memory alone */
+    uint32_t shadows; /* lights that cast shadows: one bit per light; 0 by default */
+    /* number of rays for ambient occlusion per hit, 1 .. 64; 0 (default): no ambient occlusion */
+    int occlusion_samples;
+    double occlusion_radius; /* length of these rays in scene units; 0: chosen by the data's bounds */
+    /* method of volumes; by default one volume is integrated by segments, several are sampled */
+    scene_sampling_method method;
+    /* Error bound of segments in a linear colour channel. 0: the step decides. The default for one volume is 0.01. */
+    double max_error;
+    bool has_default_samples; /* set if several volumes are sampled because the scene does not specify the method */
+    double step;              /* distance between samples in scene units; 0: step_cells decides */
+    /* distance between samples in mean cell sizes, where the size of a cell is the cube root of its volume */
+    double step_cells;
+    bool jitter;          /* whether samples are offset randomly per pixel; true by default */
+    bool is_reproducible; /* whether volumes must be the same to the last bit on any partition */
+    int frames;           /* number of frames that are averaged, 1 .. 4096, a multiple of antialias; 1 by default */
+    /* Number of positions in a pixel that successive frames use in turn: 1 (default), 2, 4, 8 or 16. Without volumes,
+     * only pixels at edges get more than one frame. */
+    int antialias;
+    double max_seconds; /* upper bound of the estimated time for samples, in seconds; 3600 by default */
+    int output_count;   /* number of output files; 0: the picture is only passed to the caller in memory */
     scene_output *outputs;
     int every;         /* the image is drawn at cycles that are multiples of this; 1 by default */
-    double every_time; /* > 0: the image is drawn instead when the time passes a multiple of this */
+    double every_time; /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
     scene_condition when;
-    bool once; /* the image is drawn only in the first step in which it is due */
+    bool once; /* whether the image is drawn only in the first step in which it is due */
 } scene_image;
 
-/* An iteration over the fields that an image's layers show: for each kind of layers in turn, first the fields that are
- * shown and then those that colour the layers. */
+/* Iterates over the fields that an image's layers use: for each kind of layer, first the fields that are shown, then
+ * those that colour the layers. */
 typedef enum scene_layer_kind { SCENE_ISOSURFACE, SCENE_VOLUME, SCENE_SLICE, SCENE_SURFACE } scene_layer_kind;
 
 typedef enum scene_field_role {
-    SCENE_SHOWN,    /* the layer is made of its values */
-    SCENE_COLOURS,  /* it colours a surface */
-    SCENE_LINES,    /* contour lines on a surface are of it */
-    SCENE_THRESHOLD /* it chooses cells */
+    SCENE_SHOWN,    /* the field of which the layer is made */
+    SCENE_COLOURS,  /* a field that colours a surface */
+    SCENE_LINES,    /* a field whose contour lines are drawn on a surface */
+    SCENE_THRESHOLD /* a field that selects cells */
 } scene_field_role;
 
 typedef struct scene_field_walk {
     const scene_image *image;
-    int place; /* place of the next field among all that the layers may have */
+    int place; /* position of the next field among all that layers can have */
     scene_layer_kind kind;
-    scene_field_role role; /* role of the last field returned */
+    scene_field_role role; /* role of the field that was returned last */
 } scene_field_walk;
 
-/* Returns the next field, or NULL after the last one. An iteration begins with only the image set. */
+/* Returns the next field, or NULL after the last one. Only `image` must be set when an iteration begins. */
 scene_field *scene_next_field(scene_field_walk *walk);
-/* Returns the name of the kind for messages. */
+/* Returns the name of a kind of layer for messages. */
 const char *scene_layer_word(scene_layer_kind kind);
 
-/* Checks whether the image is the first of its variants. Results that all variants share are stored in this one. */
+/* Returns whether the image is the first of its variants, which stores results that all of them share. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {
     return image->variant.layers == 0 && image->variant.view == 0;
 }
 
-/* Checks whether words are drawn into pictures of the image. */
+/* Returns whether text is drawn into pictures of the image. */
 static inline bool scene_has_words(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
@@ -493,8 +535,7 @@ static inline bool scene_has_words(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* The cells that trees are built over: all cells, the cells that the images can show, or whichever of the two costs
- * less. */
+/* The cells over which trees are built: all cells, the cells that images can show, or whichever costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */
@@ -506,38 +547,39 @@ typedef enum scene_schedule {
     SCENE_SCHEDULE_BINARY
 } scene_schedule;
 
-/* Pictures are written by a thread while the simulation continues, or before the step ends. */
+/* When pictures are written: by a thread while the simulation continues, or before the step ends. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
-/* Most images of a scene file (session_events.h has a bit for each), and most pictures that they make in a step. */
+/* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a
+ * step. */
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 
-/* A number in the scene for the simulation (insitu_parameter()). */
+/* A named number in the scene that the simulation can read (insitu_parameter()). */
 typedef struct scene_parameter {
     char *name;
     double value;
 } scene_parameter;
 
 typedef struct scene {
-    int derived_count;      /* 0 .. SCENE_MAX_DERIVED */
-    scene_derived *derived; /* sorted: each field after the fields that it is derived from */
-    int threads;            /* threads per rank; 0: the cores of the node, shared among its ranks */
+    int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
+    scene_derived *derived; /* derived fields; each comes after the fields from which it is derived */
+    int threads;            /* number of threads per rank; 0: the cores of the node, shared among its ranks */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;
-    int image_count; /* 1 .. SCENE_MAX_PICTURES, including variants */
+    int image_count; /* number of images including their variants, 1 .. SCENE_MAX_PICTURES */
     scene_image *images;
     int database_count;
     scene_database *databases;
     int montage_count;
     scene_montage *montages;
-    int statistics_count; /* 0 .. 64 */
+    int statistics_count; /* number of statistics, 0 .. 64 */
     scene_statistics *statistics;
-    int parameter_count; /* 0 .. 64, with different names */
+    int parameter_count; /* number of parameters, 0 .. 64; their names differ */
     scene_parameter *parameters;
 } scene;
 
-/* Parses a text of size bytes. file_name is for messages, and paths in the scene are relative to its folder.
+/* Parses a text of `size` bytes. file_name is used in messages, and paths in the scene are relative to its folder.
  * attachments is NULL if the scene may name no file; files that are read are added to it. On an error *out is zeroed
  * and the message has the form "file:line: key: what is wrong, what was expected". */
 insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene_attachments *attachments,
@@ -547,25 +589,25 @@ void scene_free(scene *s);
 
 /* Returns the parameter of this name, or NULL if the scene has none. */
 const scene_parameter *scene_find_parameter(const scene *s, const char *name);
-/* Writes the end of a message about an unknown parameter: the parameter that was probably meant, and a list of all
+/* Writes the end of a message about an unknown parameter: the name that was probably meant, and a list of all
  * parameters. */
 void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
 
-/* The values that placeholders are replaced by. */
+/* The values by which placeholders are replaced. */
 typedef struct scene_moment {
     const char *name; /* name of the image */
     long long cycle;
     double time;
     int view, plane;
     double isovalue;
-    const char *field; /* the sweep's field; NULL: no sweep */
+    const char *field; /* field that the sweep selects; NULL if there is no sweep */
 } scene_moment;
 
 scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time);
 
-/* Replace {cycle}, {cycle:0N}, {view} and {plane} likewise, {time}, {time:.Nf} (or e, or g), {isovalue} as {time},
- * {name} and {field} of pattern. Numbers have a decimal point in any locale. The result is from base_alloc(), NULL
- * where memory ran out. */
+/* Returns the pattern with its placeholders replaced: {cycle} or {cycle:0N}, likewise {view} and {plane}; {time} or
+ * {time:.Nf} (or e, or g), likewise {isovalue}; {name} and {field}. Numbers have a decimal point in any locale. The
+ * result is from base_alloc(); NULL if memory ran out. */
 char *scene_expand(const char *pattern, const scene_moment *moment);
 
 #endif

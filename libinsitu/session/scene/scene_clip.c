@@ -1,17 +1,17 @@
-/* Reads the regions that are cut away from an image's layers: half spaces, boxes and spheres. An image has one list of
- * clips, without duplicates; each layer has a set of entries of this list. */
+/* Reads the clips of an image's layers: half spaces, boxes and spheres. An image has one list of clips, without
+ * duplicates; each layer has a set of entries of this list. */
 #include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Adds the clip to the image's list, unless it is there already, and to the set. */
+/* Adds the clip to the set, and to the image's list if it is not there yet. */
 static insitu_status add_clip(const scene_document *d, const char *path, const scene_clip *clip, scene_image *image,
                               uint32_t *set)
 {
     int at = 0;
-    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): clips that were missed are only applied twice */
+    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): duplicates that are missed are only applied twice */
     while (at < image->clip_count && memcmp(&image->clips[at], clip, sizeof *clip) != 0) at++;
     if (at == SCENE_MAX_CLIPS)
         return scene_bad(d, path, "",

@@ -19,7 +19,7 @@ __attribute__((format(printf, 2, 3))) static void set_path(char path[path_size],
     va_end(arguments);
 }
 
-/* The largest ratio of the ends of a logarithmic range, limited by the exponents of float32. */
+/* Maximum ratio of the ends of a logarithmic range, limited by the exponents of float32. */
 static const double widest_log_range = 1e30;
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
@@ -122,7 +122,7 @@ static const scene_attachment *find_attachment(const scene_attachments *all, con
     return NULL;
 }
 
-/* Reads the file as an attachment, which takes ownership of the path. */
+/* Reads a file as an attachment of the scene. It takes ownership of the path. */
 static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
 {
     scene_attachments *all = d->attachments;
@@ -217,7 +217,8 @@ static void reverse(scene_colour_map *map)
     }
 }
 
-/* Takes the table's colours at evenly spaced positions, including both ends; a single band gets the middle colour. */
+/* Replaces the table by its colours at evenly spaced positions, including both ends; a single band gets the middle
+ * colour. */
 static insitu_status cut_into_bands(const scene_document *d, int bands, scene_colour_map *map)
 {
     float *colours = base_alloc((size_t)bands * 3 * sizeof *colours);

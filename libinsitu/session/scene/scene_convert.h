@@ -8,48 +8,49 @@
 
 enum { SCENE_PATH_SIZE = 128 };
 
-/* The points of a colour map, between which it is interpolated. */
+/* The points between which a colour map is interpolated. */
 typedef struct scene_colour_points {
     int count;
     colour_point *items;
     colour_space space;
-    bool is_banded; /* each colour belongs to a band */
+    bool is_banded; /* set if each colour belongs to a band and is not interpolated */
 } scene_colour_points;
 
 /* Scales v to unit length; returns false for a zero vector. */
 bool scene_normalize(double v[3]);
-/* Checks whether two unit vectors are parallel within a millionth of a radian. */
+/* Returns whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
 /* The factors of the number of pictures that an image makes in a step. */
 typedef struct scene_series {
-    int fields, isovalues, planes, views; /* each 1 or more */
+    int fields, isovalues, planes, views; /* number of fields, isovalues, planes and views; each is at least 1 */
 } scene_series;
 
-/* Checks the image's sweep and counts its series. path is the path of the image. */
+/* Checks the image's sweep and counts its pictures by factor. path: the path of the image in the file. */
 insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_series *out);
 /* Counts the pictures of all images together; too many are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Removes from the layers, which are those of the file, everything that the variant does not show. */
+/* Reduces the image's layers, which are all those of the file, to what its variant shows. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
-/* Read the series of the camera at the path: its orbit, its moving path, and the number of its views. */
+/* Converts the parts of a camera that make several views: its orbit or its moving path. path: the path of the camera in
+ * the file. */
 insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
                                  scene_camera *out);
 int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
-/* Turns a camera with an orbit to one of its views. */
+/* Sets the direction of a camera with an orbit to that of one of its views. */
 void scene_place_view(scene_camera *camera, int view);
 
 /* Converts the path of an output that belongs to a database. */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
                                    const scene_image *image, scene_output *out);
-/* List the pictures of several images, and number their cells; views are still to be made. */
+/* Lists the montages of all images, and numbers their cells. It must be called before views are added. */
 insitu_status scene_find_montages(const scene_document *d, scene *s);
-/* List the databases of all images; views are still to be made. */
+/* Lists the databases of all images. It must be called before views are added. */
 insitu_status scene_find_databases(const scene_document *d, scene *s);
 
 /* Each function converts one part of an image; path is the path of this part in the file, for messages. */
@@ -57,7 +58,7 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
                                    scene_camera *out);
 insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,
                                    scene_image *out);
-/* Must be called after scene_convert_lights(). */
+/* Converts shadows and ambient occlusion. It must be called after scene_convert_lights(). */
 insitu_status scene_convert_shadows(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out);
 insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,
@@ -102,16 +103,16 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
 insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
                                       scene_field *out, scene_colour_map *map);
 
-/* The contour lines of a layer, whose path is given; in: NULL where there are none. colours: the field that colours the
- * layer, or NULL; height: of the picture. */
+/* Converts the contour lines of a layer. layer: the path of the layer in the file; in: NULL if there are no lines;
+ * colours: the field that colours the layer, or NULL; height: height of the picture in pixels. */
 insitu_status scene_convert_lines(const scene_document *d, const char *layer, const scene_file_lines *in,
                                   const scene_field *colours, int height, scene_lines *out);
 
-/* NULL: a slight gloss. */
+/* Converts a material; NULL gives the default one, which is slightly glossy. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds the clips to the image's list and to the set, which has a bit for each entry of the list. in is NULL if there
- * are none. */
+/* Adds the clips at a path to the image's list, and to the set, which has one bit per entry of that list. in: NULL if
+ * there are none. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
 /* Makes the set of a layer: the clips of all layers, and the layer's own clips. */
@@ -120,7 +121,7 @@ insitu_status scene_convert_layer_clip(const scene_document *d, const char *laye
 /* Converts the plane with this index in the list `planes` of the mapping at path. */
 insitu_status scene_convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                   scene_plane *out);
-/* height is the height of the picture. */
+/* Converts an outer surface. height: height of the picture in pixels, for the default width of lines. */
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out);
 /* Counts the planes of all entries of the slice's list. */
@@ -128,12 +129,12 @@ int scene_count_planes(const scene_file_slice *in);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in, int height,
                                   scene_slice *out);
 
-/* in is NULL if there is no condition; image is the path of the image. */
+/* Converts the condition of an image. in: NULL if there is no condition; image: the path of the image in the file. */
 insitu_status scene_convert_condition(const scene_document *d, const char *image, const scene_file_condition *in,
                                       scene_condition *out);
 insitu_status scene_convert_statistics(const scene_document *d, const scene_file *in, scene *out);
 
-/* Converts the derived fields and sorts them: each follows the fields that it is derived from. */
+/* Converts the derived fields, and sorts them so that each comes after the fields from which it is derived. */
 insitu_status scene_convert_derived(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_derived(scene *s);
 insitu_status scene_convert_parameters(const scene_document *d, scene *out);

@@ -107,7 +107,7 @@ static insitu_status take_scalar(const scene_document *d, const char *path, int 
 
 /* ---- one field -------------------------------------------------------------------------------------------------- */
 
-/* Finds the one key that gives the kind of the field: an index in keys, or -1 for an expression. */
+/* Finds the single key that gives the kind of the field. *found: its index in `keys`, or -1 for an expression. */
 static insitu_status find_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
 {
     const char *first = in->expression ? "expression" : NULL;
@@ -167,7 +167,8 @@ static insitu_status convert_one(const scene_document *d, const char *path, cons
     return take_references(d, key_path, out);
 }
 
-/* ---- what is made of what --------------------------------------------------------------------------------------- */
+/* ---- dependencies between derived fields
+ * --------------------------------------------------------------------------- */
 
 static int find_derived(const scene *s, const char *name)
 {
@@ -180,8 +181,8 @@ static int find_derived(const scene *s, const char *name)
 typedef struct search {
     const scene_document *d;
     scene *s;
-    int path[SCENE_MAX_DERIVED], length; /* from the one that is being made on */
-    int order[SCENE_MAX_DERIVED], count; /* indices of the finished fields, and their number */
+    int path[SCENE_MAX_DERIVED], length; /* path of the search, beginning with the field that is being sorted */
+    int order[SCENE_MAX_DERIVED], count; /* indices of the sorted fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];
 } search;
 

@@ -40,13 +40,13 @@ static size_t lines_before(const char *text, size_t size, size_t offset)
 
 static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text, size_t size)
 {
-    /* libyaml does not report every lack of memory as such. */
+    /* libyaml does not report every failed allocation as such. */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
     size_t line;
     char what[SCENE_SYNTAX_SIZE];
-    if (parser->error == YAML_READER_ERROR) { /* these errors have an offset, but no line */
+    if (parser->error == YAML_READER_ERROR) { /* reader errors have an offset, but no line */
         line = lines_before(text, size, parser->problem_offset) + 1;
         snprintf(what, sizeof what, "not valid YAML: %.100s", parser->problem ? parser->problem : "unreadable");
     } else {
@@ -160,7 +160,7 @@ static const char *text_of(const yaml_node_t *scalar)
     return (const char *)scalar->data.scalar.value;
 }
 
-/* Quotes the text of the file, cut to a length that suits a message. */
+/* Writes the node's text in quotes, shortened to a length that suits a message. */
 static void quote(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {
@@ -315,7 +315,7 @@ insitu_status scene_bad(const scene_document *d, const char *parent, const char 
 
 /* ---- tree against schema ---- */
 
-/* Writes a question that suggests the nearest candidate, or "" if no candidate is near. */
+/* Writes a question that suggests the candidate nearest to the word, or "" if none is near. */
 static void ask_for_meant(const yaml_node_t *word, const char *const *candidates, int count,
                           char question[question_size])
 {
@@ -363,12 +363,13 @@ static void list_of_numbers(const char *text, const cyaml_schema_value_t *value,
 static bool read_number(const char *text, double *number)
 {
     char *end;
-    if (text[strspn(text, "+-.0123456789eE")]) return false; /* no nan, inf, hexadecimal */
+    if (text[strspn(text, "+-.0123456789eE")]) return false; /* rejects nan, inf and hexadecimal numbers */
     *number = strtod(text, &end);
     return end != text && !*end && isfinite(*number);
 }
 
-/* Adds a question about an empty value: an unquoted #ff0000 reads as a comment, and keys may lack their indentation. */
+/* Writes a question about an empty value: an unquoted #ff0000 is read as a comment, and keys may lack their
+ * indentation. */
 static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                            char question[question_size])
 {
@@ -380,7 +381,7 @@ static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, con
         snprintf(question, question_size, " (its keys stand on the next lines, further in, or in { })");
 }
 
-/* Adds "did you mean ...?" if the value would be right in quotes, as a list, or as an entry of a list. */
+/* Writes "did you mean ...?" if the value would be valid in quotes, as a list, or as an entry of a list. */
 static void ask_for_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                          const scene_key *key, char question[question_size])
 {
@@ -428,7 +429,7 @@ static insitu_status bad_value(const scene_document *d, const char *path, const 
     return scene_bad(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
-/* Reads a decimal number; 010 is rejected, as it could mean 10 or 8. */
+/* Reads a decimal whole number. 010 is rejected, because it could mean 10 or 8. */
 static bool read_whole_number(const char *text, double *number)
 {
     const char *digits = text + (*text == '-' || *text == '+');
@@ -445,7 +446,7 @@ static bool is_in_range(double number, const scene_key *key)
     return key->is_high_excluded ? number < key->high : number <= key->high;
 }
 
-/* Returns the choice of this word, or NULL if there is none. */
+/* Returns the choice of the schema with this text, or NULL if there is none. */
 static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_value_t *value)
 {
     for (uint32_t i = 0; i < value->enumeration.count; i++) {
@@ -459,7 +460,7 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     if (node->type != YAML_SCALAR_NODE) return false;
     const char *text = text_of(node);
     const size_t length = strlen(text);
-    if (length != node->data.scalar.length) return false; /* the text contains a NUL */
+    if (length != node->data.scalar.length) return false; /* lengths differ if the text contains a NUL */
     double number;
     switch (value->type) {
     case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
@@ -542,7 +543,7 @@ static insitu_status check_list(scene_document *d, const char *path, const yaml_
     return status;
 }
 
-/* Checks a name, or a list of names. */
+/* Checks a value that is a name, or a list of names. */
 static insitu_status check_names(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -577,7 +578,8 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     return bad_value(d, path, node, value, key);
 }
 
-/* Checks a name that the scene gives, as it appears in paths of messages and in calls by simulations. */
+/* Returns whether a name that the scene chooses is allowed; such names appear in paths of messages and in calls by
+ * simulations. */
 static bool is_own_name(const yaml_node_t *name)
 {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
@@ -617,8 +619,8 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
     return status;
 }
 
-/* Asks whether an unknown key was meant to stand at the file's top, or in the one mapping below this one that has it.
- */
+/* Writes a question whether an unknown key was meant to be at the top of the file, or in the one mapping below this one
+ * that has such a key. */
 static void ask_for_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
     const char *text = name->type == YAML_SCALAR_NODE ? text_of(name) : "", *holder = NULL;
@@ -654,7 +656,7 @@ static insitu_status bad_key(scene_document *d, const char *path, const yaml_nod
                      line_of(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
 
-/* Returns the reason why a key of earlier versions is gone, or NULL if there never was such a key. */
+/* Returns the reason why a key of earlier versions was removed, or NULL if there never was such a key. */
 static const char *why_gone(const char *key)
 {
     static const char *const gone[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},

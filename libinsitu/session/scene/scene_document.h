@@ -11,13 +11,14 @@
 typedef struct scene_block scene_block;
 
 typedef struct scene_document {
-    const char *file_name; /* borrowed */
-    const char *text;      /* borrowed until the document is closed; size bytes */
+    const char *file_name; /* name of the file for messages; borrowed */
+    const char *text;      /* text of the file, `size` bytes; borrowed until the document is closed */
     size_t size;
-    base_error *error;                     /* borrowed; receives the messages */
-    struct scene_attachments *attachments; /* borrowed; NULL: the scene may name no files */
+    base_error *error; /* receives the messages; borrowed */
+    /* files that the scene names; borrowed; NULL if the scene may name no files */
+    struct scene_attachments *attachments;
     yaml_document_t yaml;
-    scene_block *blocks; /* memory of the schema's structs */
+    scene_block *blocks; /* memory blocks that hold the schema's structs */
 } scene_document;
 
 /* Reads text, which is borrowed, into *d: one YAML document of bounded size and depth, without anchors, aliases and
@@ -49,10 +50,12 @@ int scene_document_texts(const scene_document *d, const char *path, const char *
  * scene_document_texts(). */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
-/* The kind of a node at a path, and its number. A node that has passed the checks has the type of its key. */
+/* The kind of the node at a path, and its value if it is a number. A node that has passed the checks has the type of
+ * its key. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);
-int scene_document_length(const scene_document *d, const char *path); /* the length of a list; 0 if there is none */
+/* Returns the length of the list at a path; 0 if there is no list. */
+int scene_document_length(const scene_document *d, const char *path);
 double scene_document_number(const scene_document *d, const char *path);
 
 /* Records "file:line: parent.key: ..." and returns INSITU_ERROR_SCENE. An empty key means the parent itself. */

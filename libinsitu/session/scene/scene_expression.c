@@ -1,4 +1,4 @@
-/* The parser descends by the precedence of operators:
+/* Parses expressions by recursive descent along the precedence of operators:
  *
  *     sum     = product { (+ | -) product }
  *     product = sign { (* | /) sign }
@@ -6,7 +6,7 @@
  *     power   = primary [ ^ sign ]                 so that -x^2 is -(x^2), and x^-1 is allowed
  *     primary = number | ( sum ) | function ( sum [, sum] ) | mag ( field ) | field [. component]
  *
- * and emits instructions when it reaches their operators. */
+ * An instruction is emitted after the operands of its operator. */
 #include "scene_expression.h"
 
 #include <math.h>
@@ -36,8 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *at;
     scene_expression *out;
-    int nested; /* number of open brackets and signs */
-    int used;   /* number of used entries of the stack */
+    int nested; /* number of open brackets and signs, which is limited */
+    int used;   /* number of stack entries in use at this point of the program */
     scene_parse_result result;
     char *fault;
 } parser;
@@ -73,7 +73,7 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Checks for a letter. Bytes of UTF-8 beyond ASCII count as letters. */
+/* Returns whether c can be part of a name. Bytes of UTF-8 beyond ASCII count as letters. */
 static bool is_letter(char c)
 {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (unsigned char)c >= 0x80;
@@ -92,7 +92,7 @@ static bool take(parser *p, char c)
     return true;
 }
 
-/* Returns the length of the next word for a message: a name, a number or a sign. */
+/* Returns the length of the next word, for a message: a name, a number or a sign. */
 static int word_length(const char *at)
 {
     int length = 0;
@@ -137,7 +137,7 @@ static bool add_binary(parser *p, scene_operation operation)
     return add(p, operation, 0, 0);
 }
 
-/* Adds a power; an exponent that is a small whole number needs no logarithm. */
+/* Emits a power. An exponent that is a small whole number gets an instruction that needs no logarithm. */
 static bool add_power(parser *p)
 {
     const scene_instruction *last = &p->out->instructions[p->out->count - 1];
@@ -165,7 +165,7 @@ static bool push_input(parser *p, const char *name, int component)
     return push(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
 }
 
-/* Reads a component after its point. */
+/* Reads the component that follows a point. */
 static bool parse_component(parser *p, const char *name, int *component)
 {
     const char *word = p->at;
@@ -397,7 +397,8 @@ static void apply_function(scene_operation operation, double *restrict a, int co
     }
 }
 
-/* The minimum or maximum of NaN and another number is NaN too. */
+/* Applies the operator to `count` pairs of numbers: a = a op b. The minimum or maximum of NaN and another number is
+ * NaN. */
 static void apply_operator(scene_operation operation, double *restrict a, const double *restrict b, int count)
 {
     switch (operation) {
@@ -419,7 +420,7 @@ static bool is_operator(scene_operation operation)
 
 void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack)
 {
-    double *top = stack - SCENE_BLOCK; /* the last entry */
+    double *top = stack - SCENE_BLOCK; /* top entry of the stack */
     for (int k = 0; k < expression->count; k++) {
         const scene_instruction *at = &expression->instructions[k];
         if (at->operation == SCENE_OP_PUSH_NUMBER) {

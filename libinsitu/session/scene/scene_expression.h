@@ -7,13 +7,12 @@
 
 enum {
     SCENE_EXPRESSION_BYTES = 1000,
-    SCENE_BLOCK = 256, /* places that a program runs for at most */
-    SCENE_STACK = 32,  /* most stack entries of a program */
+    SCENE_BLOCK = 256, /* maximum number of points for which a program is run at once */
+    SCENE_STACK = 32,  /* maximum number of stack entries of a program */
     SCENE_FAULT_SIZE = 400
 };
 
-/* An operation of the program: a function of one or two numbers, an operator, or an instruction that pushes a
- * number. */
+/* An operation of a program: a function of one or two numbers, an operator, or an instruction that pushes a number. */
 typedef enum scene_operation {
     SCENE_OP_PUSH_NUMBER,
     SCENE_OP_PUSH_INPUT,
@@ -23,7 +22,7 @@ typedef enum scene_operation {
     SCENE_OP_MULTIPLY,
     SCENE_OP_DIVIDE,
     SCENE_OP_POWER,
-    SCENE_OP_WHOLE_POWER, /* `number` is the exponent */
+    SCENE_OP_WHOLE_POWER, /* raises to a whole power; `number` is the exponent */
     SCENE_OP_SQRT,
     SCENE_OP_ABS,
     SCENE_OP_EXP,
@@ -38,11 +37,11 @@ typedef enum scene_operation {
 
 typedef struct scene_instruction {
     scene_operation operation;
-    int input;     /* which input SCENE_OP_PUSH_INPUT pushes */
-    double number; /* operand of SCENE_OP_PUSH_NUMBER and SCENE_OP_WHOLE_POWER */
+    int input;     /* index of the input that SCENE_OP_PUSH_INPUT pushes */
+    double number; /* operand of SCENE_OP_PUSH_NUMBER, and exponent of SCENE_OP_WHOLE_POWER */
 } scene_instruction;
 
-/* A scalar of a field, given by its name and a component as in scene_field.component. */
+/* A scalar of a field: the field's name, and a component as in scene_field.component. */
 typedef struct scene_reference {
     char *name;
     int component;
@@ -50,10 +49,10 @@ typedef struct scene_reference {
 
 typedef struct scene_expression {
     int count;
-    scene_instruction *instructions; /* operands come before their operator */
-    int depth;                       /* most stack entries in use, 1 .. SCENE_STACK */
+    scene_instruction *instructions; /* the program; operands come before their operators */
+    int depth;                       /* number of stack entries that the program needs, 1 .. SCENE_STACK */
     int input_count;
-    scene_reference *inputs; /* without duplicates */
+    scene_reference *inputs; /* scalars that the program reads, without duplicates */
 } scene_expression;
 
 typedef enum scene_parse_result { SCENE_PARSED, SCENE_FAULTY, SCENE_NO_MEMORY } scene_parse_result;

@@ -80,9 +80,10 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
     return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
 }
 
-/* ---- walks ------------------------------------------------------------------------------------------------------- */
+/* ---- iteration over fields
+ * ----------------------------------------------------------------------------------------- */
 
-/* The layer's contour lines; NULL: a volume has none. */
+/* Returns the layer's contour lines; NULL for a volume, which has none. */
 static scene_lines *lines_of(const scene_image *image, scene_layer_kind kind, int layer)
 {
     switch (kind) {
@@ -93,7 +94,7 @@ static scene_lines *lines_of(const scene_image *image, scene_layer_kind kind, in
     }
 }
 
-/* The layer's field of this role; NULL: it has none. */
+/* Returns the layer's field with this role; NULL if it has none. */
 static scene_field *field_of(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
 {
     scene_isosurface *isosurface = kind == SCENE_ISOSURFACE ? &image->isosurfaces[layer] : NULL;

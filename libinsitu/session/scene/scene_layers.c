@@ -9,8 +9,8 @@
 
 enum { cycle_length = 16 };
 
-/* Neighbours in the cycle differ in both hue and lightness, and the first colours also differ for viewers who cannot
- * distinguish red from green. */
+/* The default cycle of colours. Neighbours differ in both hue and lightness, and the first colours also differ for
+ * viewers who cannot distinguish red from green. */
 static const float cycle[cycle_length][3] = {
     {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
@@ -35,7 +35,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* first is the number of isovalues of earlier layers, so that two layers do not begin with the same colour. */
+/* Converts the colours of an isosurface. first: number of isovalues of earlier layers, so that two layers do not begin
+ * with the same default colour. */
 static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                      int first, scene_isosurface *out)
 {
@@ -119,7 +120,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 
 typedef struct layer_counts {
     int isosurfaces, volumes, slices, surfaces;
-    int values; /* number of isovalues, planes and outer surfaces */
+    int values; /* number of isovalues, planes and outer surfaces together */
 } layer_counts;
 
 static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
@@ -163,7 +164,7 @@ static const char *layer_word(const scene_file_layer *layer)
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
-/* Converts the clips of the layer, which must be the last one that was converted of its kind. */
+/* Converts the clips of a layer, which must be the last layer of its kind that was converted. */
 static insitu_status convert_clip_of(const scene_document *d, const char *path, const scene_file_layer *in,
                                      scene_image *out)
 {
@@ -181,7 +182,7 @@ static insitu_status convert_clip_of(const scene_document *d, const char *path, 
                      "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
-/* Numbers the layer, which must be the last one that was converted of its kind. */
+/* Stores the index of a layer, which must be the last layer of its kind that was converted. */
 static void number_layer(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;
@@ -189,7 +190,7 @@ static void number_layer(const scene_file_layer *in, int number, scene_image *ou
     if (in->slice) out->slices[out->slice_count - 1].number = number;
 }
 
-/* values is the number of isovalues of the layers before this one. */
+/* Converts a layer. values: number of isovalues of earlier layers. */
 static insitu_status convert_layer(const scene_document *d, const char *path, const scene_file_layer *in, int values,
                                    scene_image *out)
 {
@@ -214,7 +215,8 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
     if (!out->isosurfaces || !out->volumes || !out->slices || !out->surfaces) return scene_no_memory(d);
     for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
         const scene_file_layer *layer = &in->layers[i];
-        char layer_path[SCENE_PATH_SIZE - 16]; /* leaves space for the keys below a layer */
+        /* shorter than SCENE_PATH_SIZE, to leave space for the keys below the layer */
+        char layer_path[SCENE_PATH_SIZE - 16];
         snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);
         if (!status) status = convert_clip_of(d, layer_path, layer, out);

@@ -1,4 +1,4 @@
-/* Contour lines on slices, outer surfaces and isosurfaces. */
+/* Reads contour lines on slices, outer surfaces and isosurfaces. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,7 +35,7 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* Lines without a field are of the one that colours the layer. */
+/* If the scene gives lines without a field, takes the field that colours the layer. */
 static insitu_status take_field_of_colours(const scene_document *d, const char *layer, const char *path,
                                            const scene_file_lines *in, const scene_field *colours, scene_lines *out)
 {

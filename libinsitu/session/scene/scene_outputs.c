@@ -22,7 +22,7 @@ typedef enum placeholder_kind {
 
 typedef struct placeholder {
     placeholder_kind kind;
-    /* minimum number of digits of a whole number, or digits of another number; -1: as few as the number needs */
+    /* minimum number of digits of a whole number, or number of digits of another number; -1: as few as needed */
     int digits;
     char conversion; /* format of a number that is not whole: 'f', 'e' or 'g' */
     size_t size;     /* number of bytes in the pattern */
@@ -30,7 +30,7 @@ typedef struct placeholder {
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
-/* Reads "{WORD:0N}", whose ":" is at text[at]. */
+/* Parses "{WORD:0N}"; text[at] is its ":". */
 static placeholder read_whole(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '0') return no_placeholder;
@@ -40,7 +40,7 @@ static placeholder read_whole(const char *text, size_t at, placeholder_kind kind
     return (placeholder){kind, (int)digits, 0, at + 2 + count + 1};
 }
 
-/* Reads "{WORD:.Nf}", or the same with e or g. */
+/* Parses "{WORD:.Nf}", or the same with e or g; text[at] is its ":". */
 static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '.') return no_placeholder;
@@ -51,14 +51,14 @@ static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
     return (placeholder){kind, (int)digits, conversion, at + 2 + count + 2};
 }
 
-/* Reads the placeholder at the start of the text, which begins with '{'. */
+/* Parses the placeholder at the start of the text, which begins with '{'. */
 static placeholder read_placeholder(const char *text)
 {
     static const struct {
         const char *word;
         placeholder_kind kind;
         int digits;
-        char conversion; /* 0: a whole number; 't': a text, without a format */
+        char conversion; /* format of the value: 0 for a whole number, 't' for a text, else as above */
     } known[] = {{"{cycle", PLACEHOLDER_CYCLE, 1, 0},          {"{view", PLACEHOLDER_VIEW, 1, 0},
                  {"{plane", PLACEHOLDER_PLANE, 1, 0},          {"{time", PLACEHOLDER_TIME, -1, 'g'},
                  {"{isovalue", PLACEHOLDER_ISOVALUE, -1, 'g'}, {"{name", PLACEHOLDER_NAME, 0, 't'},
@@ -73,7 +73,7 @@ static placeholder read_placeholder(const char *text)
     return no_placeholder;
 }
 
-/* fewest is the number of digits if no format is given. */
+/* Writes a number and returns its length. fewest: number of digits if the placeholder gives no format. */
 static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
@@ -81,7 +81,8 @@ static int write_number(const placeholder *p, double value, int fewest, char *ou
     return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
 }
 
-/* Writes the placeholder's value to out (size bytes; NULL and 0 to measure) and returns its length. */
+/* Writes the placeholder's value to out and returns its length. size: bytes at out; with NULL and 0 only the length is
+ * computed. */
 static int write_value(const placeholder *p, const scene_moment *moment, char *out, size_t size)
 {
     switch (p->kind) {
@@ -95,7 +96,8 @@ static int write_value(const placeholder *p, const scene_moment *moment, char *o
     }
 }
 
-/* Writes the expanded text to out (size bytes; NULL and 0 to measure) and returns its length. */
+/* Writes the expanded text to out and returns its length. size: bytes at out; with NULL and 0 only the length is
+ * computed. */
 static size_t expand(const char *pattern, const scene_moment *moment, char *out, size_t size)
 {
     size_t length = 0;
@@ -125,8 +127,8 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
     return text;
 }
 
-/* Returns the key that the image lacks for the placeholder, or NULL if it lacks none. image is the path of the
- * image. */
+/* Returns the key without which the placeholder has no value, if the image lacks this key; else NULL. image: the path
+ * of the image in the file. */
 static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
@@ -242,9 +244,11 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
     return status;
 }
 
-/* ---- no two may be one ----------------------------------------------------------------------------------------- */
+/* ---- no two outputs may be the same file
+ * --------------------------------------------------------------------------- */
 
-/* Names are compared as expanded at one cycle of many digits, so that {cycle} and {cycle:03} count as equal. */
+/* A cycle with many digits, for which names are expanded and compared, so that {cycle} and {cycle:03} count as
+ * equal. */
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
@@ -254,7 +258,7 @@ scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double tim
     return (scene_moment){image->name, (long long)cycle, time, v->view, v->plane, image->isovalue, image->swept_field};
 }
 
-/* The file of an output, with its index among all outputs. */
+/* The path of an output's file, with the output's index among all outputs. */
 typedef struct written_file {
     char *path;
     int image, output, number;
@@ -267,7 +271,7 @@ static int compare_files(const void *a, const void *b)
     return order ? order : first->number - second->number;
 }
 
-/* Returns a placeholder that would distinguish two pictures of one image. */
+/* Returns a placeholder that would give two pictures of one image different names. */
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
@@ -295,7 +299,8 @@ static const scene_output *output_of(const scene *s, const written_file *file)
     return &s->images[file->image].outputs[file->output];
 }
 
-/* The first output whose file another before it has, unless they are cells of one picture. files: sorted. */
+/* Finds the first output with the same file as an earlier one, which is an error unless both are cells of one picture.
+ * files: sorted by path. */
 static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
 {
     int found = -1;

@@ -1,4 +1,4 @@
-/* Reads the scene's numbers for the simulation, whose names the scene chooses. */
+/* Reads the scene's parameters: numbers for the simulation, with names that the scene chooses. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,4 +1,5 @@
-/* The keys of a scene, of its images, and of their parts other than layers. The macros are in scene_schema_lists.h. */
+/* Defines the keys of a scene, of its images, and of all their parts other than layers. The macros are in
+ * scene_schema_lists.h. */
 #include "scene.h"
 #include "scene_schema_lists.h"
 

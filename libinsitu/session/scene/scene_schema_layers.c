@@ -1,4 +1,4 @@
-/* The keys of layers and clips. The macros are in scene_schema_lists.h. */
+/* Defines the keys of layers and clips. The macros are in scene_schema_lists.h. */
 #include "colour_map.h"
 #include "scene.h"
 #include "scene_schema_lists.h"
@@ -41,7 +41,7 @@ static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER,
 static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* the mapping is one of several forms and is read from the document */
+} no_members; /* a struct without members, for mappings that are one of several forms and are read from the document */
 
 #define MAP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \

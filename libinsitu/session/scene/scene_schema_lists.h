@@ -1,6 +1,6 @@
-/* Macros that the schema's files use to define their lists. Each mapping has one list, which gives each key as a field
- * of libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md are all derived
- * from these lists, so that none of them can become outdated. */
+/* Macros by which the schema's files define their lists of keys. Each mapping has one list, which gives each key as a
+ * field of libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md are all
+ * derived from these lists, so that none of them can become outdated. */
 #ifndef SCENE_SCHEMA_LISTS_H
 #define SCENE_SCHEMA_LISTS_H
 
@@ -33,7 +33,7 @@
     CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
 #define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
 
-/* Some files use only some of these values. */
+/* Each file that includes this header uses only some of these values. */
 #define SHARED static const __attribute__((unused)) cyaml_schema_value_t
 SHARED number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
 SHARED whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};

@@ -1,6 +1,6 @@
-/* A short form is recognised by its key and the kind of its value, wherever the key appears: no key of the schema has
- * two meanings that could use the same short form. Nodes are identified by their numbers, because adding a node may
- * move all nodes. */
+/* Rewrites short forms. A short form is recognised by its key and the kind of its value, wherever the key appears: no
+ * key of the schema has two meanings that could use the same short form. Nodes are identified by their numbers, because
+ * adding a node may move all nodes in memory. */
 #include "scene_shorthand.h"
 
 #include <ctype.h>
@@ -13,7 +13,7 @@
 /* A document while its short forms are expanded. */
 typedef struct rewrite {
     yaml_document_t *document;
-    yaml_mark_t mark; /* position of the value that is replaced */
+    yaml_mark_t mark; /* position in the file of the value that is replaced */
     bool has_memory;
 } rewrite;
 
@@ -110,7 +110,7 @@ static bool read_colour(const char *text, double colour[3])
     return true;
 }
 
-/* Reads "x", "+y" or "-z". */
+/* Reads an axis such as "x", "+y" or "-z" as a vector. */
 static bool read_axis(const char *text, double axis[3])
 {
     const double sign = *text == '-' ? -1 : 1;
@@ -148,7 +148,7 @@ static void expand_axis(rewrite *r, int *value)
 
 /* ---- other forms ------------------------------------------------------------------------------------------------ */
 
-/* A text alone: a mapping in which it is the key's value. */
+/* Expands a text to a mapping in which the text is the value of the key. */
 static void expand_text(rewrite *r, const char *key, int *value)
 {
     const int text = *value;
@@ -162,7 +162,7 @@ static void expand_field(rewrite *r, int *value)
     expand_text(r, "field", value);
 }
 
-/* A path, a mapping, or a list of either: a list of mappings. */
+/* Expands a path, a mapping, or a list of either, to a list of mappings. */
 static void expand_outputs(rewrite *r, int *value)
 {
     expand_text(r, "path", value);
@@ -177,7 +177,7 @@ static void expand_outputs(rewrite *r, int *value)
     }
 }
 
-/* true: all defaults; false: the pair goes, for which *value becomes 0. */
+/* Expands true to an empty mapping, which means all defaults. For false the pair is removed: *value becomes 0. */
 static void expand_switch(rewrite *r, int *value)
 {
     const char *text = text_of(r, *value);
@@ -241,14 +241,15 @@ static void expand_fields(rewrite *r, int *value)
     *value = list;
 }
 
-/* ---- all of a document ------------------------------------------------------------------------------------------ */
+/* ---- whole documents
+ * ----------------------------------------------------------------------------------------------- */
 
 static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = "true or false";
 
 static const struct {
     const char *key;
     void (*expand)(rewrite *r, int *value);
-    const char *words; /* the short form, unless the schema's words include it */
+    const char *words; /* description of the short form; NULL if the schema's words already include it */
 } rules[] = {
     {"colour", expand_colour, NULL},
     {"background", expand_colour, NULL},
@@ -283,16 +284,17 @@ const char *scene_shorthand_words(const char *key, size_t length)
     return NULL;
 }
 
-/* Replaces the first word `from` in the text, whose words are joined by _, by the word `to`, which is at least as
+/* Replaces the first word `from` in a text, whose words are joined by _, by the word `to`, which is at least as
  * long. */
 static void respell(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
-    const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* also matches the plural, as in colors */
+    const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* a plural such as colors is replaced, too */
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
-    for (size_t i = 0; to[i]; i++) at[i] = to[i]; /* copies without a NUL: the text behind it is already terminated */
+    /* copies without the NUL, because the text behind it is already terminated */
+    for (size_t i = 0; to[i]; i++) at[i] = to[i];
 }
 
 /* Expands American spellings: color becomes colour, and center becomes centre. */
@@ -331,7 +333,7 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) node_of(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* Returns the node of a mapping whose keys the scene chooses, or 0 if there is none. */
+/* Returns the node of a mapping whose keys are chosen by the scene, or 0 if there is none. */
 static int find_own(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = node_of(r, 1);
@@ -347,7 +349,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 {
     rewrite r = {.document = document, .has_memory = true};
     const int count = (int)(document->nodes.top - document->nodes.start);
-    /* The keys of these mappings are names that the scene chooses, which have no short forms. */
+    /* In these mappings keys are names that the scene chooses, which have no short forms. */
     const int parameters = find_own(&r, "parameters"), fields = find_own(&r, "fields");
     for (int number = 1; number <= count && r.has_memory; number++)
         if (number != parameters && number != fields && node_of(&r, number)->type == YAML_MAPPING_NODE)
@@ -355,7 +357,8 @@ bool scene_expand_shorthand(yaml_document_t *document)
     return r.has_memory;
 }
 
-/* ---- words that are nearly right -------------------------------------------------------------------------------- */
+/* ---- words that are nearly correct
+ * --------------------------------------------------------------------------------- */
 
 enum { LONGEST_WORD = 63 };
 
@@ -389,7 +392,7 @@ static bool is_same_word(const char *a, const char *b)
     return !*a && !*b;
 }
 
-/* Words of other programs, and the corresponding words of the schema. */
+/* Words of other programs, each with the corresponding word of the schema. */
 static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"width", "size"},
                                           {"height", "size"},

@@ -1,4 +1,4 @@
-/* Short forms of a scene's values, which are rewritten into the full forms that the schema describes. */
+/* Rewrites short forms of a scene's values into the full forms that the schema describes. */
 #ifndef SCENE_SCENE_SHORTHAND_H
 #define SCENE_SCENE_SHORTHAND_H
 
@@ -11,7 +11,7 @@
  * memory runs out. */
 bool scene_expand_shorthand(yaml_document_t *document);
 
-/* Returns a description of the short forms that a key's value may have, such as "true or false", or NULL if there are
+/* Returns a description of the short forms that the value of a key may have, such as "true or false", or NULL if it has
  * none. */
 const char *scene_shorthand_words(const char *key, size_t length);
 

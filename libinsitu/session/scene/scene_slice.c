@@ -8,7 +8,8 @@
 
 static const scene_material no_light = {.ambient = 1, .shininess = 1};
 
-/* Scales by the largest number first, because the squares of very large or very small numbers may be infinite or 0. */
+/* Scales a vector to unit length. It is divided by its largest number first, because the squares of very large or very
+ * small numbers may be infinite or 0. */
 static bool make_unit(const double in[3], double out[3])
 {
     const double largest = fmax(fabs(in[0]), fmax(fabs(in[1]), fabs(in[2])));

@@ -1,7 +1,8 @@
-/* libyaml reports the position at which it could not continue, which is often lines behind the mistake, in the terms of
- * the grammar. Its report is therefore only used to choose the lines to examine: from the begin of the structure that
- * could not be completed to the position of the report. These lines are searched for common mistakes, the most certain
- * ones first; any other mistake is reported in libyaml's own words. */
+/* Finds the mistake in a text that is not valid YAML. libyaml reports the position at which it could not continue,
+ * which is often lines behind the mistake, in the terms of the grammar. So its report is only used to choose the lines
+ * to examine: from the begin of the structure that could not be completed to the position of the report. These lines
+ * are searched for common mistakes, the most certain ones first; any other mistake is reported in libyaml's own
+ * words. */
 #include "scene_syntax.h"
 
 #include <ctype.h>
@@ -12,20 +13,20 @@
 
 enum { longest_quote = 40 };
 
-/* A line of the text, without its line end. */
+/* A line of the text, without its line ending. */
 typedef struct text_line {
     const char *start;
     size_t length;
     size_t indent; /* number of leading blanks and tabs; the length of the line if there is nothing else */
-    size_t number; /* counted from 0 */
+    size_t number; /* number of the line, from 0 */
 } text_line;
 
 typedef struct fault {
     const yaml_parser_t *parser;
     const char *text;
     size_t size;
-    size_t first, last; /* the lines to examine, counted from 0 */
-    bool is_flow;       /* within { } or [ ] */
+    size_t first, last; /* range of the lines to examine, from 0 */
+    bool is_flow;       /* set if the position is within { } or [ ] */
     size_t *line;
     char *words;
 } fault;
@@ -39,7 +40,7 @@ static text_line line_from(const char *start, const char *end, size_t number)
     return l;
 }
 
-/* Returns the next line; behind the last line, an empty one. */
+/* Returns the next line; after the last line, an empty one. */
 static text_line line_behind(text_line l, const char *end)
 {
     const char *stop = memchr(l.start, '\n', (size_t)(end - l.start));
@@ -58,7 +59,7 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Writes the words of the error and its line. Returns true, so that a rule can end with this call. */
+/* Writes the message and the line of the error. Returns true, so that a rule can end with this call. */
 __attribute__((format(printf, 3, 4))) static bool tell(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
@@ -74,7 +75,8 @@ static int quoted_length(size_t length)
     return (int)(length < longest_quote ? length : longest_quote);
 }
 
-/* ---- the mistakes: each rule tells of one and returns true, or returns false ------------------------------------ */
+/* ---- rules: each writes a message about one kind of mistake and returns true, or returns false
+ * -------------------- */
 
 static bool is_tab(const fault *f, text_line l)
 {
@@ -84,8 +86,8 @@ static bool is_tab(const fault *f, text_line l)
                 quoted_length(l.length - l.indent), l.start + l.indent);
 }
 
-/* Checks whether p is within quotes or is a quote itself, continuing from the previous character; *quote is the quote
- * that is open. */
+/* Returns whether p is within quotes or is a quote itself. *quote: the quote that was open at the previous character;
+ * it is updated. */
 static bool is_in_quotes(text_line l, const char *p, char *quote)
 {
     const bool begins = p == l.start || strchr(" \t[{,:", p[-1]);
@@ -133,7 +135,7 @@ static size_t placeholder_length(const char *at, const char *end)
     return is_one ? (size_t)(p - at) + 1 : 0;
 }
 
-/* Returns the length of a text of placeholders and other characters up to a blank, comma or bracket. */
+/* Returns the length of a text of placeholders and other characters, up to a blank, comma or bracket. */
 static size_t word_length(const char *at, const char *end)
 {
     const char *p = at;
@@ -155,7 +157,7 @@ static size_t text_length(const char *at, size_t word, const char *end)
     return (size_t)(end - at);
 }
 
-/* Checks for a text with a placeholder outside of quotes, such as path: {name}.png. */
+/* Finds a text with a placeholder outside of quotes, such as path: {name}.png. */
 static bool is_bare_placeholder(const fault *f, text_line l)
 {
     const char *end = l.start + l.length;
@@ -167,7 +169,7 @@ static bool is_bare_placeholder(const fault *f, text_line l)
         if (!begins && !is_placeholder) continue;
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
-        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* may be a mapping */
+        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* it may be a mapping */
         return tell(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
                     (int)(f->is_flow ? length : text_length(p, length, end)), p);
     }
@@ -189,10 +191,10 @@ static bool is_unended_quote(const fault *f, text_line l)
                 l.start + column, column < l.length ? l.start[column] : '"');
 }
 
-/* Checks for a " in an earlier line that only the " of this line closes. */
+/* Finds a " in an earlier line that only the " of this line closes. */
 static bool is_unended_before(const fault *f, text_line l)
 {
-    const char *quote = NULL; /* the open quote */
+    const char *quote = NULL; /* the quote that is open */
     text_line opened = l;
     for (text_line other = line_at(f->text, f->size, 0); other.number < l.number;
          other = line_behind(other, f->text + f->size))
@@ -206,7 +208,7 @@ static bool is_unended_before(const fault *f, text_line l)
                 quoted_length((size_t)(opened.start + opened.length - quote)), quote);
 }
 
-/* Checks for an earlier line that ends with an opening bracket that is never closed. */
+/* Finds an earlier line that ends with an opening bracket that is never closed. */
 static bool is_left_open(const fault *f)
 {
     bool is_told = false;
@@ -227,7 +229,7 @@ static bool is_unended_bracket(const fault *f, text_line l)
     const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
     const text_line stop = line_at(f->text, f->size, f->last);
     size_t column = f->parser->problem_mark.column;
-    if (column < stop.length && stop.start[column] == ':') /* the key before the colon is indented too little */
+    if (column < stop.length && stop.start[column] == ':') /* the key in front of this colon is indented too little */
         while (column > stop.indent && !strchr(" {[,", stop.start[column - 1])) column--;
     const size_t length = column < stop.length ? stop.length - column : 0;
     if (l.number == stop.number && length > 0)
@@ -250,8 +252,8 @@ static bool is_item(text_line l)
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
 
-/* Returns the earlier line whose item or key is indented most similarly to this line; the items of a list may be
- * indented 2 further. Sets *expected to the expected indentation. */
+/* Returns the earlier line whose item or key is indented most similarly to this line; items of a list may be indented
+ * by 2 more. *expected: the indentation that the line should have. */
 static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;
@@ -269,7 +271,7 @@ static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
     return nearest;
 }
 
-/* Checks for an earlier line that nothing can be added to, because it lacks a colon, or the blank after its hyphen. */
+/* Finds an earlier line to which nothing can be added, because it lacks a colon, or a blank after its hyphen. */
 static bool is_bad_line_above(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
@@ -306,7 +308,7 @@ static bool is_bad_indent(const fault *f, text_line l)
                 plural(l.indent), quoted_length(key_length), l.start + l.indent, expected, other.number + 1);
 }
 
-/* Checks for text behind a complete value, as in title: "a" b, or a text with a colon, as in title: a: b. */
+/* Finds text behind a complete value, as in title: "a" b, or a text with a colon, as in title: a: b. */
 static bool is_bare_text(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";

@@ -79,7 +79,7 @@ static insitu_status convert_automatic(const scene_document *d, const char *path
     return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
 }
 
-/* Converts the position and the up direction of the camera. */
+/* Converts the camera's position and up direction. */
 static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_camera *in,
                                    scene_camera *out)
 {
@@ -125,7 +125,8 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
                                            : scene_bad(d, path, "direction", "has length 0, expected a direction");
 }
 
-/* The fill light keeps the side that the key light does not reach readable, and is too weak to flatten shapes. */
+/* Sets the default lights. The fill light keeps the side that the key light does not reach readable, and is too weak to
+ * flatten shapes. */
 static void default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};

@@ -1,4 +1,4 @@
-/* Describes the schema in words, both for messages and for docs/scene.md. */
+/* Describes the values that the schema allows in words, for messages and for docs/scene.md. */
 #ifndef SCENE_SCENE_WORDS_H
 #define SCENE_SCENE_WORDS_H
 
@@ -8,12 +8,12 @@
 enum { SCENE_WORDS_SIZE = 640 };
 void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
 
-/* Describes the values as above, with additions for messages: the keys of a list's mappings, and the short form that
- * the last key of the path may have. */
+/* Describes the values that a key accepts, with additions for messages: the keys of a list's mappings, and the short
+ * form that the last key of the path may have. */
 void scene_expected_words(const char *path, const cyaml_schema_value_t *value, const scene_key *key,
                           char expected[SCENE_WORDS_SIZE]);
 
-/* Checks whether a list is a colour: 3 or 4 numbers from 0 to 1, for which scene_shorthand.c also accepts names. */
+/* Returns whether a list is a colour: 3 or 4 numbers from 0 to 1, for which scene_shorthand.c also accepts names. */
 bool scene_is_colour(const cyaml_schema_value_t *list, const scene_key *key);
 
 #endif

@@ -45,7 +45,7 @@ static const char *default_file(const scene_image *image, char file[96])
     return file;
 }
 
-/* Joins folder and file to one path. */
+/* Joins folder and file name to the output's path. */
 static insitu_status join(const scene_document *d, const char *folder, const char *file, scene_output *out)
 {
     const size_t size = strlen(folder) + strlen(file) + 2;
@@ -61,7 +61,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
 {
     char file[96];
     const char *folder = in->cinema;
-    /* a folder has one table, even if the scene writes its name in several ways */
+    /* removes "./", so that a folder has one table even if the scene writes its name in several ways */
     while (strncmp(folder, "./", 2) == 0) folder += 2;
     insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);

@@ -1,12 +1,13 @@
-/* Outputs with a grid: which pictures are cells of one file. Cells are numbered in the order in which pictures are
- * drawn: images as they stand in the scene, of each its sweep, and of each of these the views of its orbit. */
+/* Converts outputs with a grid, and finds which pictures are cells of one file. Cells are numbered in the order in
+ * which pictures are drawn: images in the order of the scene, each image's sweep in its order, and for each of these
+ * the views of its orbit. */
 #include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Names are compared as they come out at one cycle and time (scene_outputs.c). */
+/* Returns the output's path, expanded for a sample cycle and time, by which outputs are compared (scene_outputs.c). */
 static char *name_at_sample(const scene_image *image, const scene_output *output, int view)
 {
     scene_moment moment = scene_moment_of(image, 123456789012345678, 0.5);
@@ -26,7 +27,7 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
                      output->path);
 }
 
-/* The montage of this name; a new one if there is none yet. -1: no memory. */
+/* Returns the index of the montage of this name, which is added if there is none yet; -1 if memory ran out. */
 static int find_montage(scene *s, const scene_image *image, const scene_output *output, char *name)
 {
     for (int i = 0; i < s->montage_count; i++)

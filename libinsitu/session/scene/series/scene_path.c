@@ -11,9 +11,10 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* ---- where it is ----------------------------------------------------------------------------------------------- */
+/* ---- interpolation
+ * ------------------------------------------------------------------------------------------------- */
 
-/* The number of values in a point, stored in one list. */
+/* Number of values that are interpolated; a point's values are stored in one list. */
 enum { NUMBERS_OF_POINT = 10 };
 
 static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POINT])
@@ -24,13 +25,13 @@ static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POIN
     out[9] = p->angle;
 }
 
-/* Times and values of four successive points; the first and the last may be missing. */
+/* Times and values of four successive points, of which the first and the last may be missing. */
 typedef struct cubic_points {
     double at[4], value[4];
     bool has_first, has_last;
 } cubic_points;
 
-/* Returns the slope at point i, which is 1 or 2. */
+/* Returns the slope of the curve at point i, which is 1 or 2. */
 static double slope_at(const cubic_points *p, int i)
 {
     const double before = p->at[i] - p->at[i - 1], after = p->at[i + 1] - p->at[i];
@@ -40,7 +41,7 @@ static double slope_at(const cubic_points *p, int i)
     return (w + v) / (w / down + v / up);
 }
 
-/* Returns the value at share, which goes from 0 at the second point to 1 at the third. The result is clamped, so that
+/* Returns the interpolated value; share is 0 at the second point and 1 at the third. The result is clamped, so that
  * rounding does not take it beyond the values of these points. */
 static double cubic_value(const cubic_points *p, double share)
 {
@@ -94,7 +95,8 @@ scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double t
     return out;
 }
 
-/* ---- the file -------------------------------------------------------------------------------------------------- */
+/* ---- reading the points
+ * -------------------------------------------------------------------------------------------- */
 
 static insitu_status convert_time(const scene_document *d, const char *path, const scene_file_point *in,
                                   const scene_camera *camera, scene_camera_point *out)

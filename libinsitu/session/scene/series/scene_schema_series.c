@@ -1,4 +1,4 @@
-/* The keys of the camera, and of sweeps, which make several pictures of an image. The macros are in
+/* Defines the keys of the camera, and of sweeps, which make several pictures of an image. The macros are in
  * scene_schema_lists.h. */
 #include "scene.h"
 #include "scene_schema_lists.h"

@@ -16,7 +16,7 @@ static bool is_over_planes(const scene_file_image *in)
     return in->sweep && in->sweep->planes && *in->sweep->planes;
 }
 
-/* Finds the first isosurface or slice; returns how many there are. */
+/* Finds the image's first isosurface; returns how many isosurfaces there are. */
 static int find_isosurface(const scene_file_image *in, const scene_file_isosurface **found)
 {
     int count = 0;
@@ -102,7 +102,8 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
     return INSITU_OK;
 }
 
-/* ---- one of them ----------------------------------------------------------------------------------------------- */
+/* ---- reducing the layers to one variant
+ * ---------------------------------------------------------------------------- */
 
 static bool replace_field(scene_field *field, const char *name, int line)
 {
@@ -114,13 +115,13 @@ static bool replace_field(scene_field *field, const char *name, int line)
     return true;
 }
 
-/* Lines of the field that colours a layer are of the one that takes its place. */
+/* Replaces the field that colours a layer. Contour lines of that field become lines of the new one. */
 static bool replace_colours(scene_field *field, scene_lines *lines, const char *name, int line)
 {
     return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
 }
 
-/* Replaces the field in all layers that a field colours; *count is their number. */
+/* Replaces the field in all layers that a field colours; *count: the number of these layers. */
 static bool replace_fields(scene_image *image, const char *name, int line, int *count)
 {
     bool is_done = true;

@@ -1,9 +1,10 @@
-/* Normalises and compares the directions that scenes give. */
+/* Normalises and compares the direction vectors that scenes give. */
 #include <math.h>
 
 #include "scene_convert.h"
 
-/* The vector is scaled first, so that the squares of 1e-200 and 1e200 neither underflow nor overflow. */
+/* The vector is scaled by its largest component first, so that squares of 1e-200 and 1e200 neither underflow nor
+ * overflow. */
 bool scene_normalize(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -14,7 +15,8 @@ bool scene_normalize(double v[3])
     return true;
 }
 
-/* With a smaller angle, the image's right direction would mostly consist of rounding errors. */
+/* The limit is a millionth of a radian: at smaller angles the image's right direction would mostly consist of rounding
+ * errors. */
 bool scene_is_parallel(const double a[3], const double b[3])
 {
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
