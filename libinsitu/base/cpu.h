@@ -8,7 +8,7 @@ typedef enum cpu_isa { CPU_PLAIN = 0, CPU_SSE42 = 1, CPU_AVX2 = 2, CPU_AVX512 = 
  * F, DQ, BW and VL. */
 cpu_isa cpu_best_isa(void);
 
-/* Returns "plain", "sse4.2", "avx2" or "avx512". */
+/* Returns the name of an instruction set: "plain", "sse4.2", "avx2" or "avx512". */
 const char *cpu_isa_name(cpu_isa isa);
 
 #endif

@@ -1,5 +1,5 @@
-/* The rooms of the library report an error as a status and one message. The function that finds the error fills them
- * in, and its callers return them unchanged. */
+/* Represents an error as a status and one message. The function that finds the error fills them in, and its callers
+ * return them unchanged. */
 #ifndef BASE_ERROR_H
 #define BASE_ERROR_H
 
@@ -9,7 +9,7 @@
 
 typedef struct base_error {
     insitu_status status;
-    char message[1024]; /* "" while status is INSITU_OK */
+    char message[1024]; /* the message; "" while status is INSITU_OK */
 } base_error;
 
 /* Makes the control characters of a text visible, ESC as "\\x1b", so that a name in a message cannot control a terminal

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE 1 /* O_PATH */
+#define _GNU_SOURCE 1 /* for O_PATH */
 #include "file.h"
 
 #include <errno.h>
@@ -41,7 +41,7 @@ static bool fail_size(file_failure *failure, size_t limit)
 
 /* ---- opening --------------------------------------------------------------------------------------------------- */
 
-/* Gets the status of the path; anything other than a regular file is a failure. */
+/* Gets the status of the path. Anything other than a regular file is a failure. */
 static bool look(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
     const int look_flags = flags & O_NOFOLLOW ? AT_SYMLINK_NOFOLLOW : 0;
@@ -169,14 +169,14 @@ static bool make_folders(char *path)
     return true;
 }
 
-/* A file's folder and its name in this folder. Both strings are in the memory at path. */
+/* A file's folder and its name in this folder. Both strings share the memory at `path`. */
 typedef struct file_place {
     char *path;
     const char *name;
-    int folder; /* descriptor of the folder, -1 before it is opened */
+    int folder; /* descriptor of the folder; -1 until it is opened */
 } file_place;
 
-/* Rejects anything that a rename must not replace. */
+/* Returns false if the file is of a kind that a rename must not replace, such as a folder, pipe or device. */
 static bool check_place(const file_place *place, file_failure *failure)
 {
     struct stat found;
@@ -202,12 +202,12 @@ static bool open_place(const char *path, file_place *place, file_failure *failur
 
 enum { TEMPORARY_NAME = 40, TRIES = 8 };
 
-/* Writes to a new file of this name and renames it to its final name. */
+/* Writes a new file with the temporary name, and renames it to its final name. */
 static bool try_to_replace(const file_place *place, const char *temporary, const char *bytes, size_t size)
 {
     const int file = openat(place->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
-    /* The lock prevents picture writers from mistaking the file for one that was left by a killed run. */
+    /* The lock prevents other picture writers from taking the file for one that a killed run has left. */
     flock(file, LOCK_EX | LOCK_NB);
     bool is_written = write_all(file, bytes, size);
     int code = errno;
@@ -222,8 +222,8 @@ static bool try_to_replace(const file_place *place, const char *temporary, const
     return false;
 }
 
-/* Tries again if another process has deleted the temporary file because it mistook it for one that was left by a killed
- * run. */
+/* Replaces the file; tries again if another process has deleted the temporary file because it took it for one that a
+ * killed run has left. */
 static bool replace(const file_place *place, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {

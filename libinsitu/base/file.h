@@ -11,24 +11,24 @@
 
 /* The reason why a call failed. */
 typedef struct file_failure {
-    /* there is no such file, or the existing one may not be used and file_replace() would replace it */
+    /* set if there is no such file, or if the existing one must not be used but file_replace() would replace it */
     bool is_missing;
     bool is_memory;
     char reason[128];
 } file_failure;
 
 typedef struct file_content {
-    char *text; /* size bytes and a NUL, allocated with base_alloc() */
+    char *text; /* the file's `size` bytes and a NUL, allocated with base_alloc() */
     size_t size;
-    struct stat stamp; /* state of the file when it was opened */
+    struct stat stamp; /* status of the file when it was opened */
 } file_content;
 
 /* Reads a file that the user names, of at most limit bytes. Symbolic links are followed. Returns false on a failure:
  * *out->text is NULL, and out->stamp is the status of the file if there is one. */
 bool file_read(const char *path, size_t limit, file_content *out, file_failure *failure);
 
-/* Same as file_read(), for a file that the library writes and continues. A link that does not lead to a regular file
- * counts as missing, because file_replace() replaces the link itself. */
+/* Reads, like file_read(), a file that the library itself writes and continues. A link that does not lead to a regular
+ * file counts as missing, because file_replace() replaces the link itself. */
 bool file_read_own(const char *path, size_t limit, file_content *out, file_failure *failure);
 
 /* Replaces a file by these bytes, and creates missing folders. If the path is a link, the link is replaced and its
@@ -40,7 +40,7 @@ bool file_replace(const char *path, const char *bytes, size_t size, file_failure
  * failure: the file is unchanged, unless the file system cannot even cut off bytes that were partly written. */
 bool file_append(const char *path, const char *bytes, size_t size, file_failure *failure);
 
-/* Checks whether the path leads to anything. */
+/* Returns whether the path leads to anything. */
 bool file_exists(const char *path);
 
 #endif

@@ -12,12 +12,12 @@
 #include <stdint.h>
 
 typedef struct fragment {
-    uint32_t pixel; /* y * width + x, y = 0 at the top */
+    uint32_t pixel; /* number of the pixel, y * width + x, with y = 0 at the top */
     float t_in;     /* the ray's parameter, (depth - depth_origin) * scale (render.h), of the first sample or the hit */
     float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit t_in */
     float colour[3];     /* premultiplied linear RGB */
-    float transmittance; /* 0 opaque .. 1 clear */
-    uint32_t kind;       /* one of the kinds below */
+    float transmittance; /* 0 for an opaque fragment .. 1 for a clear one */
+    uint32_t kind;       /* kind of the fragment, one of those below */
 } fragment;
 
 /* Kinds of fragments. A single sample has FRAGMENT_VOLUME + FRAGMENT_LAYER times the number of the volume (0 .. 3).
@@ -26,7 +26,7 @@ typedef struct fragment {
  * FRAGMENT_VOLUME. Hits have FRAGMENT_SURFACE + surface id (0, 1, ...). */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
-/* Checks whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
+/* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
  * still visible: a rank that omitted such a fragment would draw a different picture from a rank that had folded it with
  * others. */
 static inline bool fragment_shows(const fragment *f)
@@ -34,7 +34,7 @@ static inline bool fragment_shows(const fragment *f)
     return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
 }
 
-/* A growing list in memory from memory.h. */
+/* A growing list of fragments in memory from memory.h. */
 typedef struct fragment_list {
     fragment *items;
     int64_t count;
@@ -43,13 +43,13 @@ typedef struct fragment_list {
 
 /* A rectangle of an image's pixels. */
 typedef struct pixel_area {
-    int x, y; /* the upper left pixel */
+    int x, y; /* column and row of the upper left pixel */
     int width, height;
 } pixel_area;
 
-/* Receives all fragments of a rank in an area as soon as they are complete: count fragments in any order. The function
- * may reorder them; they are invalid after the call. thread is the number (0, 1 ...) of the calling thread. Returns
- * false if memory ran out. */
+/* Callback that receives all fragments of a rank in an area as soon as they are complete: `count` fragments in any
+ * order. It may reorder them; they are invalid after the call. thread: the number (0, 1 ...) of the calling thread.
+ * Returns false if memory ran out. */
 typedef bool fragment_taker(void *state, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 #endif

@@ -2,7 +2,8 @@
 
 #include <stdbool.h>
 
-/* ---- the tree ------------------------------------------------------------------------------------------------- */
+/* ---- the binary tree of an interval
+ * ------------------------------------------------------------------------------- */
 
 static void put_behind(fragment *front, const fragment *behind)
 {
@@ -11,7 +12,7 @@ static void put_behind(fragment *front, const fragment *behind)
     if (behind->t_out > front->t_out) front->t_out = behind->t_out;
 }
 
-/* Returns the height above the leaves at which both leaves belong to the same node. */
+/* Returns the height above the leaves of the lowest node that contains both leaves. */
 static int height_of(int32_t a, int32_t b)
 {
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
@@ -41,7 +42,7 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
     return open[0];
 }
 
-/* ---- parts of it ---------------------------------------------------------------------------------------------- */
+/* ---- folding of the parts that a rank has ------------------------------------------------------------------------ */
 
 /* The range of t within which a rank has all fragments, and the list of folded fragments. */
 typedef struct fold_part {
@@ -50,7 +51,7 @@ typedef struct fold_part {
     int64_t count;
 } fold_part;
 
-/* Returns the t at which a leaf begins. The result is exact, because it is a product by a power of two. */
+/* Returns the t at which a leaf begins. The result is exact, because it is a product with a power of two. */
 static double begin_of(int32_t leaf)
 {
     return (double)leaf / (FRAGMENT_STRETCHES << FRAGMENT_HALVINGS);

@@ -33,7 +33,7 @@ enum { FRAGMENT_STRETCHES = 8, FRAGMENT_HALVINGS = 15 };
  * FRAGMENT_HALVINGS bits. All depths beyond a thousand scenes are in one leaf. */
 static inline int32_t fragment_leaf(float t)
 {
-    const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* NaN too */
+    const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* also replaces NaN */
     return (int32_t)floorf(at * (float)(FRAGMENT_STRETCHES << FRAGMENT_HALVINGS));
 }
 

@@ -8,7 +8,7 @@
 
 #include "fragment.h"
 
-/* Returns bits that increase with the value, for all floats including NaN. */
+/* Returns bits of the float that, as an unsigned integer, increase with its value, for all floats including NaN. */
 static inline uint32_t fragment_rising_bits(float value)
 {
     uint32_t bits;
@@ -31,7 +31,7 @@ static inline int fragment_compare_rest(const fragment *a, const fragment *b)
     return order;
 }
 
-/* Returns a negative number if a is in front of b. */
+/* Returns a negative number if a is in front of b, 0 if they are identical, else a positive number. */
 static inline int fragment_compare(const fragment *a, const fragment *b)
 {
     if (a->t_in < b->t_in) return -1;

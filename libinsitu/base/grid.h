@@ -21,7 +21,8 @@ enum {
     GRID_WEDGE = 13,
     GRID_PYRAMID = 14,
     GRID_POLYHEDRON = 42,
-    GRID_MAX_CELL_VERTICES = 8 /* most vertices of a cell, except polyhedra and polygons, which have any number */
+    /* maximum number of vertices of a cell, except polyhedra and polygons, which may have any number */
+    GRID_MAX_CELL_VERTICES = 8
 };
 
 /* Computes the three indices of a lattice's vertices or cells from their numbers: the index of number n along an axis
@@ -29,9 +30,9 @@ enum {
  * a unique number; the numbers in between are padding. */
 typedef struct grid_numbering {
     int64_t stride[3];
-    double inverse_stride[3]; /* 0 along an axis with a single index */
-    double outer[3];          /* 0 along the axis of the largest stride */
-    double inverse_outer[3];  /* 0 along the axis of the largest stride */
+    double inverse_stride[3]; /* 1 / the stride of each axis; 0 along an axis with a single index */
+    double outer[3];          /* the next larger stride; 0 along the axis of the largest stride */
+    double inverse_outer[3];  /* 1 / outer; 0 along the axis of the largest stride */
 } grid_numbering;
 
 /* Returns the index of number n along an axis. Each quotient is rounded down from (n + 1/2) / stride, which is at least
@@ -45,23 +46,24 @@ static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64
 
 /* Coordinates along one axis of a uniform or rectilinear lattice. */
 typedef struct grid_axis {
-    const double *places; /* by index */
-    int64_t count;        /* number of places */
+    const double *places; /* coordinates, by index along the axis */
+    int64_t count;        /* number of coordinates */
     const grid_numbering *vertices;
     int axis;
 } grid_axis;
 
-/* Returns the coordinate of vertex n. Numbers that only padding has, which loops over all numbers meet, get the last. */
+/* Returns the coordinate of vertex n. Numbers that are only padding, which loops over all numbers include, get the last
+ * coordinate. */
 static inline double grid_axis_place(const grid_axis *axis, int64_t n)
 {
     const int64_t index = grid_index_along(axis->vertices, axis->axis, n);
     return axis->places[index < axis->count ? index : axis->count - 1];
 }
 
-/* Elements that are read one by one, at any address. Only values of fields and axes are; whoever makes a grid copies
- * other arrays of such elements. */
+/* Element types that are read one by one, at any address. Only values of fields and axes may have them; other arrays of
+ * such elements are copied before a grid is made. */
 typedef enum grid_odd {
-    GRID_NOT_ODD = 0, /* aligned, and double, float, int64 or int32 */
+    GRID_NOT_ODD = 0, /* the array is aligned, and of type double, float, int64 or int32 */
     GRID_ODD_FLOAT32,
     GRID_ODD_FLOAT64,
     GRID_ODD_INT32,
@@ -74,61 +76,67 @@ typedef enum grid_odd {
     GRID_ODD_UINT64
 } grid_odd;
 
-/* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
+/* A strided array. is_wide: its elements have 8 bytes (double or int64), else 4 bytes (float or int32). */
 typedef struct grid_array {
     const char *data;
-    int64_t stride; /* in bytes; 0: all elements are the same one */
+    int64_t stride; /* distance between elements in bytes; 0: all elements are the same one */
     bool is_wide;
-    bool is_integer;       /* or odd: not to be read as float or double */
-    unsigned char odd;     /* a grid_odd */
-    int64_t base;          /* for indices and offsets: the entry that counts as 0 */
-    int64_t open_count;    /* for offsets without the last entry: how many there are, else 0; */
-    int64_t open_end;      /* and that entry, from 0 */
-    const grid_axis *axis; /* NULL, or what computes the numbers, coordinates by vertex; there is no data then */
+    bool is_integer;    /* elements must not be read as float or double: they are integers or odd */
+    unsigned char odd;  /* one of the values of grid_odd */
+    int64_t base;       /* for indices and offsets: the entry that means 0 */
+    int64_t open_count; /* for offsets without the last entry: their number; else 0 */
+    int64_t open_end;   /* the omitted last offset, counted from 0 */
+    /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
+    const grid_axis *axis;
 } grid_array;
 
 /* A lattice, whose cells are given by three indices instead of connectivity. */
 typedef struct grid_lattice {
-    int64_t cells[3]; /* number of cells along each axis; 0 along one axis: the cells are quads */
+    int64_t cells[3]; /* number of cells along each axis; if it is 0 along one axis, the cells are quads */
     grid_numbering by_vertex, by_cell;
     int64_t corner[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
     int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */
-    int64_t cell_count;                   /* without padding */
-    bool has_ghosts;                      /* some numbers of cells are padding or belong to ghost layers */
-    grid_axis axes[3];                    /* without places if the coordinates are given by vertex */
+    int64_t cell_count;                   /* number of cells, without padding */
+    bool has_ghosts;                      /* set if some cell numbers are padding or belong to ghost layers */
+    /* coordinates along the axes; without places if coordinates are given by vertex */
+    grid_axis axes[3];
 } grid_lattice;
 
 typedef struct grid {
     int64_t vertex_count;
     int64_t cell_count;
     grid_array coordinates[3];
-    grid_array connectivity; /* vertices; for a polyhedron its faces */
-    grid_array offsets;      /* data is NULL: all cells have cell_type. Always given if there are polyhedra */
-    const char *cell_types;  /* NULL: all cells have cell_type */
+    grid_array connectivity; /* vertex indices of the cells; for a polyhedron indices of its faces */
+    /* begin of each cell in connectivity. It has no data if all cells have the type cell_type, and always has data if
+     * there are polyhedra. */
+    grid_array offsets;
+    const char *cell_types; /* type of each cell; NULL: all cells have the type cell_type */
     int64_t cell_types_stride;
-    int cell_types_bytes; /* 1, 4 or 8 */
+    int cell_types_bytes; /* size of an element of cell_types in bytes: 1, 4 or 8 */
     int cell_type;
-    const char *ghosts; /* NULL: none */
+    const char *ghosts; /* a flag per cell, nonzero for ghost cells; NULL: there are none */
     int64_t ghosts_stride;
-    const grid_lattice *lattice; /* NULL, or replaces connectivity, offsets and cell_types */
-    const uint64_t *flat;        /* NULL, or a bit per cell, set if the cell has no volume and is not drawn */
-    /* Faces of polyhedra, which cells share; without data there are no polyhedra. */
+    const grid_lattice *lattice; /* if not NULL, replaces connectivity, offsets and cell_types */
+    /* a bit per cell, set if the cell has no volume and is not drawn; NULL: there are no such cells */
+    const uint64_t *flat;
+    /* The faces of polyhedra, which cells share. face_count is 0 if there are no polyhedra. */
     int64_t face_count;
-    grid_array face_offsets;      /* face_count + 1 */
-    grid_array face_connectivity; /* the faces' vertices around */
-    int ghosts_bytes;             /* 1, 4 or 8: the size of a flag in ghosts */
+    grid_array face_offsets;      /* begin of each face in face_connectivity; face_count + 1 entries */
+    grid_array face_connectivity; /* vertex indices of the faces, in cyclic order */
+    int ghosts_bytes;             /* size of a flag in ghosts in bytes: 1, 4 or 8 */
 } grid;
 
-/* One scalar per vertex or per cell from a field of several components. */
+/* A scalar per vertex or per cell, taken from a field of one or several components. */
 typedef struct grid_field {
-    grid_array values; /* the stride is that between tuples */
+    grid_array values; /* tuples of components; the stride is that between tuples */
     int64_t component_stride;
-    const grid_array *apart; /* NULL, or for a magnitude the components, each an array of its own */
+    /* the components, each in an array of its own, for a magnitude; NULL if they are in `values` */
+    const grid_array *apart;
     int component_count;
-    int component; /* 0 .. component_count - 1, or -1 for the magnitude */
+    int component; /* number of the component, from 0, or -1 for the magnitude */
     bool is_cell_centred;
-    /* NULL, or the cell values from which the values at vertices were computed: a cell whose own value is not finite
-     * has no value */
+    /* the cell values from which the values at vertices were computed: a cell whose own value is not finite then has no
+     * value; NULL if there are none */
     const struct grid_field *own;
 } grid_field;
 
@@ -180,16 +188,17 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
 {
     const char *p = a->data + i * a->stride;
     const int64_t index = a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
-    return (int64_t)((uint64_t)index - (uint64_t)a->base); /* well defined for any index */
+    return (int64_t)((uint64_t)index - (uint64_t)a->base); /* unsigned subtraction is well defined for any index */
 }
 
-/* Returns where the i-th cell or face ends, by an array of offsets. */
+/* Returns the end of the i-th cell or face, by an array of offsets. */
 static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
 {
     return i + 1 == offsets->open_count ? offsets->open_end : grid_array_index(offsets, i + 1);
 }
 
-/* 0 for polyhedra and polygons, whose cells differ in it, and for numbers that are no type. */
+/* Returns the number of vertices of a cell type; 0 for polyhedra and polygons, whose cells differ in it, and for
+ * unknown types. */
 static inline int grid_type_vertices(int cell_type)
 {
     switch (cell_type) {
@@ -203,7 +212,8 @@ static inline int grid_type_vertices(int cell_type)
     }
 }
 
-/* Checks whether cells of the type are two-dimensional. Such cells have no volume, and outer surfaces show them. */
+/* Returns whether cells of the type are two-dimensional. Such cells (shells) have no volume, and outer surfaces show
+ * them. */
 static inline bool grid_is_shell_type(int cell_type)
 {
     return cell_type == GRID_TRIANGLE || cell_type == GRID_QUAD || cell_type == GRID_POLYGON;
@@ -219,7 +229,7 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
-/* Returns the axis along which the numbers of cells are successive, or -1. */
+/* Returns the axis along which cell numbers are consecutive, or -1 if there is none. */
 static inline int grid_lattice_row_axis(const grid_lattice *l)
 {
     for (int axis = 0; axis < 3; axis++)
@@ -235,7 +245,7 @@ static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
     return first;
 }
 
-/* Checks whether the number belongs to a cell; else it is padding. */
+/* Returns whether the number is that of a cell; otherwise it is padding. */
 static inline bool grid_lattice_has(const grid_lattice *l, int64_t cell)
 {
     int64_t number = 0;
@@ -247,7 +257,7 @@ static inline bool grid_lattice_has(const grid_lattice *l, int64_t cell)
     return number == cell;
 }
 
-/* Checks whether the number belongs to a cell outside of the ghost layers. */
+/* Returns whether the number is that of a cell outside the ghost layers. */
 static inline bool grid_lattice_draws(const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -272,35 +282,36 @@ static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertic
     return count;
 }
 
-/* Checks whether the grid may have polyhedra. */
+/* Returns whether the grid may contain polyhedra. */
 static inline bool grid_has_faces(const grid *g)
 {
     return g->face_offsets.data != 0;
 }
 
-/* Returns a polyhedron's faces, which are the entries [*first, *end) of connectivity. */
+/* Returns the range of a polyhedron's faces: the entries [*first, *end) of connectivity. */
 static inline void grid_cell_faces(const grid *g, int64_t cell, int64_t *first, int64_t *end)
 {
     *first = grid_array_index(&g->offsets, cell);
     *end = grid_offset_end(&g->offsets, cell);
 }
 
-/* Returns a face's vertices, which are the entries [*first, *end) of face_connectivity. */
+/* Returns the range of a face's vertices: the entries [*first, *end) of face_connectivity. */
 static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *first, int64_t *end)
 {
     *first = grid_array_index(&g->face_offsets, face);
     *end = grid_offset_end(&g->face_offsets, face);
 }
 
-/* An iteration over the vertices of a cell of any type. A vertex of a polyhedron is returned once for each of its faces
- * that contains it. */
+/* Iterates over the vertices of a cell of any type. A vertex of a polyhedron is returned once for each face that
+ * contains it. */
 typedef struct grid_walk {
     const grid *cells;
     bool is_polyhedron;
-    const int64_t *corner;       /* for a lattice: offsets from the cell's first vertex to each; else NULL */
-    int64_t base;                /* the cell's first vertex, for a lattice */
-    int64_t next, end;           /* entries of connectivity, or of corner */
-    int64_t face_next, face_end; /* entries of face_connectivity */
+    /* for a lattice: differences between the numbers of the cell's vertices and that of its first one; else NULL */
+    const int64_t *corner;
+    int64_t base;                /* for a lattice: the number of the cell's first vertex */
+    int64_t next, end;           /* next and last entry of connectivity, or of `corner` */
+    int64_t face_next, face_end; /* next and last entry of face_connectivity */
 } grid_walk;
 
 static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
@@ -346,7 +357,7 @@ static inline void grid_vertex(const grid *g, int64_t vertex, double position[3]
     for (int axis = 0; axis < 3; axis++) position[axis] = grid_array_number(&g->coordinates[axis], vertex);
 }
 
-/* Tells whether the flag of a cell is not 0. There are flags. */
+/* Returns whether the flag of a cell is nonzero. The grid must have flags. */
 static inline bool grid_is_flagged(const grid *g, int64_t cell)
 {
     const char *p = g->ghosts + cell * g->ghosts_stride;
@@ -360,7 +371,7 @@ static inline bool grid_is_ghost(const grid *g, int64_t cell)
     return g->lattice && g->lattice->has_ghosts && !grid_lattice_draws(g->lattice, cell);
 }
 
-/* Checks whether some cells may be ghosts. */
+/* Returns whether some cells may be ghosts. */
 static inline bool grid_has_ghosts(const grid *g)
 {
     return g->ghosts || (g->lattice && g->lattice->has_ghosts);
@@ -376,19 +387,19 @@ static inline bool grid_is_shell(const grid *g, int64_t cell)
     return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
 }
 
-/* Checks whether the cell is neither a ghost nor flat. Trees contain these cells. */
+/* Returns whether the cell is neither a ghost nor flat. Trees contain these cells. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
 }
 
-/* Checks whether the cell is drawn or is a shell. Pictures may show these cells. */
+/* Returns whether the cell is drawn or is a shell. Pictures may show these cells. */
 static inline bool grid_is_seen(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));
 }
 
-/* One component of the field, from tuple to tuple. */
+/* Returns one component of the field as an array over all tuples. */
 static inline grid_array grid_field_component(const grid_field *f, int component)
 {
     grid_array a = f->apart ? f->apart[component] : f->values;
@@ -411,15 +422,15 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
     return sqrt(sum);
 }
 
-/* Checks whether the cell's own value is finite, if the values at vertices were computed from cell values; else returns
- * true. */
+/* Returns whether the cell's own value is finite, if values at vertices were computed from cell values; otherwise
+ * returns true. */
 static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
 {
     return !f->own || isfinite(grid_field_value(f->own, cell));
 }
 
-/* Reads the values at the cell's vertices, or the cell's own value count times. Returns false if a value is NaN or
- * infinite: such a cell is not drawn. */
+/* Reads the values at the cell's vertices, or stores the cell's own value `count` times. Returns false if a value is
+ * NaN or infinite: such a cell is not drawn. */
 static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count,
                                     double *values)
 {

@@ -9,7 +9,7 @@
 
 /* The samples of an image's pixels sorted by depth, as in insitu_deep; only on rank 0, and all zero on other ranks. */
 typedef struct deep_image {
-    insitu_deep_sample *samples; /* may include samples that no longer belong to a pixel */
+    insitu_deep_sample *samples; /* samples of all pixels; some may not belong to any pixel */
     int64_t count, capacity;
     int64_t *first;   /* index of the first sample of each pixel */
     uint32_t *counts; /* number of samples of each pixel; may be 0 */
@@ -19,11 +19,11 @@ typedef struct image {
     int width;
     int height;
     float *rgba; /* row-major, height × width × 4, top row first, premultiplied, linear light */
-    /* row-major, height × width: fragment.t_in of the nearest surface hit, +infinity if there is none. NULL: not
-     * requested */
+    /* row-major, height × width: fragment.t_in of the nearest surface hit, +infinity if there is none. NULL: depth was
+     * not requested. */
     float *depth;
-    deep_image *deep; /* NULL on every rank: not requested */
-    bool is_folded;   /* made from fragments that ranks have folded (fragment_fold.h) */
+    deep_image *deep; /* NULL on every rank if the samples were not requested */
+    bool is_folded;   /* set if the image is made from fragments that ranks have folded (fragment_fold.h) */
 } image;
 
 #endif

@@ -10,10 +10,10 @@
 /* Returns 64-byte aligned memory, or NULL on failure. For 0 bytes it returns a pointer that may be freed. */
 void *base_alloc(size_t bytes);
 
-/* Same as base_alloc(), with all bytes 0. */
+/* Returns memory for count × size bytes, all 0, aligned to 64 bytes; NULL on failure. */
 void *base_calloc(size_t count, size_t size);
 
-/* base_reserve() reserves address space for bytes that are not counted yet, since memory that has not been written to
+/* base_reserve() reserves address space for bytes that are not counted yet, because memory that has not been written to
  * is not used. base_use() sets the number of bytes in use and counts them. base_realloc() before base_use() does not
  * keep the contents. */
 void *base_reserve(size_t bytes);
@@ -23,10 +23,11 @@ void base_use(void *block, size_t bytes);
  * block is allocated as by base_alloc(). */
 void *base_realloc(void *block, size_t bytes);
 
-/* block may be NULL. */
+/* Frees a block from these functions; NULL is allowed. */
 void base_free(void *block);
 
-/* A block that is divided into 64-byte aligned pieces; if begin is NULL, the pieces are only counted. */
+/* A block that is divided into pieces aligned to 64 bytes. If begin is NULL, the sizes of the pieces are only added
+ * up. */
 typedef struct base_carving {
     char *begin;
     size_t used;
@@ -37,12 +38,12 @@ void *base_carve(base_carving *from, size_t bytes);
 /* Returns a copy of a C string, or NULL on failure. */
 char *base_strdup(const char *text);
 
-/* Return the bytes that are allocated now, and the maximum since base_memory_reset_peak(). */
+/* Return the number of bytes that are allocated now, and the maximum since base_memory_reset_peak(). */
 int64_t base_memory_held(void);
 int64_t base_memory_peak(void);
 void base_memory_reset_peak(void);
 
-/* For tests: makes the n-th allocation from now on fail (1: the next one) and the following ones succeed; 0: none
+/* For tests: lets the n-th allocation from now on fail (1: the next one) and the following ones succeed; 0: none
  * fails. */
 void base_memory_fail_nth(int64_t n);
 

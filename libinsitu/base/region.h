@@ -17,7 +17,8 @@
 
 #include <stdint.h>
 
-/* The number of items (vertices, cells, pixels) per chunk if an item takes little work; a chunk takes about 10 µs. */
+/* Number of items (vertices, cells, pixels) per chunk of a loop if an item takes little work. A chunk then takes about
+ * 10 µs. */
 enum { REGION_ITEMS = 8192 };
 
 /* Gives a worker the default floating-point environment, and moves it off the core of the region's first thread. */

@@ -38,7 +38,8 @@ typedef __mmask16 vm;
 typedef vi vm;
 #endif
 
-/* (vf){0} + x would be wrong: compilers may not remove this addition, which turns -0 into 0. */
+/* Returns a vector with x in all lanes. (vf){0} + x would be wrong: compilers may not remove this addition, which turns
+ * -0 into 0. */
 SIMD_INLINE vf vf_set(float x)
 {
 #if defined(SIMD_AVX512)
@@ -73,7 +74,7 @@ SIMD_INLINE vf vf_from_bits(vi v)
     return (vf)v;
 }
 
-/* Rounds towards zero. */
+/* Converts to integers, rounding towards zero. */
 SIMD_INLINE vi vi_from_vf(vf v)
 {
     return __builtin_convertvector(v, vi);
@@ -112,7 +113,7 @@ SIMD_INLINE vm vm_xor(vm a, vm b)
 SIMD_INLINE vm vm_andnot(vm a, vm b)
 {
     return (vm)(a & ~b);
-} /* a and not b */
+} /* returns a and not b */
 SIMD_INLINE vm vm_none(void)
 {
     return 0;
@@ -289,7 +290,7 @@ SIMD_INLINE vf vf_select(vm m, vf a, vf b)
 SIMD_INLINE vf vf_min(vf a, vf b)
 {
     return vf_select(vf_lt(a, b), a, b);
-} /* b if either value is NaN, as on x86 */
+} /* returns b if either value is NaN, as on x86 */
 SIMD_INLINE vf vf_max(vf a, vf b)
 {
     return vf_select(vf_lt(b, a), a, b);
@@ -369,7 +370,7 @@ SIMD_INLINE vf vf_permute_pair(vf first, vf second, vi index)
 #endif
 }
 
-/* Gathers base[index] and base[index + 1]. */
+/* Gathers base[index] into *first and base[index + 1] into *second. */
 SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *second)
 {
 #if defined(SIMD_AVX512)
@@ -385,8 +386,8 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* Stores indices for scalar loads. Without this function compilers extract each index from the vector, which takes two
- * instructions per lane. */
+/* Stores indices in an array for scalar loads. Without this function compilers extract each index from the vector,
+ * which takes two instructions per lane. */
 SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
 {
     memcpy(out, &a, sizeof a);
@@ -597,8 +598,8 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
-/* Same as vf_min() and vf_max() for single numbers: the result is b if either is NaN. fminf() has another rule for NaN
- * and takes more than one instruction. */
+/* Return the minimum and maximum of single numbers by the rule of vf_min() and vf_max(): the result is b if either is
+ * NaN. fminf() has another rule for NaN and takes more than one instruction. */
 SIMD_INLINE float simd_min(float a, float b)
 {
     return a < b ? a : b;

@@ -16,7 +16,7 @@ void c_numbers_end(c_numbers *numbers)
     freelocale(numbers->own);
 }
 
-/* Calls write() into memory, with numbers in the C locale. *text must be freed with free(). */
+/* Calls write() with a stream into memory, with numbers in the C locale. The caller must free *text with free(). */
 static bool print(text_writer *write, const void *what, char **text, size_t *size)
 {
     c_numbers numbers;

@@ -1,4 +1,4 @@
-/* Text files whose numbers have a decimal point, independent of the locale that the simulation has set. */
+/* Writes text files whose numbers have a decimal point, independent of the locale that the simulation has set. */
 #ifndef BASE_TEXT_FILE_H
 #define BASE_TEXT_FILE_H
 
@@ -22,11 +22,11 @@ typedef void text_writer(FILE *file, const void *what);
 /* Replaces a file as file_replace() does; its text is the output of write(), with numbers in the C locale. */
 bool text_file_replace(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Appends to a file as file_append() does. */
+/* Appends the output of write() to a file, like file_append(), with numbers in the C locale. */
 bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Keeps only the lines that begin with a whole number below number, and moves them to the beginning of text. Returns
- * the number of bytes that they take. An incomplete last line is dropped. */
+/* Removes all lines except those that begin with a whole number below `number`, and moves these to the begin of the
+ * text. Returns the number of bytes that they take. An incomplete last line is removed. */
 size_t text_keep_below(char *text, long long number);
 
 #endif

@@ -1,4 +1,4 @@
-/* Products and lengths of vectors of three numbers. */
+/* Computes products and lengths of vectors of three numbers. */
 #ifndef BASE_VECTOR3_H
 #define BASE_VECTOR3_H
 
@@ -9,7 +9,7 @@ static inline double vector3_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* out must be neither a nor b. */
+/* Computes the cross product a × b. out must be neither a nor b. */
 static inline void vector3_cross(const double a[3], const double b[3], double out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
@@ -17,7 +17,7 @@ static inline void vector3_cross(const double a[3], const double b[3], double ou
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Returns the length, which is correct even if the squares overflow. */
+/* Returns the length of v, which is correct even if squares overflow. */
 static inline double vector3_length(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);

@@ -90,7 +90,7 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
     c->first[c->face_count] = c->entry_count = entry;
 }
 
-/* ---- turning alike -------------------------------------------------------------------------------------------- */
+/* ---- consistent orientation -------------------------------------------------------------------------------------- */
 
 static int side_end(const closed_faces *c, int side)
 {
@@ -193,7 +193,7 @@ bool closed_face_is_patch(const closed_faces *c, int face, const double (*positi
     return !polygon_is_concave_quad((const double(*)[3])corners);
 }
 
-/* ---- turning outward ------------------------------------------------------------------------------------------ */
+/* ---- outward orientation ----------------------------------------------------------------------------------------- */
 
 /* Returns six times the volume of the tet with the centre, whose sign follows from the order a, b, c. */
 static double tet_volume(const double (*p)[3], const int *v, const double *centre)
@@ -205,7 +205,7 @@ static double tet_volume(const double (*p)[3], const int *v, const double *centr
            d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
-/* Checks whether the ray from p in the negative x direction crosses the triangle. A corner at the same height as p
+/* Returns whether the ray from p in the negative x direction crosses the triangle. A corner at the same height as p
  * counts as above it. If the projection of the triangle is a line, the ray does not cross it. */
 static bool crosses_below(const double *const t[3], const double *p)
 {
@@ -227,7 +227,7 @@ static bool crosses_below(const double *const t[3], const double *p)
     return t[0][0] - (n[1] * (p[1] - t[0][1]) + n[2] * (p[2] - t[0][2])) / n[0] < p[0];
 }
 
-/* Checks whether the piece lies inside an odd number of other pieces. The test starts at the piece's smallest vertex,
+/* Returns whether the piece lies inside an odd number of other pieces. The test starts at the piece's smallest vertex,
  * because the piece itself has no points at smaller x. */
 static bool is_cavity(const closed_faces *c, const double (*positions)[3], int piece)
 {
@@ -254,7 +254,7 @@ void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], co
     }
     for (int piece = 0; piece < c->piece_count; piece++) {
         const bool is_turned = c->piece_count > 1 && is_cavity(c, positions, piece);
-        /* from here on, the sign by which the piece is turned */
+        /* replaces the volume by the sign with which the piece is oriented */
         c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_turned ? -1 : 1;
     }
     for (int face = 0; face < c->face_count; face++) c->turn[face] *= (int)c->piece_volume[c->piece[face]];

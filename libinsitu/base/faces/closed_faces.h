@@ -13,7 +13,7 @@
 #include "grid.h"
 
 typedef struct closed_triangle {
-    int vertex[3]; /* in increasing order */
+    int vertex[3]; /* numbers of the vertices, in increasing order */
     int face;
     int turn;      /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
     double volume; /* six times the volume of the tet with the centre; positive if the triangle is seen from inside */
@@ -21,22 +21,24 @@ typedef struct closed_triangle {
 
 /* An edge of the faces, with the sides that run along it. */
 typedef struct closed_edge {
-    int low, high; /* vertices; low is -1 in an unused entry */
-    int side[2];   /* entries at which the sides begin; -1: none */
+    int low, high; /* numbers of the two vertices; low is -1 in an unused entry */
+    int side[2];   /* entries at which the sides along the edge begin; -1: there is none */
 } closed_edge;
 
-/* An entry is a vertex of a face; a side connects an entry with the next entry of the face. */
+/* The faces of a polyhedron as lists of entries. An entry is a vertex of a face; a side connects an entry with the next
+ * entry of the face. */
 typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
-    int *first;        /* face_count + 1 elements: the first entry of each face */
-    int *entry;        /* number of each entry's vertex */
+    int *first;        /* first entry of each face; face_count + 1 elements */
+    int *entry;        /* vertex number of each entry */
     int *face_of;      /* face of each entry */
     int64_t *vertices; /* index in the grid of each numbered vertex */
-    /* 1 or -1 per face; after closed_faces_turn_outward(), 1 if the face's vertices run around the outward normal */
+    /* 1 or -1 per face: whether it is reversed; after closed_faces_turn_outward(), 1 if the face's vertices run around
+     * the outward normal */
     int *turn;
-    int *piece; /* index of the connected piece of each face */
+    int *piece; /* number of the connected piece to which each face belongs */
     closed_triangle *triangles;
-    closed_edge *edges; /* hash table of 2 * table_size entries */
+    closed_edge *edges; /* hash table of edges with 2 * table_size entries */
     /* Work space of the functions below. */
     double (*corners)[3];
     int (*cuts)[3];
@@ -49,8 +51,8 @@ typedef struct closed_faces {
 /* Counts faces and entries. Returns false if their number exceeds int. */
 bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
 
-/* Places the arrays in memory of 64-byte alignment and returns the number of bytes that they take. If room is NULL,
- * only the size is returned. */
+/* Places the arrays in `room`, which must be aligned to 64 bytes, and returns the number of bytes that they take. If
+ * room is NULL, only the size is computed. */
 size_t closed_faces_lay_out(closed_faces *c, char *room);
 
 /* Reads the faces, and numbers the vertices in the order in which they appear. Repeated successive vertices of a face
@@ -68,11 +70,12 @@ void closed_faces_cut(closed_faces *c, const double (*positions)[3]);
 /* Computes the volumes of the triangles, and orients the pieces outward. */
 void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], const double centre[3]);
 
-/* Checks whether the face is intersected as a bilinear patch: it has four vertices, and none of its corners is concave.
- * Any other face is intersected as its triangles. */
+/* Returns whether the face is intersected as a bilinear patch: it has four vertices, and none of its corners is
+ * concave. Any other face is intersected as its triangles. */
 bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3]);
 
-/* Clear the hash table of edges, and find the index of an edge in it. A new edge has no sides. */
+/* closed_edges_empty() clears the hash table of edges. closed_edges_find() returns the index of the edge between two
+ * vertices, which is added without sides if it is new. */
 void closed_edges_empty(closed_faces *c);
 int closed_edges_find(closed_faces *c, int a, int b);
 

@@ -10,18 +10,18 @@
  * coordinates. */
 static const double fan_slack = 0x1p-20;
 
-/* The area below which three corners of a polygon of width about 1 count as collinear. Projected positions have errors
- * of a few 2^-53; areas have errors of about ten times as much. */
+/* Area below which three corners of a polygon of width about 1 count as collinear. Projected positions have errors of a
+ * few 2^-53; areas have errors of about ten times as much. */
 static const double line_slack = 0x1p-46;
 
-/* The corners, numbered by their rank in the order of cutting. */
+/* The corners of a polygon, numbered by their rank in the order of cutting. */
 typedef struct polygon_work {
     int count;
-    int step; /* 1 if the order runs in the direction of the list, else -1 */
+    int step; /* 1 if that order runs in the direction of the caller's list, else -1 */
     int *order;
     double (*places)[3]; /* positions relative to the smallest corner, scaled to a width of about 1 */
-    double (*flat)[2];   /* projection along the normal, in which the order runs counterclockwise */
-    int *next, *before;  /* doubly linked list of the remaining corners */
+    double (*flat)[2];   /* projection of the corners along the normal, in which the order runs counterclockwise */
+    int *next, *before;  /* doubly linked list of the corners that have not been cut off */
     char *is_ear;
     int (*triangles)[3];
     int triangle_count;
@@ -45,7 +45,8 @@ static polygon_work lay_out(int count, char *room, int (*triangles)[3])
     return w;
 }
 
-/* ---- the order ------------------------------------------------------------------------------------------------ */
+/* ---- the order of corners
+ * ----------------------------------------------------------------------------------------- */
 
 static int compare_places(const double a[3], const double b[3])
 {
@@ -100,7 +101,8 @@ static bool find_places(polygon_work *w, const double (*p)[3])
 
 /* ---- fans ----------------------------------------------------------------------------------------------------- */
 
-/* Checks whether a fan cuts the polygon. The length of the normal is twice the area. */
+/* Returns whether the polygon can be cut into a fan from its first corner. *normal: the polygon's normal, whose length
+ * is twice the area. */
 static bool is_fan(const polygon_work *w, double normal[3])
 {
     double area[3];
@@ -117,7 +119,7 @@ static bool is_fan(const polygon_work *w, double normal[3])
     return true;
 }
 
-/* Checks whether exactly one of four corners is concave. */
+/* Returns whether exactly one of four corners is concave. */
 static bool is_concave_quad(const polygon_work *w)
 {
     double areas[4][3], normal[3] = {0, 0, 0}, sides[4][3];
@@ -178,8 +180,8 @@ static bool are_together(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Checks whether the polygon, if it passes the position of the tip again, enters or leaves the corner at the tip
- * there. */
+/* Returns whether the polygon, if it passes the position of the tip a second time, enters or leaves the corner at the
+ * tip there. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->before[again], w->next[again]};
@@ -205,7 +207,7 @@ static bool is_ear(const polygon_work *w, int tip)
     return true;
 }
 
-/* Returns the first ear after the first corner, which is checked last, or -1 if there is none. */
+/* Returns the first ear in the order of corners after the first corner, which is tested last; -1 if there is none. */
 static int find_ear(const polygon_work *w, int first)
 {
     int i = first;
@@ -216,7 +218,8 @@ static int find_ear(const polygon_work *w, int first)
     return -1;
 }
 
-/* Recomputes all ears: a corner may have become an ear because the corner that blocked it has been cut off. */
+/* Tests all corners again and returns an ear: a corner may have become one because the corner that blocked it has been
+ * cut off. */
 static int find_ear_anew(polygon_work *w, int first)
 {
     int i = first;
@@ -225,7 +228,7 @@ static int find_ear_anew(polygon_work *w, int first)
     return find_ear(w, first);
 }
 
-/* Returns a corner that is collinear with its neighbours. */
+/* Returns a corner that is collinear with its two neighbours. */
 static int find_straight(const polygon_work *w, int first)
 {
     int i = first;

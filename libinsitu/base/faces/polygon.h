@@ -15,14 +15,14 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Returns the number of bytes of 8-byte aligned memory that a polygon of count corners needs. */
+/* Returns the number of bytes, aligned to 8, of work space for a polygon of `count` corners. */
 size_t polygon_room(int count);
 
 /* Cuts a polygon of count corners, at least 3, into count - 2 triangles of corner numbers, each of which runs in the
  * direction of the polygon. Triangles of coincident or collinear corners may have no area. */
 void polygon_cut(const double (*corners)[3], int count, void *room, int (*triangles)[3]);
 
-/* Checks whether four corners form a quad with exactly one concave corner. A quad that crosses itself has none; all
+/* Returns whether four corners form a quad with exactly one concave corner. A quad that crosses itself has none; all
  * quads except concave ones are cut into a fan. */
 bool polygon_is_concave_quad(const double (*corners)[3]);
 
