@@ -17,7 +17,8 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
 
 /* ---- visible values --------------------------------------------------------------------------------------------- */
 
-/* Returns whether the scalar already has the interval: the images of a sweep over fields share their isosurfaces. */
+/* Returns whether the scalar already has the interval. It may, because the images of a sweep over fields share their
+ * isosurfaces. */
 static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
@@ -65,7 +66,8 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
     return !scalar || add_volume(scalar, layer);
 }
 
-/* Marks a plane. Its isovalue is 0 or very small: see session_slice_distance(). */
+/* Marks the scalar of distances from a plane, with its isovalue, which is 0 or very small
+ * (session_slice_distance()). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

@@ -1,5 +1,5 @@
-/* Candidates: the cells that the due images can show, determined by the values that these show. A partial tree contains
- * only the candidates. */
+/* Determines the candidates: the cells that the due images can show, judged by the cells' values. A partial tree
+ * contains only the candidates. */
 #ifndef SESSION_CANDIDATES_H
 #define SESSION_CANDIDATES_H
 
@@ -12,10 +12,10 @@
 bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
                         const session_extent *extent);
 
-/* Returns false if values alone do not determine which cells may be visible, so that any may be. Else *key is a hash of
- * everything besides values that determines the candidates: the scalars and their intervals. */
+/* Returns false if values alone do not determine which cells may be visible, so that any may be. Otherwise *key is a
+ * hash of everything except the values themselves that determines the candidates: the scalars and their intervals. */
 bool session_find_candidates(const session_mesh *mesh, uint64_t *key);
-/* Selects the candidates and sets the scalars' counts of unusable cells. Parallel. Local. */
+/* Selects the candidates and counts, per scalar, the cells whose values are not finite. Parallel. Local. */
 insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error);
 
 #endif

@@ -1,9 +1,8 @@
-/* Derived fields are computed in order, each after the fields on which it depends:
- *
+/* Derived fields are computed in their order, each after the fields on which it depends:
  *     cells' values that are needed at vertices  ->  session_recentre()
  *     an expression:  blocks of vertices or cells, each instruction for a whole block
  *     a gradient, or a quantity computed from one:  sums over the cells around each vertex and over all ranks
- *         (session_vertex_sums.h), over all meshes that have the field as one, so that blocks show no seam
+ *         (session_vertex_sums.h), over all meshes that share the field, so that blocks show no seam
  *
  * The values are copies owned by the session, packed, with 4 bytes if all values on which they depend have 4, else with
  * 8. A hash of the versions of these values determines whether the copies are up to date; they are recomputed if it has
@@ -26,19 +25,19 @@
 
 enum { SPACE = 3 };
 
-/* Data of the computation of one derived field. */
+/* The data for computing one derived field. */
 typedef struct derive_work {
     const session_derive_basis *basis;
     const scene_derived *derived;
     int number;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale; /* nonzero for each recentring or mesh that is out of date */
+    int *stale; /* per recentring or mesh: nonzero if its values are out of date */
 } derive_work;
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
 
-/* Returns the field on the mesh over all ranks; NULL if the mesh does not have it, or it has a fault. */
+/* Returns the derived field on the mesh, as all ranks know it; NULL if the mesh does not have it, or it has a fault. */
 static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
@@ -46,15 +45,13 @@ static const session_catalogue_field *find_field(const derive_work *w, const ses
     return NULL;
 }
 
-/* Visits this rank's parts of a mesh with the field.
- *
- *     for (part_visit v = visit_parts(w, mesh); next_part(w, &v);) use(v.part, v.index);
- */
+/* Iterates over this rank's parts of a mesh that have the field:
+ *     for (part_visit v = visit_parts(w, mesh); next_part(w, &v);) use(v.part, v.index); */
 typedef struct part_visit {
     session_parts parts;
     int next;
     session_mesh *part;
-    int index; /* of the field on it */
+    int index; /* index of the field in the part's list of fields */
 } part_visit;
 
 static part_visit visit_parts(const derive_work *w, const session_catalogue_mesh *mesh)
@@ -74,13 +71,13 @@ static bool next_part(const derive_work *w, part_visit *v)
     return false;
 }
 
-/* Returns the input's component, as grid_field.component. */
+/* Returns the number of the input's component, in the format of grid_field.component. */
 static int component_of(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
 
-/* Returns whether values of this input on the mesh are first recentred to vertices. */
+/* Returns whether the values of this input on the mesh must first be recentred to vertices. */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find(mesh, input->name);
@@ -92,7 +89,7 @@ static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *
     return session_joint_name(mesh, input->joined);
 }
 
-/* ---- cells' values, recentred to vertices ---------------------------------------------------------------------- */
+/* ---- cell values recentred to vertices ------------------------------------------------------------------------- */
 
 /* Adds a scalar for the recentred values to one of this rank's parts of the mesh. */
 static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, const scene_field *input, int component)
@@ -174,7 +171,8 @@ static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh 
     return hash | 1;
 }
 
-/* Finds the meshes on which the values are stale on some rank. *error may hold an earlier error. Collective, agreed. */
+/* Finds the meshes on which the values are out of date on some rank. *error may hold an earlier error of this rank.
+ * Collective, agreed. */
 static insitu_status find_stale(derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
@@ -193,7 +191,7 @@ static insitu_status find_stale(derive_work *w, base_error *error)
 
 /* ---- values of one mesh ------------------------------------------------------------------------------------------ */
 
-/* Returns the values of an input, or of one of its components, at the derived field's centring. */
+/* Returns the values of an input, or of one of its components, at vertices or cells, as the derived field is. */
 static grid_field input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                                int input, int component)
 {
@@ -213,7 +211,7 @@ static int64_t place_count(const session_mesh *part, const session_field *field)
     return field->given.centring == INSITU_CELL ? part->cells.cell_count : session_vertex_count(part);
 }
 
-/* Allocates the values, unless they have the right size. */
+/* Allocates memory for the values, unless it already has the right size. */
 static bool make_room(const derive_work *w, session_mesh *part, session_field *field)
 {
     bool is_wide = false;
@@ -242,7 +240,7 @@ static void store(const session_field *field, int64_t place, const double *value
             ((float *)(void *)field->copy)[place * count + c] = (float)values[c];
 }
 
-/* Records that the values are new, for scalars and for fields that depend on them. */
+/* Records that the values are new, for the scalars and fields that depend on them. */
 static void note_values(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
 {
     session_spoil_scalars(part, index);
@@ -271,10 +269,10 @@ static void load_block(const grid_field *field, int64_t first, int count, double
         for (int i = 0; i < count; i++) out[i] = (double)*(const float *)(const void *)(data + i * stride);
 }
 
-/* A thread's buffers for a block. */
+/* The buffers of a thread for one block of points. */
 typedef struct block_room {
     const double **inputs;
-    double *values; /* values of the inputs, followed by the stack */
+    double *values; /* values of the inputs, followed by the program's stack */
 } block_room;
 
 static bool rooms_create(const scene_derived *derived, int threads, block_room **out)
@@ -365,7 +363,7 @@ static int keep_component(int component, const double vector[3], double *out)
     return component == SCENE_COMPONENT_DEFAULT ? SPACE : 1;
 }
 
-/* Computes the values at a vertex from the gradient of each component. */
+/* Computes the derived values at a vertex from the gradients of the components there. */
 static void make_values(const scene_derived *derived, const double gradient[SPACE][SPACE], double out[SPACE])
 {
     double curl[SPACE];
@@ -403,7 +401,8 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
     }
 }
 
-/* Lists the scalars whose gradients are computed. A vector with two components has none along z. */
+/* Lists the scalars whose gradients are computed: a vector's components, of which a vector with two has none along
+ * z. */
 static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                         grid_field out[SESSION_GRADIENTS])
 {
@@ -416,8 +415,8 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     return count;
 }
 
-/* Returns the first of the joint's meshes on which the field has no fault. On all such meshes the vector has the same
- * number of components. */
+/* Returns the first of the joint's meshes on which the field has no fault. The vector has the same number of components
+ * on all such meshes. */
 static const session_catalogue_mesh *first_sound(const derive_work *w, const session_joint *joint)
 {
     int i = 0;
@@ -425,7 +424,7 @@ static const session_catalogue_mesh *first_sound(const derive_work *w, const ses
     return i < joint->count ? joint->meshes[i] : NULL;
 }
 
-/* Returns the number of scalars; ranks without a part of a mesh need it, too. */
+/* Returns the number of scalars whose gradients are computed; ranks without a part of a mesh need it, too. */
 static int count_scalars(const derive_work *w, const session_joint *joint)
 {
     if (!session_takes_vector(w->derived)) return w->derived->input_count;

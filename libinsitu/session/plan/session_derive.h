@@ -6,7 +6,7 @@
 #include "session_catalogue.h"
 #include "session_space.h"
 
-/* Input of the values; the same on every rank except for its own meshes. */
+/* The input of the computation; it is the same on every rank except for the rank's own meshes. */
 typedef struct session_derive_basis {
     const scene *scene;
     session_catalogue *catalogue;
@@ -15,8 +15,9 @@ typedef struct session_derive_basis {
     const session_extent *extent;
 } session_derive_basis;
 
-/* Computes the values of the needed derived fields, a bit each, that are stale on any rank. The fields on which they
- * depend must have been filled and copied, and must be in `needed`, too, if they are derived. Collective, agreed. */
+/* Computes the values of derived fields that are out of date on any rank. needed: one bit per derived field. The fields
+ * on which they depend must have been filled and copied, and must be in `needed`, too, if they are derived. Collective,
+ * agreed. */
 insitu_status session_derive(const session_derive_basis *basis, uint64_t needed, base_error *error);
 
 #endif

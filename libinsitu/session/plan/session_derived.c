@@ -26,7 +26,7 @@ static uint64_t bit_of(const scene *scene, const scene_field *field)
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 
-/* Adds the fields on which the needed ones depend, which come before them. */
+/* Adds to the set of needed fields those on which they depend, which come before them in the list. */
 static uint64_t with_sources(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
@@ -81,10 +81,10 @@ void session_mark_sources(const scene *scene, uint64_t needed, const session_mes
 typedef struct derived_place {
     const char *scene_path;
     const scene_derived *derived;
-    const session_catalogue_mesh *mesh, *first_mesh; /* first_mesh: of the catalogue */
+    const session_catalogue_mesh *mesh, *first_mesh; /* first_mesh: first mesh of the catalogue */
 } derived_place;
 
-/* Begins a message: "scene.yaml:3: fields.q.vorticity". */
+/* Begins a message with the place of the derived field, such as "scene.yaml:3: fields.q.vorticity". */
 #define AT "%s:%d: fields.%.200s%s%s: "
 #define OF(place)                                                                                                      \
     (place)->scene_path, (place)->derived->line, (place)->derived->name, *(place)->derived->key ? "." : "",            \
@@ -104,7 +104,7 @@ static insitu_status refuse_components(const derived_place *at, const scene_fiel
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-/* Checks that vectors on meshes that are joined have the same number of components. */
+/* Checks that a vector has the same number of components on all meshes that are joined. */
 static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {
@@ -156,7 +156,7 @@ static insitu_status check_input(const derived_place *at, const scene_field *inp
     return check_components(at, input, found, error);
 }
 
-/* ---- names in the catalogue ------------------------------------------------------------------------------------ */
+/* ---- derived fields in the catalogue --------------------------------------------------------------------------- */
 
 static bool keep_fault(session_catalogue_field *field, const base_error *error)
 {
@@ -203,7 +203,7 @@ static bool name_in_catalogue(const scene *scene, const char *scene_path, sessio
     return true;
 }
 
-/* ---- fields of this rank's meshes ------------------------------------------------------------------------------ */
+/* ---- derived fields of this rank's meshes ---------------------------------------------------------------------- */
 
 static bool is_sound(const session_catalogue_field *field)
 {

@@ -1,5 +1,5 @@
-/* Derived fields: fields that the session computes from the caller's, as the scene defines them. They are stored among
- * the fields of the meshes and of the catalogue; layers, statistics and conditions use them like other fields. */
+/* Adds derived fields, which the session computes from the caller's fields as the scene defines them. They are stored
+ * among the fields of the meshes and of the catalogue; layers, statistics and conditions use them like other fields. */
 #ifndef SESSION_DERIVED_H
 #define SESSION_DERIVED_H
 
@@ -13,18 +13,20 @@
 insitu_status session_name_derived(const scene *scene, const char *scene_path, session_catalogue *catalogue,
                                    session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Return the derived fields, a bit each, that the images of the plan need, or the statistics and conditions of a step,
- * including those on which they depend. images: conditions count. Local, the same on all ranks. */
+/* Return the sets of derived fields, one bit each, that the images of the plan need, or that the statistics and
+ * conditions of a step need, including the fields on which they depend. images: whether conditions count. Local, the
+ * same on all ranks. */
 uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan);
 uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images);
 
-/* Marks on this rank's meshes the fields on which the derived ones depend, so that they are filled and copied. */
+/* Marks on this rank's meshes the fields on which the needed derived fields depend, so that they are filled and
+ * copied. */
 void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes);
 
 /* Returns whether the field is computed from one vector, by the gradients of its components. */
 bool session_takes_vector(const scene_derived *derived);
 
-/* Returns the field's index among the scene's derived fields; -1 if it is not derived. */
+/* Returns the index of a field among the scene's derived fields; -1 if it is not one of them. */
 int session_find_derived(const scene *scene, const char *name);
 
 #endif

@@ -1,5 +1,6 @@
-/* Trees have the ranges of their cells' values, rounded outward to float32. If the layer shows some value within these,
- * it is not empty. Otherwise the range of all cells is computed, once, and decides. */
+/* Finds layers that show nothing. Trees know the ranges of their cells' values, rounded outward to float32. If a layer
+ * shows no value within these ranges, it may be empty; then the exact range of all cells is computed, once, and
+ * decides. */
 #include "session_empty_layers.h"
 
 #include <math.h>
@@ -13,32 +14,34 @@
 #include "session_transfer.h"
 #include "session_unusable.h"
 
-/* The minimum and the negated maximum, so that one reduction by minimum computes both. */
+/* The minimum and the negated maximum of a range, so that one reduction by minimum computes both. */
 typedef struct field_range {
     double low, minus_high;
 } field_range;
 
 static const field_range no_range = {INFINITY, INFINITY};
 
-/* A layer of the plan that may be empty. One of the three pointers to layers is set. */
+/* A layer of the plan that may be empty. One of its three pointers to layers is set. */
 typedef struct planned_layer {
     const scene_image *image;
     const scene_isosurface *isosurface;
     const scene_volume *volume;
-    const scene_surface *surface; /* has a threshold */
-    int number;                   /* number of its first warning */
-    field_range range;            /* for a surface: 0 if any cell is within the threshold, else empty */
-    bool is_empty;                /* of a surface: it is empty */
-    bool is_news;                 /* by the trees it seems to show nothing, and no warning has been reported yet */
+    const scene_surface *surface; /* a surface with a threshold */
+    int number;                   /* number of the layer's first warning */
+    /* range of the layer's values; for a surface, low is 0 if some cell is within the threshold */
+    field_range range;
+    bool is_empty; /* set if the surface is empty */
+    /* set if the layer shows nothing according to the trees, and no warning has been reported yet */
+    bool is_news;
 } planned_layer;
 
 /* ---- layers ---------------------------------------------------------------------------------------------------- */
 
-/* Number of layers that are processed at a time, on the stack. */
+/* Number of layers that are processed at a time; it limits the memory on the stack. */
 enum { WINDOW = 128 };
 
 typedef struct layer_window {
-    int first, next; /* numbers of layers: the first in the window, and the next to be listed */
+    int first, next; /* number of the first layer in the window, and of the next one to be listed */
     int count;
     planned_layer layers[WINDOW];
 } layer_window;
@@ -73,8 +76,9 @@ static void list_thresholds(const scene_image *image, layer_window *window)
             list_layer(window, (planned_layer){.image = image, .surface = &image->surfaces[n], .number = n});
 }
 
-/* Lists the layers of the window; returns how many there are in all. Views of an image share their layers, fields of a
- * sweep its isosurfaces, isovalues its volumes, planes both, all of them its thresholds. */
+/* Lists the layers of the window, and returns the number of all layers. Each layer is listed once: views of an image
+ * share their layers, pictures of a sweep over fields share the isosurfaces, those of a sweep over isovalues the
+ * volumes, those of a sweep over planes both, and all of them share the thresholds. */
 static int list_layers(const session_plan *plan, layer_window *window)
 {
     for (int i = 0; i < plan->image_count; i++) {
@@ -109,7 +113,7 @@ static void take_root(const session_mesh *mesh, const session_scalar *scalar, fi
     take((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* kind: of the cells. */
+/* Widens the range by the values of cells of this kind, which are computed if necessary. */
 static void take_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                         field_range *range)
 {
@@ -135,7 +139,8 @@ static field_range own_range(const session_meshes *meshes, const planned_layer *
         if (layer->surface && !of_all_cells)
             take_faces(mesh, layer->surface, &range);
         else if (scalar && layer->isosurface && mesh->has_shells_alone)
-            take_extent(mesh, scalar, threads, SESSION_SEEN, &range); /* shells have no tree */
+            /* shells are in no tree, so their values are read */
+            take_extent(mesh, scalar, threads, SESSION_SEEN, &range);
         else if (scalar && of_all_cells)
             take_extent(mesh, scalar, threads, SESSION_SOLID, &range);
         else if (scalar)
@@ -144,14 +149,14 @@ static field_range own_range(const session_meshes *meshes, const planned_layer *
     return range;
 }
 
-/* Further data in the reduction. */
+/* Further data that is part of the reduction. */
 typedef struct layer_news {
-    bool has_other_cells; /* some rank has cells that are not shown; see session_unusable.h */
-    int telling;          /* maximum of session_telling_word() */
+    bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
+    int telling;          /* maximum of all ranks' session_telling_word() */
 } layer_news;
 
-/* Reduces the ranges over all ranks, together with earlier errors and the news; after an error the rest is undefined.
- * Collective. */
+/* Reduces the layers' ranges over all ranks, together with earlier errors and the news; after an error the rest is
+ * undefined. Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_window *window,
                                    bool of_all_cells, layer_news *news, base_error *error)
 {
@@ -178,8 +183,8 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 
 /* ---- empty layers ---------------------------------------------------------------------------------------------- */
 
-/* Returns the warning's subject. In a sweep over isovalues each picture has one isovalue, whose number is that in the
- * file. */
+/* Returns the identity of the layer's warning. In a sweep over isovalues each picture has one isovalue, whose number is
+ * that in the file. */
 static session_warning warning_of(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
@@ -204,8 +209,8 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     return true;
 }
 
-/* Returns the trees' range with its minimum raised by the rounding to float32, by which the true minimum may be
- * larger. */
+/* Returns the trees' range with its minimum raised by the rounding to float32, because the true minimum may be that
+ * much larger. */
 static field_range least_of_trees(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
@@ -217,7 +222,7 @@ static int value_count(const planned_layer *layer)
     return layer->isosurface ? layer->isosurface->value_count : 1;
 }
 
-/* Returns whether the layer, or this isovalue of it, shows no value of the range. */
+/* Returns whether the layer, or its isovalue number `value`, shows no value of the range. */
 static bool shows_nothing(const planned_layer *layer, int value, const field_range *range)
 {
     if (layer->isosurface) return is_outside(layer->isosurface->values[value], range);
@@ -272,7 +277,7 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
                  -layer->range.minus_high);
 }
 
-/* Warns of an empty layer. If there is no value at all, other warnings give the reason. */
+/* Warns of an empty layer. If the field has no value at all, other warnings give the reason. */
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {
     const bool has_values = layer->range.low <= -layer->range.minus_high || !layer->is_news;

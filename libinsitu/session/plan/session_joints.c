@@ -5,9 +5,9 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* The purpose for which meshes are joined: a layer's field, or the gradients of a derived field. */
+/* The purpose for which meshes are joined: either a layer's field, or the gradients of a derived field. */
 typedef struct join_wish {
-    const scene_field *field; /* NULL: derived is set */
+    const scene_field *field; /* field of a layer; NULL if `derived` is set */
     int derived;
 } join_wish;
 
@@ -50,7 +50,7 @@ static bool set_apart(session_catalogue *catalogue, session_catalogue_mesh *mesh
     return true;
 }
 
-/* Computes the name of the meshes' joint, without meshes with ids, and adds the joint if it is new. */
+/* Computes the name of the joint of all meshes of the wish that have no global ids, and adds the joint if it is new. */
 static bool join(session_catalogue *catalogue, const join_wish *wish, uint64_t *joined)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -93,7 +93,7 @@ static bool join_derived(session_catalogue *catalogue, scene *scene, int number)
     return is_done;
 }
 
-/* Adds meshes with ids as joints by themselves. Tells each part whether any block of its mesh is refined. */
+/* Adds each mesh with global ids as a joint by itself. Stores in each part whether any block of its mesh is refined. */
 static void find_apart(session_catalogue *catalogue, const session_meshes *meshes)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {

@@ -23,7 +23,7 @@
 
 enum { NAMES_SIZE = 700 };
 
-/* Lists the existing names for a message. */
+/* Lists the existing fields' names for a message. */
 static void list_fields(const session_catalogue *catalogue, char names[NAMES_SIZE])
 {
     size_t size = 0;
@@ -45,7 +45,7 @@ static void list_meshes(const session_catalogue *catalogue, char names[NAMES_SIZ
     if (size == 0) snprintf(names, NAMES_SIZE, "none");
 }
 
-/* Returns the fault, or INSITU_OK if it is NULL. */
+/* Returns the fault's status and stores the fault in *error; returns INSITU_OK if it is NULL. */
 static insitu_status refuse_fault(const base_error *fault, base_error *error)
 {
     if (!fault) return INSITU_OK;
@@ -53,8 +53,8 @@ static insitu_status refuse_fault(const base_error *fault, base_error *error)
     return error->status;
 }
 
-/* Returns the fault of a mesh that the layer is on: the field that no mesh has may be on that one. NULL if there is
- * none. */
+/* Returns the fault of a mesh on which the layer is drawn, because a field that seems to be on no mesh may be on the
+ * faulty one. NULL if there is none. */
 static const base_error *find_hidden(const session_plan_basis *basis, const scene_field *field)
 {
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
@@ -71,7 +71,7 @@ static bool is_anywhere(const session_catalogue *catalogue, const char *name)
     return false;
 }
 
-/* Writes "did you mean" with the most similar field name; "" if none is similar. */
+/* Writes "did you mean" and the most similar field name; "" if none is similar. */
 static void word_meant(const session_catalogue *catalogue, const char *name, char words[300])
 {
     const char *candidates[256];
@@ -84,7 +84,7 @@ static void word_meant(const session_catalogue *catalogue, const char *name, cha
     if (meant) snprintf(words, 300, " (did you mean %.255s?)", meant);
 }
 
-/* Refuses a derived field that is on no mesh, because of an input that no mesh has. */
+/* Refuses a derived field that exists on no mesh, and names the input that no mesh has. */
 static insitu_status refuse_sources(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
@@ -118,7 +118,7 @@ static insitu_status refuse_missing(const session_plan_basis *basis, const scene
                      basis->scene_path, field->line, field->name, meant, names);
 }
 
-/* Checks that a mesh that the layer names exists, and has the field unless it has no cells anywhere. */
+/* Checks that a mesh that the layer names exists, and that it has the field unless it has no cells on any rank. */
 static insitu_status check_named_mesh(const session_plan_basis *basis, const scene_field *field, const char *name,
                                       base_error *error)
 {
@@ -164,13 +164,13 @@ static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_
     return INSITU_OK;
 }
 
-/* Returns the mesh's field if the layer shows it there, else NULL. */
+/* Returns the mesh's field if the layer is drawn on the mesh, else NULL. */
 static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
 {
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Checks that some mesh has the field, and that it has no fault on those that the layer is on. */
+/* Checks that some mesh has the field, and that it has no fault on the meshes on which the layer is drawn. */
 static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, const scene_field *layer,
                                  base_error *error)
 {
@@ -215,7 +215,7 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     }
 }
 
-/* on: has the meshes of the layer. */
+/* Checks the field of a layer's contour lines. on: the field that names the meshes of the layer. */
 static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
                                  base_error *error)
 {
@@ -272,7 +272,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 {
     bool is_planned = true;
     for (int i = 0; i < plan->image_count; i++) {
-        if (plan->images[i]->variant.view > 0) continue; /* its layers are those of view 0 */
+        if (plan->images[i]->variant.view > 0) continue; /* the layers of other views are those of view 0 */
         scene_field_walk walk = {.image = plan->images[i]};
         for (const scene_field *field; is_planned && (field = scene_next_field(&walk)) != NULL;)
             is_planned = walk.role == SCENE_THRESHOLD || add_recentrings(catalogue, plan, field);
@@ -283,8 +283,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* ---- all images ---------------------------------------------------------------------------------------------- */
 
-/* Returns the number of multiples of the interval up to the time. A time within rounding of a multiple counts, as steps
- * of 0.1 sum up to less. */
+/* Returns the number of multiples of the interval up to the time. A time within rounding of a multiple counts, because
+ * steps of 0.1 add up to slightly less. */
 static double intervals(double time, double interval)
 {
     const double count = time / interval;
@@ -298,7 +298,7 @@ static bool is_due(const scene_image *image, const session_moment *m)
     return image->every <= 1 || m->cycle % image->every == 0;
 }
 
-/* Returns whether any rank has cells or any mesh a fault. If not, fields are not required, and the picture is its
+/* Returns whether any rank has cells, or any mesh has a fault. If not, fields are not required, and the picture is its
  * background. */
 static bool has_anything(const session_plan_basis *basis)
 {
@@ -347,8 +347,8 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     }
 }
 
-/* Warns of meshes that have the layer but not the field of its lines. on: the layer's meshes, and unless it is an outer
- * surface its field. */
+/* Warns of meshes that have the layer but not the field of its contour lines. on: the layer's meshes and, unless it is
+ * an outer surface, its field. */
 static void warn_of_no_lines(const session_catalogue *catalogue, const scene_image *image, const scene_field *on,
                              const scene_lines *lines, session_report *report)
 {
@@ -363,7 +363,7 @@ static void warn_of_no_lines(const session_catalogue *catalogue, const scene_ima
     }
 }
 
-/* Warns of a layer whose meshes have no cells but shells. */
+/* Warns of a layer whose meshes contain only shells. */
 static void warn_of_shells(const session_catalogue *catalogue, const scene_image *image, const char *layer,
                            const scene_field *field, session_report *report)
 {
@@ -382,8 +382,8 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
                  image->name, layer, field->name, name ? name : "", field->name);
 }
 
-/* Warns of a mesh with vertex ids if a layer shows it by means at vertices together with other meshes: its vertices are
- * not equal to theirs. */
+/* Warns of a mesh with global vertex ids if a layer shows it, by means at vertices, together with other meshes: its
+ * vertices do not count as equal to theirs. */
 static void warn_of_apart(const session_catalogue *catalogue, const scene_image *image, const char *layer,
                           const scene_field *field, session_report *report)
 {
@@ -446,7 +446,7 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
-/* Returns whether an image has no outputs and its pictures are not kept in memory, and warns of it. */
+/* Returns whether an image has no outputs and its pictures are not kept in memory; warns if that is so. */
 static bool is_for_nobody(const session_plan_basis *basis, const scene_image *image, session_report *report)
 {
     const bool is_for_none = image->output_count == 0 && !basis->are_kept;
@@ -496,7 +496,8 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =
-        basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* fill functions may be collective */
+        /* agrees only if necessary, because fill functions may be collective */
+        basis->is_filled ? session_agree(team->comm, error) : INSITU_OK;
     if (!status) {
         if (is_whole) session_fill_fields(meshes, basis->catalogue, true, error);
         if (is_whole) session_copy_used(meshes, team->threads, error);

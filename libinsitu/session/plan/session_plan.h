@@ -8,50 +8,51 @@
 #include "session_report.h"
 #include "session_space.h"
 
-/* Cell values that a layer needs at vertices. There is one item for each set of meshes, field and component. */
+/* A request for cell values at vertices. There is one for each set of meshes, field and component. */
 typedef struct session_recentring {
     session_joint *joint;
     const char *field;
-    int component; /* as grid_field.component */
+    int component; /* number of the component, in the format of grid_field.component */
 } session_recentring;
 
 /* The images to draw and the data that they need; the same on every rank. Borrows from the scene and the catalogue. */
 typedef struct session_plan {
     int image_count; /* number of images that can be drawn */
     const scene_image **images;
-    int slice_count, surface_count; /* counts over all images, in which an orbit's views count once; surfaces: outer
-                                       ones, and isosurfaces if there are meshes of shells alone */
+    /* Numbers of layers over all images, in which an orbit's views count once. Surfaces are outer surfaces and, if
+     * there are meshes of shells alone, isosurfaces. */
+    int slice_count, surface_count;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale;         /* one per recentring, for session_recentre() */
+    int *stale;         /* one number per recentring: work space of session_recentre() */
     int64_t cell_count; /* number of drawn cells over all ranks */
     base_error refusal; /* error of the first due image that cannot be drawn */
 } session_plan;
 
-/* A step, and the time of the previous one; the same on every rank. */
+/* The cycle and time of a step, and the time of the previous one; the same on every rank. */
 typedef struct session_moment {
     int64_t cycle;
     double time, last_time;
-    bool is_first; /* there is no previous step */
+    bool is_first; /* set if there is no previous step */
 } session_moment;
 
-/* Input of a plan; the same on every rank. */
+/* The input of a plan; the same on every rank. */
 typedef struct session_plan_basis {
     const scene *scene;
-    const char *scene_path; /* for messages */
+    const char *scene_path; /* path of the scene file, for messages */
     const session_moment *moment;
-    uint64_t let_images; /* a bit for each image of the file, set unless its condition does not hold */
+    uint64_t let_images; /* one bit per image of the file, set unless the image's condition does not hold */
     const session_catalogue *catalogue;
     const session_extent *extent;
-    bool is_filled; /* some rank has a field with a fill function */
-    bool are_kept;  /* pictures are kept in memory */
+    bool is_filled; /* set if some rank has a field with a fill function */
+    bool are_kept;  /* set if pictures are kept in memory */
 } session_plan_basis;
 
 /* Returns the number of images that are due, without regard to conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
 
-/* Finds the statistics that are due and, if images, the conditions, whose fields exist. The first fault is stored in
- * *error. Local, the same on every rank. */
+/* Finds the statistics that are due and, if images is set, the conditions, and keeps those whose fields exist. The
+ * first fault is stored in *error. Local, the same on every rank. */
 session_sound_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Determines which of the due images can be drawn, marks on this rank's meshes and scalars the data that they need, and

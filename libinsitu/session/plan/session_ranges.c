@@ -1,8 +1,8 @@
-/* Percentiles are computed digit by digit. Values are doubles, mapped to integers in the same order. A pass takes the
- * values whose leading bits are those found so far, and counts them by the next 11 bits; the sum of all ranks' counts
- * determines the bin of the wanted value. Six passes find all 64 bits, and so the value itself instead of an estimate,
- * for any partition. From the third pass on few values are left: a pass stores them, and the next ones do not read
- * cells. */
+/* Percentiles are computed digit by digit. Values are doubles, mapped to integers in the same order. A pass considers
+ * the values whose leading bits are those found so far, and counts them by the next 11 bits; the sum of all ranks'
+ * counts determines the digit of the wanted value. Six passes find all 64 bits, and so the exact value instead of an
+ * estimate, for any partition. From the third pass on few values are left: a pass stores them, and the next ones do not
+ * read cells. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -60,31 +60,31 @@ static double value_of(uint64_t order)
     return value;
 }
 
-/* Returns the lowest bit that a pass counts by: the last pass has 9 bits left. */
+/* Returns the position of the lowest bit by which a pass counts. The last pass has 9 bits left. */
 static int shift_of(int pass)
 {
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
-/* Returns the mask of the bits found before a pass. */
+/* Returns the mask of the bits that are known before a pass. */
 static uint64_t known_of(int pass)
 {
     return pass ? ~UINT64_C(0) << shift_of(pass - 1) : 0;
 }
 
-/* A rank's values that a pass has taken, unsorted, if there are at most MOST_KEPT. */
+/* This rank's values that the last pass has considered, unsorted; they are stored if there are at most MOST_KEPT. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct kept_values {
-    int count; /* MOST_KEPT + 1: there are more */
+    int count; /* number of values; MOST_KEPT + 1: there are more */
     uint64_t orders[MOST_KEPT];
 } kept_values;
 
 typedef struct digit_count {
-    uint64_t found[2]; /* leading bits of both ends, the rest 0 */
+    uint64_t found[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
     int pass;
     bool is_positive;
-    bool is_kept; /* the kept values are read instead of cells */
+    bool is_kept; /* whether the stored values are read instead of cells */
     kept_values kept;
 } digit_count;
 
@@ -99,8 +99,8 @@ static void keep_value(uint64_t order, kept_values *kept)
     if (at < MOST_KEPT) kept->orders[at] = order;
 }
 
-/* Counts the value by its next digit, for each end whose leading bits it has. Returns whether it has those of any
- * end. */
+/* Counts a value by its next digit, for each percentile whose known leading bits it has. Returns whether it was counted
+ * for any. */
 static bool count_value(const digit_count *of, uint64_t order, int64_t counts[2 * DIGITS])
 {
     const uint64_t known = known_of(of->pass);
@@ -157,7 +157,8 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                        "MPI_Allreduce");
 }
 
-/* Returns the bin of the value with this rank in the order; *rank becomes its rank within the bin. */
+/* Returns the digit of the value with this rank in the order; *rank becomes its rank among the values with this
+ * digit. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;

@@ -1,4 +1,4 @@
-/* The ranges of values of colour maps, if the scene does not fix them. */
+/* Computes the ranges of values of colour maps that the scene does not fix. */
 #ifndef SESSION_RANGES_H
 #define SESSION_RANGES_H
 
@@ -7,20 +7,21 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* The scalar whose extremes are computed: a field, or, if a plane is given, the distances from it on the meshes that
- * have the field. */
+/* The scalar whose extremes are computed: a field, or, if a plane is given, the distances from the plane on the meshes
+ * that have the field. */
 typedef struct session_range_subject {
     const scene_field *field;
-    const scene_plane *plane; /* NULL: the field's own values */
-    bool is_positive;         /* only positive values count (session_scalars.h) */
+    const scene_plane *plane; /* the plane; NULL: the field's own values are used */
+    bool is_positive;         /* set if only positive values count (session_scalars.h) */
 } session_range_subject;
 
 /* Computes the minimum and maximum over all ranks' drawn cells; low > high: there are no values. Collective. */
 insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
                                     const session_range_subject *of, double *low, double *high, base_error *error);
 
-/* Computes the range of a layer's field over all ranks' drawn cells, by the map's source; for SCENE_RANGE_RUN only that
- * of this step. low > high: there are no values. It has the same bits on any partition. Collective. */
+/* Computes the range of a layer's field over all ranks' drawn cells, by the colour map's rule; for SCENE_RANGE_RUN only
+ * the range of this step. low > high: there are no values. The result has the same bits on any partition.
+ * Collective. */
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error);
 

@@ -28,36 +28,38 @@
 #include "session_scalars.h"
 #include "session_vertex_groups.h"
 
-/* Values by group: those of group g are values[starts[g]] .. values[ends[g] - 1]. There is room up to starts[g + 1], as
- * a cell whose value is not finite gives none. */
+/* Values by group: those of group g are values[starts[g]] to values[ends[g] - 1]. There is space up to starts[g + 1],
+ * because a cell whose value is not finite contributes none. */
 typedef struct value_groups {
     int64_t count;
-    const int64_t *starts; /* count + 1 entries */
-    int64_t *ends;         /* count entries */
+    const int64_t *starts; /* begin of each group's values; count + 1 entries */
+    int64_t *ends;         /* end of each group's values; count entries */
     double *values;
-    double *means;            /* count entries */
-    unsigned char *are_faces; /* count entries: the values are those of faces, else those of cells or corners */
+    double *means; /* mean of each group; count entries */
+    /* per group: whether its values are those of boundary faces, else those of cells or corners; count entries */
+    unsigned char *are_faces;
 } value_groups;
 
-/* One of this rank's parts of the meshes. */
+/* One of this rank's parts of the meshes whose values are recentred. */
 typedef struct mesh_part {
-    session_scalar *scalar; /* NULL: the part does not have the field */
+    session_scalar *scalar; /* scalar that gets the recentred values; NULL: the part does not have the field */
     bool is_of_vertices;
     grid_field field; /* the values to recentre */
 } mesh_part;
 
-/* One recentring on this rank. */
+/* The data of one recentring on this rank. */
 typedef struct recentring {
     session_joint *joint;
     session_joint_parts list;
-    mesh_part *parts;    /* one for each of the list */
-    int64_t *starts;     /* of the values, if faces of the boundary have some; else joint->groups has them */
-    value_groups values; /* of joint->groups */
+    mesh_part *parts; /* one entry per part in the list */
+    /* begin of each group's values if faces of the boundary have values; otherwise those in joint->groups are used */
+    int64_t *starts;
+    value_groups values; /* values of joint->groups */
 } recentring;
 
 /* ---- values by group ----------------------------------------------------------------------------------------- */
 
-/* Makes groups without values. The starts stay the caller's. */
+/* Makes groups without values. The array `starts` remains owned by the caller. */
 static bool groups_create(value_groups *groups, int64_t count, const int64_t *starts)
 {
     *groups = (value_groups){.count = count, .starts = starts};
@@ -79,11 +81,11 @@ static void groups_free(value_groups *groups)
     *groups = (value_groups){0};
 }
 
-/* Sums finite values, each times scale, to the same bits in whatever order they stand. A value is rounded to a multiple
- * of a unit that is coarse enough for sums of such multiples to be exact; the rest of it, which is exact too, is
- * rounded to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate floating-point summation, 2008, section 3).
- * The rests of 100 values that are then left out are below 2^-85 of the largest value, so that the sum is rounded
- * correctly but where it is as near as that to a tie. */
+/* Returns the sum of finite values, each multiplied by scale; the bits of the sum do not depend on the order of the
+ * values. A value is rounded to a multiple of a unit that is coarse enough for sums of such multiples to be exact; the
+ * rest of it, which is exact too, is rounded to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate
+ * floating-point summation, 2008, section 3). What remains of 100 values after that is below 2^-85 of the largest
+ * value, so the sum is rounded correctly unless it is that close to a tie. */
 static double sum_of(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
@@ -99,7 +101,7 @@ static double sum_of(const double *values, int64_t count, double largest, double
     return sums[0] + sums[1];
 }
 
-/* The mean of equal values is their value, to the bit. */
+/* Returns the mean. The mean of equal values is exactly their value. */
 static double mean_of(const double *values, int64_t count)
 {
     double largest = 0;
@@ -109,7 +111,7 @@ static double mean_of(const double *values, int64_t count)
         are_equal = are_equal && values[i] == values[0];
     }
     if (are_equal) return values[0];
-    const double scale = largest > 0x1p900 ? 0x1p-128 : 1; /* so that no sum overflows */
+    const double scale = largest > 0x1p900 ? 0x1p-128 : 1; /* prevents overflow of the sum */
     return count ? sum_of(values, count, largest, scale) / (double)count / scale : NAN;
 }
 
@@ -125,13 +127,13 @@ static void groups_average(value_groups *groups, int threads)
     }
 }
 
-/* ---- this rank's part ---------------------------------------------------------------------------------------- */
+/* ---- this rank's values ---------------------------------------------------------------------------------------- */
 
-/* The groups of a cell's vertices, each once. */
+/* The groups of a cell's vertices, each listed once. */
 typedef struct cell_groups {
     int64_t count, room;
     int64_t *groups;
-    bool is_lost; /* memory ran out */
+    bool is_lost; /* set if memory ran out */
 } cell_groups;
 
 static void add_group(cell_groups *list, int64_t group)
@@ -148,7 +150,7 @@ static void add_group(cell_groups *list, int64_t group)
     list->groups[list->count++] = group;
 }
 
-/* Gives a value to a group, unless the group has those of faces. Several threads may do so if is_shared. */
+/* Adds a value to a group, unless the group has values of faces. is_shared: several threads may do so at once. */
 static inline void give_value(value_groups *values, int64_t group, double value, bool is_shared)
 {
     int64_t at;
@@ -161,7 +163,8 @@ static inline void give_value(value_groups *values, int64_t group, double value,
     values->values[at] = value;
 }
 
-/* Gives the cell's value to the groups of its vertices, once to each, or the finite ones of its corners to theirs. */
+/* Adds the cell's value to the group of each of its vertices, once per group; or, for values at corners, adds each
+ * finite one to the group of its corner. */
 static void give_cell(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
@@ -182,7 +185,7 @@ static void give_cell(recentring *r, int part, int64_t cell, cell_groups *list, 
     for (int64_t i = 0; i < list->count; i++) give_value(&r->values, list->groups[i], value, is_shared);
 }
 
-/* Gives the finite values at the vertices of drawn cells, each once. */
+/* Adds the finite values at the vertices of drawn cells to their groups, each vertex once. */
 static void give_vertices(recentring *r, int part)
 {
     const grid_field *field = &r->parts[part].field;
@@ -193,7 +196,7 @@ static void give_vertices(recentring *r, int part)
     }
 }
 
-/* Gives the values of the part's cells; false where memory runs out. */
+/* Adds the values of a part's cells to the groups. Returns false if memory ran out. */
 static bool give_values(recentring *r, int part, int threads)
 {
     const grid *g = &r->list.items[part]->cells;
@@ -217,7 +220,7 @@ static bool give_values(recentring *r, int part, int threads)
     return !is_lost;
 }
 
-/* Lets the groups of boundary faces have these faces' values alone. */
+/* Replaces the values in groups of boundary faces by the values of these faces alone. */
 static void give_face_values(const session_patch_values *faces, value_groups *values)
 {
     for (int64_t i = 0; i < faces->count; i++) {
@@ -227,7 +230,7 @@ static void give_face_values(const session_patch_values *faces, value_groups *va
     }
 }
 
-/* Lists this rank's parts of the item's meshes. */
+/* Lists this rank's parts of the meshes of a recentring. */
 static bool list_parts(const session_recentring *item, const session_meshes *meshes, recentring *r)
 {
     r->joint = item->joint;
@@ -254,7 +257,7 @@ static bool update_groups(recentring *r, int ranks)
     return session_update_vertex_groups(&basis, &joint->groups);
 }
 
-/* Finds the values that the boundary has, one list for each part. */
+/* Reads the values of boundary faces, one list per part. */
 static void find_face_values(const recentring *r, session_patch_values *faces, base_error *error)
 {
     const session_vertex_groups *groups = &r->joint->groups;
@@ -262,12 +265,12 @@ static void find_face_values(const recentring *r, session_patch_values *faces, b
         const mesh_part *part = &r->parts[i];
         const session_vertex_numbers numbers = {&groups->keys, groups->of_vertex + groups->firsts[i], r->joint->by_id};
         if (part->scalar)
-            session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers, &faces[i],
-                                      error);
+            session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers,
+                                      &faces[i], error);
     }
 }
 
-/* Makes room for the values of cells and, if there are any, of faces. */
+/* Allocates memory for the values of cells and, if there are any, of faces. */
 static bool make_values(recentring *r, const session_patch_values *faces)
 {
     const session_vertex_groups *groups = &r->joint->groups;
@@ -287,7 +290,7 @@ static bool make_values(recentring *r, const session_patch_values *faces)
     return true;
 }
 
-/* Finds the means over this rank's cells and faces. */
+/* Computes the means over this rank's cells and faces. */
 static void average_own(recentring *r, const session_team *team, base_error *error)
 {
     const int count = r->list.count;
@@ -303,7 +306,7 @@ static void average_own(recentring *r, const session_team *team, base_error *err
     base_free(faces);
 }
 
-/* ---- groups of several ranks --------------------------------------------------------------------------------- */
+/* ---- groups that several ranks have ---------------------------------------------------------------------------- */
 
 /* Number of words before the values: the key, and the count, in which the bit FACE_VALUES marks values of faces. */
 enum { RECORD_HEAD = 4 };
@@ -314,7 +317,7 @@ static int64_t value_count(const value_groups *values, int64_t group)
     return values->ends[group] - values->starts[group];
 }
 
-/* Packs the shared groups into records, sorted by home rank. */
+/* Packs the shared groups into records, sorted by the rank that is their home. */
 static bool pack_records(const recentring *r, int ranks, session_mail *mail)
 {
     const session_vertex_groups *groups = &r->joint->groups;
@@ -340,7 +343,7 @@ static bool pack_records(const recentring *r, int ranks, session_mail *mail)
     return true;
 }
 
-/* ---- the homes' part: merge by key --------------------------------------------------------------------------- */
+/* ---- work of home ranks: merging records by key ---------------------------------------------------------------- */
 
 static int64_t record_count(const uint64_t *record)
 {
@@ -352,14 +355,14 @@ static const uint64_t *next_record(const uint64_t *record)
     return record + RECORD_HEAD + record_count(record);
 }
 
-/* Returns whether the record has values that its group uses. If any rank has values of faces, those of cells do not
- * count. */
+/* Returns whether the record has values that its group uses. If any rank has values of faces, those of cells are
+ * ignored. */
 static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
 {
     return !values->are_faces[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
-/* Numbers the groups of the records by their keys. */
+/* Assigns the same number to records with the same key. */
 static bool number_records(const session_mail *in, int64_t *groups, session_key_table *keys, int64_t records)
 {
     const uint64_t *end = in->words + in->total;
@@ -372,7 +375,7 @@ static bool number_records(const session_mail *in, int64_t *groups, session_key_
     return true;
 }
 
-/* Gathers the records' values by group. starts: 0, for one more than there are groups. */
+/* Collects the records' values by group. starts: one entry more than there are groups, all 0. */
 static bool gather_records(const session_mail *in, const int64_t *groups, int64_t count, int64_t *starts,
                            value_groups *values)
 {
@@ -421,7 +424,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     return is_done;
 }
 
-/* Replaces the means of the groups that other ranks have too by those over all ranks. */
+/* Replaces the means of groups that other ranks have, too, by those over all ranks. */
 static insitu_status merge_shared(const session_team *team, recentring *r, base_error *error)
 {
     const session_vertex_groups *groups = &r->joint->groups;
@@ -442,10 +445,10 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
     return status;
 }
 
-/* ---- one scalar ---------------------------------------------------------------------------------------------- */
+/* ---- one recentring -------------------------------------------------------------------------------------------- */
 
 /* Copies the means to the vertices. A corner whose own value is not finite keeps it, so that its cell is not drawn, as
- * without means. A cell's own value is checked elsewhere (grid_field.own). */
+ * without means. For cell values this is checked elsewhere (grid_field.own). */
 static void spread_means(const recentring *r, int part, int threads)
 {
     const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
@@ -464,8 +467,8 @@ static void spread_means(const recentring *r, int part, int threads)
     }
 }
 
-/* Returns whether any of the meshes has values of cells, or of vertices some of which may hang. Values at corners are
- * not constrained: codes that have them do so themselves. */
+/* Returns whether some of the meshes have values of cells, or values of vertices some of which may be hanging. Values
+ * at corners are not constrained, because codes that have them do so themselves. */
 static bool is_constrained(const session_recentring *item)
 {
     for (int i = 0; i < item->joint->count; i++)
@@ -482,7 +485,7 @@ static insitu_status constrain_hanging(const recentring *r, const session_team *
     return status ? status : session_constrain_hanging(&r->joint->hanging, team, r->values.means, error);
 }
 
-/* Allocates the values of each part. */
+/* Allocates memory for the recentred values of each part. */
 static void make_room(const recentring *r, base_error *error)
 {
     for (int i = 0; i < r->list.count; i++) {

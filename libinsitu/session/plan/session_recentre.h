@@ -5,13 +5,13 @@
 #include "session_plan.h"
 #include "session_team.h"
 
-/* Adds an item to a list unless the list has it. Returns false if memory ran out. Local. */
+/* Adds an item to a list unless the list already contains it. Returns false if memory ran out. Local. */
 bool session_add_recentring(session_recentring **items, int *count, const session_recentring *item);
 
-/* Fills the recentred arrays of the items that are stale on any rank. A vertex gets the mean of the finite values of
- * its cells that are not ghosts, over all ranks; NaN if there are none. The homes of the catalogue's meshes must be up
- * to date. stale: space for count numbers. An error of this rank at the very end is stored only in *error, for the next
- * phase to agree on. Collective, else agreed. */
+/* Computes the recentred arrays of the items that are out of date on any rank. A vertex gets the mean of the finite
+ * values of its cells that are not ghosts, over all ranks; NaN if there are none. The homes of the catalogue's meshes
+ * must be up to date. stale: work space for `count` numbers. An error of this rank at the very end is stored only in
+ * *error, for the next phase to agree on. Collective, otherwise agreed. */
 insitu_status session_recentre(const session_recentring *items, int count, int *stale, const session_meshes *meshes,
                                const session_team *team, base_error *error);
 

@@ -8,13 +8,13 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 20 }; /* the largest file of ranges that is read */
+enum { MOST_BYTES = 1 << 20 }; /* maximum size of a file of ranges that is read */
 
 /* ---- layers ---------------------------------------------------------------------------------------------------- */
 
 typedef struct layer_list {
     int count;
-    session_run_range *items; /* NULL: layers are only counted */
+    session_run_range *items; /* the layers with ranges over the run; NULL: layers are only counted */
 } layer_list;
 
 static void add_layer(layer_list *list, const char *kind, int number, const scene_field *field,
@@ -50,7 +50,7 @@ static int count_layers(const scene_image *image)
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
-/* Returns an error for the file. what: "read" or "written". */
+/* Stores an error about the file. what: "read" or "written". */
 static insitu_status fail(const session_image_ranges *ranges, const char *what, const file_failure *failure,
                           base_error *error)
 {
@@ -94,13 +94,13 @@ static bool read_line(session_image_ranges *ranges, const char *text)
     return true;
 }
 
-/* Reads the lines of the text, which is cut into them. */
+/* Reads the ranges from the lines of the text, in which line ends are replaced by NUL. */
 static insitu_status read_lines(session_image_ranges *ranges, const file_content *content, base_error *error)
 {
     char *line = content->text, *const end = content->text + content->size;
     for (int number = 1; line < end; number++) {
         char *stop = memchr(line, '\n', (size_t)(end - line));
-        if (!stop) stop = end; /* stop at a NUL byte */
+        if (!stop) stop = end; /* ends the line at a NUL byte */
         *stop = '\0';
         if (line + strlen(line) != stop || !read_line(ranges, line))
             return base_fail(error, INSITU_ERROR_SCENE,
@@ -112,7 +112,7 @@ static insitu_status read_lines(session_image_ranges *ranges, const file_content
     return INSITU_OK;
 }
 
-/* Reads the file; it is not an error if there is none. */
+/* Reads the file of ranges; a missing file is not an error. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
     c_numbers numbers;
@@ -177,7 +177,7 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
     return NULL;
 }
 
-/* Prepares an entry at the end of the list, which is counted after it is complete. */
+/* Prepares an entry at the end of the list; the caller counts it when it is complete. */
 static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);
@@ -211,7 +211,7 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
     return status;
 }
 
-/* Fills the ranges from the file, which rank 0 reads. Collective. */
+/* Reads the ranges from the file on rank 0, and sends them to all ranks. Collective. */
 static insitu_status fill_ranges(session_image_ranges *ranges, const session_team *team, base_error *error)
 {
     if (team->rank == 0) read_ranges(ranges, error);

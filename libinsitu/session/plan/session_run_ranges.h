@@ -1,11 +1,11 @@
-/* Ranges that widen over a run (range: run): the widest range with which each layer of an image has been drawn.
+/* Keeps ranges that widen over a run (range: run): the widest range with which each layer of an image has been drawn.
  *
- * They are stored in a file NAME.ranges, NAME being the image's, in the folder of the image's first output: the part of
- * its path before the last slash that comes before any placeholder. Further pictures of a sweep use NAME.1.ranges and
- * so on. The file is text, written anew after each picture for which a range became wider, and read when the first
- * picture of the image is drawn, so that a run that is restarted continues with the ranges of the previous one. A line
- * has: isosurface, surface, slice or volume, the layer's number among those of its kind from 0 on, the component
- * (scene.h), low, high, and the field. Lines that match no layer of the image are ignored. */
+ * They are stored in a file NAME.ranges, where NAME is the image's name, in the folder of the image's first output: the
+ * part of its path before the last slash that comes before any placeholder. Further pictures of a sweep use
+ * NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became wider, and
+ * read when the first picture of the image is drawn, so that a restarted run continues with the ranges of the previous
+ * one. A line has: isosurface, surface, slice or volume; the layer's number among those of its kind from 0 on; the
+ * component (scene.h); low; high; and the field. Lines that match no layer of the image are ignored. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 
@@ -13,21 +13,21 @@
 #include "scene.h"
 #include "session_team.h"
 
-/* A layer with a range over the run; points into the scene. */
+/* The range of a layer over the run; it points into the scene. */
 typedef struct session_run_range {
     const char *kind;
-    int number; /* number among the layers of its kind */
+    int number; /* number of the layer among those of its kind */
     const scene_field *field;
     const scene_colour_map *map;
-    double low, high; /* the same on all ranks; low > high: none yet */
+    double low, high; /* ends of the range, the same on all ranks; low > high: there is none yet */
 } session_run_range;
 
 typedef struct session_image_ranges {
     char *image, *path;
-    int layers; /* number of layers of the image's variants */
+    int layers; /* number of the variant of the image (scene_variant.layers) */
     int count;
     session_run_range *items;
-    bool is_changed; /* changed since the file was written */
+    bool is_changed; /* set if a range has changed since the file was written */
 } session_image_ranges;
 
 typedef struct session_run_ranges {
@@ -35,14 +35,15 @@ typedef struct session_run_ranges {
     session_image_ranges *items;
 } session_run_ranges;
 
-/* Opens the image's ranges; *out is NULL if no layer of it has a range over the run. Collective. */
+/* Finds or loads the image's ranges; *out is NULL if no layer of the image has a range over the run. Collective. */
 insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
                                       session_image_ranges **out, base_error *error);
 
-/* Widens the range of the layer with the map by that of this step, and returns the result in *low and *high. Local. */
+/* Widens the run's range of the layer with this map by the range of this step, low to high, and returns the result in
+ * *low and *high. Local. */
 void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high);
 
-/* Writes the file if a range has changed. On rank 0. */
+/* Writes the file if a range has changed. Called on rank 0 only. */
 insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error *error);
 
 void session_run_ranges_free(session_run_ranges *all);

@@ -11,15 +11,15 @@
 #include "session_scalars.h"
 #include "session_vertex_sums.h"
 
-/* One field of one mesh. */
+/* A field on a mesh, or on joined meshes, that needs gradients at vertices. */
 typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
-    const scene_field *scene_field; /* field of the first layer that shows it */
-    uint64_t joined;                /* session_joint_name() if values are recentred */
+    const scene_field *scene_field; /* the field in the first layer that shows it */
+    uint64_t joined;                /* name of the joint (session_joint_name()) if values are recentred */
     int component;
     int value_count;
-    mmbvh_interval *values; /* isovalues of all layers that show it */
+    mmbvh_interval *values; /* isovalues of all layers that show the field */
 } smooth_item;
 
 typedef struct smooth_items {
@@ -27,10 +27,10 @@ typedef struct smooth_items {
     smooth_item *items;
 } smooth_items;
 
-/* This rank's work on an item. */
+/* The data of this rank for one item. */
 typedef struct smooth_work {
-    session_scalar **scalars; /* one per part */
-    mmbvh_selection *crossed; /* per part, the cells that the surface crosses */
+    session_scalar **scalars; /* the scalar of each part */
+    mmbvh_selection *crossed; /* per part, the cells that the isosurface crosses */
     session_vertex_sums sums;
 } smooth_work;
 
@@ -76,7 +76,7 @@ static bool list_items(const session_plan *plan, const session_catalogue *catalo
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int i = 0; i < plan->image_count; i++) {
             const scene_image *image = plan->images[i];
-            if (image->variant.view > 0) continue; /* its layers are those of view 0 */
+            if (image->variant.view > 0) continue; /* the layers of other views are those of view 0 */
             for (int n = 0; n < image->isosurface_count && is_listed; n++)
                 is_listed = add_layer(out, &catalogue->meshes[m], &image->isosurfaces[n]);
         }
@@ -99,7 +99,8 @@ bool session_is_smooth(const session_plan *plan)
 
 /* ---- vertices of crossed cells ------------------------------------------------------------------------------- */
 
-/* Marks the vertices of a part's crossed cells with 0, the others with -1. Returns how many are marked. */
+/* Sets the entries of the vertices of a part's crossed cells to 0, and the others to -1. Returns the number of vertices
+ * set to 0. */
 static int64_t mark_vertices(const mmbvh_selection *crossed, session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -115,7 +116,7 @@ static int64_t mark_vertices(const mmbvh_selection *crossed, session_sum_part *p
     return count;
 }
 
-/* Adds the keys of the marked vertices. */
+/* Adds the keys of the marked vertices to the sums. */
 static bool add_own_keys(const smooth_item *item, int64_t most, session_vertex_sums *sums)
 {
     if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;
@@ -151,7 +152,7 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
     return error->status;
 }
 
-/* Begins this rank's share of the item. */
+/* Prepares this rank's data for the item. */
 static insitu_status begin_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
                                 base_error *error)
 {
@@ -185,8 +186,8 @@ static void free_work(smooth_work *work)
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Numbers the part's vertices that this rank has requested; the others have sums for other ranks only, or none. sum_of
- * gets the sum of each number. */
+/* Numbers the part's vertices for which this rank needs sums; the others have sums only for other ranks, or none.
+ * sum_of[n] becomes the index of the sum of number n. */
 static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;
@@ -200,8 +201,8 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
     return count;
 }
 
-/* Keeps the gradients of a part. A gradient is kept to a scale that does not matter, near that of the scene, so that no
- * unit of the values makes it too small for a float. */
+/* Stores the gradients of a part's vertices. They are scaled to the size of the scene, because their length does not
+ * matter, so that no unit of the values makes them too small for a float. */
 static bool keep_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
 {
     const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);

@@ -1,4 +1,4 @@
-/* Gradients at vertices, for isosurfaces whose normals are interpolated between them. */
+/* Computes gradients at vertices, for isosurfaces whose normals are interpolated between them. */
 #ifndef SESSION_SMOOTH_H
 #define SESSION_SMOOTH_H
 
@@ -6,10 +6,10 @@
 #include "session_team.h"
 
 /* Computes, for the isosurfaces of the plan that have smooth normals, the gradients at the vertices of the cells that
- * they cross: over the cells around each on all ranks, to the same bits on any partition. Vertices are equal by the
- * same keys as in recentring. extent: the global bounds. The homes of the catalogue's meshes must be up to date. An
- * error of this rank at the very end is stored only in *error, for the next phase to agree on. Collective, else
- * agreed. */
+ * they cross. Each is computed over the cells around the vertex on all ranks, with the same bits on any partition.
+ * Vertices are equal by the same keys as in recentring. extent: the global bounds. The homes of the catalogue's meshes
+ * must be up to date. An error of this rank at the very end is stored only in *error, for the next phase to agree on.
+ * Collective, otherwise agreed. */
 insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
                              const session_team *team, const session_extent *extent, base_error *error);
 

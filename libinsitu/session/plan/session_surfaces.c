@@ -9,19 +9,19 @@
 #include "session_outer_mesh.h"
 #include "session_thresholds.h"
 
-/* The faces of a layer on one mesh, of which this rank may have no part. */
+/* The faces that a layer needs of one mesh; this rank may have no part of it. */
 typedef struct surface_wish {
     const session_catalogue_mesh *mesh;
     const scene_threshold *threshold;
 } surface_wish;
 
-/* Returns the part's faces; NULL if it has none. */
+/* Returns the part's outer faces for the wish; NULL if it has none. */
 static session_outer *find_own(const session_mesh *part, const surface_wish *wish)
 {
     return part->is_given ? session_find_outer(part, wish->threshold) : NULL;
 }
 
-/* Tells whether faces are out of date on some of this rank's parts. */
+/* Returns whether faces are out of date on some of this rank's parts. */
 static bool is_stale(const session_meshes *meshes, const surface_wish *wish)
 {
     const session_parts parts = session_find_parts(meshes, wish->mesh->name);
@@ -47,7 +47,8 @@ static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
     return count + 1;
 }
 
-/* Lists the outer surfaces of an image's layers and the meshes that they are on. Returns how many there are then. */
+/* Lists the outer surfaces of an image's layers with the meshes on which they are drawn. Returns the new length of the
+ * list. */
 static int list_image(const scene_image *image, const session_catalogue *catalogue, surface_wish *wishes, int count)
 {
     static const scene_threshold none = {.is_given = false};
@@ -66,7 +67,7 @@ static int list_image(const scene_image *image, const session_catalogue *catalog
     return count;
 }
 
-/* Lists those of all images, in the same order on all ranks. Returns how many. */
+/* Lists the outer surfaces of all images, in the same order on all ranks. Returns their number. */
 static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_wish *wishes)
 {
     int count = 0;
@@ -75,11 +76,12 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Determines whether faces are stale on some rank. If a rank has failed before, all return its error. Collective. */
+/* Determines which of the faces are out of date on some rank. If a rank has failed before, all return its error.
+ * Collective. */
 static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
                                 const session_team *team, int *stale, bool *is_any, base_error *error)
 {
-    /* entries: this rank has failed; this rank has stale faces */
+    /* entries: whether this rank has failed; whether it has faces that are out of date */
     int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
         stale[i] = is_stale(meshes, &wishes[i]);
@@ -112,7 +114,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
     return status ? status : session_agree(team->comm, error);
 }
 
-/* Prepares the mesh of outer faces for drawing. All of its cells have a drawn face. */
+/* Prepares a mesh of outer faces for drawing. Each of its cells has one drawn face. */
 static insitu_status make_ready(const session_mesh *mesh, session_outer *outer, base_error *error)
 {
     const insitu_status status = session_make_outer_mesh(mesh, outer, error);

@@ -1,7 +1,7 @@
-/* A surface is coloured directly by the map. A volume is integrated over transfer functions whose colours are linear
- * between entries, so other maps are converted to such: each band has 16 entries of a table, so that colours change
- * within 1/16 of a band; colours outside of the range are one more entry at an end. Opacity is linear along the map's
- * scale, as the renderer requires. */
+/* Converts colour maps to transfer functions. A surface is coloured directly by the map. A volume is integrated over
+ * transfer functions whose colours are linear between entries, so other maps are converted to such: each band gets 16
+ * entries of a table, so that colours change within 1/16 of a band; colours outside the range are one more entry at an
+ * end. Opacity is linear along the map's scale, as the renderer requires. */
 #include "session_transfer.h"
 
 #include <float.h>
@@ -12,17 +12,17 @@
 
 enum { band_entries = 16 };
 
-/* Values are relative to the low end in double, so a range may be as narrow as their digits allow. A range from the
- * data counts as a single value if it is not wider than these shares of its larger end: means over cells and ranks
- * round by a few times 2^-53. */
+/* Values are stored relative to the low end in double, so a range may be as narrow as their digits allow. A range from
+ * the data counts as a single value if it is not wider than these shares of its larger end, because means over cells
+ * and ranks have rounding errors of a few times 2^-53. */
 static const double least_of_data = 64 * DBL_EPSILON, widest_log = 1e30;
 
-/* Width of the range of a constant field, as a share of the value. */
+/* Width of the range that a constant field gets, as a share of its value. */
 static const double constant_linear = 1e-6, constant_scaled = 1e-3;
 
-/* With a logarithmic scale, values are relative to 0 in float32, whose rounding would be visible in a range below this
- * share of its larger end. In such a range the scale is replaced by a linear one: the error is an eighth of the share,
- * 1.3e-4 of the map, at most. */
+/* With a logarithmic scale, values are relative to 0 in float32, whose rounding would be visible in a range narrower
+ * than this share of its larger end. In such a range the scale is replaced by a linear one: the error is at most an
+ * eighth of the share, 1.3e-4 of the map. */
 static const double straight = 1e-3;
 
 static double larger_end(double low, double high)
@@ -46,8 +46,8 @@ bool session_is_too_narrow(double low, double high)
     return low < high && high - low < fmax(least_of_data * larger_end(low, high), FLT_MIN);
 }
 
-/* Extends a range so that it is not empty, and positive for a logarithmic scale. A constant field has its value in the
- * middle. Returns whether there is a single value, and stores it. */
+/* Extends a range so that it is not empty, and positive for a logarithmic scale; a constant field gets its value in the
+ * middle. Returns whether there is a single value, and stores it in *constant. */
 static bool make_usable(const scene_colour_map *map, double *low, double *high, double *constant)
 {
     const bool is_log = map->scale == SCENE_LOG;
@@ -90,7 +90,7 @@ bool session_takes_memory(const scene_colour_map *map, const scene_volume *volum
     return volume && (map->is_banded || map->has_below || map->has_above);
 }
 
-/* Fills a table with bands and with the colours outside the range. */
+/* Fills a table for bands, and for the colours outside the range. */
 static bool expand_table(const scene_colour_map *map, session_transfer *out)
 {
     render_transfer *t = &out->transfer;
@@ -157,7 +157,7 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS])
 {
     const scene_range *range = &volume->colour_map.range;
-    scene_colour_map map = volume->colour_map; /* the map with the fewest colours, for which no memory is allocated */
+    scene_colour_map map = volume->colour_map; /* a map with a single colour does not allocate memory */
     map.is_banded = map.has_below = map.has_above = false;
     session_transfer t;
     session_make_transfer(1, &map, range->is_fixed ? range->low : 0, range->is_fixed ? range->high : 1, volume, &t);

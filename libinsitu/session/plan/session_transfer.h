@@ -1,4 +1,4 @@
-/* Transfer functions in the renderer's form. */
+/* Converts colour maps and opacities to transfer functions in the renderer's form. */
 #ifndef SESSION_TRANSFER_H
 #define SESSION_TRANSFER_H
 
@@ -6,27 +6,27 @@
 #include "scene.h"
 
 typedef struct session_transfer {
-    render_transfer transfer; /* points into this struct */
+    render_transfer transfer; /* the transfer function; it points into this struct */
     double opacity_values[RENDER_MAX_OPACITY_POINTS];
     float opacities[RENDER_MAX_OPACITY_POINTS];
-    /* values at the map's ends; the transfer function's range is larger if a volume shows values outside */
+    /* values at the ends of the colour map; the transfer function's range is larger if a volume shows values outside */
     double low, high;
-    bool is_constant; /* all values are equal, in the middle of low and high */
+    bool is_constant; /* set if all values are equal; the value is then in the middle of low and high */
     double constant;
-    float *table; /* its own table; NULL: the map's is used */
+    float *table; /* a table of its own; NULL: the map's table is used */
 } session_transfer;
 
-/* Computes the transfer function of a colour map over [low, high] (low > high: there are no values), and the opacity of
- * the volume; volume is NULL for a surface. half_diagonal: of the global bounds. Points into the map. Returns false if
- * memory ran out, with nothing to free. Local. */
+/* Computes the transfer function of a colour map over [low, high] (low > high: there are no values), with the opacity
+ * of the volume; volume is NULL for a surface. half_diagonal: half the diagonal of the global bounds. *out points into
+ * the map. Returns false if memory ran out, with nothing to free. Local. */
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
-/* Returns whether the transfer function takes memory, and so may fail; the same on all ranks. */
+/* Returns whether the transfer function needs memory, and so may fail; the result is the same on all ranks. */
 bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 
-/* Computes the values at which a volume is not transparent, as far as they are known before the data's range is;
- * returns the number of intervals. Local, the same on every rank. */
+/* Computes the intervals of values in which a volume is not transparent, as far as they are known before the data's
+ * range is. Returns their number. Local, the same on every rank. */
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
 /* Returns whether the values of a range are so close to each other that their rounding is visible in float32, even

@@ -1,8 +1,8 @@
-/* Trees that are up to date are not changed: new cells build a tree, moved vertices refit its bounds (until its cost
- * has grown by half, then it is rebuilt), new values refit ranges. The first scalar with which a mesh is drawn has
- * ranges in the nodes themselves, further ones have pairs beside the tree. If values determine which cells are visible
- * and vertices move in every step, only the bounds of visible nodes are refitted: a fifth of the nodes for an
- * isosurface.
+/* Updates trees. Trees that are up to date are not changed. New cells require a new tree; moved vertices require a
+ * refit of its bounds (or, if its cost has grown by half, a new tree); new values require a refit of ranges. The first
+ * scalar with which a mesh is drawn has its ranges in the nodes themselves, further ones in arrays beside the tree. If
+ * values determine which cells are visible and vertices move in every step, only the bounds of visible nodes are
+ * refitted: a fifth of the nodes for an isosurface.
  *
  * A full tree is expensive to build and cheap to keep. A partial tree, over the cells that the images can show, is
  * cheap to build if they show little, but is valid only for the current values. Which is better depends on how long the
@@ -24,11 +24,11 @@
 #include "session_candidates.h"
 #include "session_scalars.h"
 
-static const double worst_cost = 1.5; /* a refitted tree's cost, as a multiple of its cost when it was built */
+static const double worst_cost = 1.5; /* largest cost of a refitted tree, as a multiple of its cost when it was built */
 
-/* Seconds per cell on one thread, before anything was measured. */
+/* Assumed seconds per cell on one thread, used before anything was measured. */
 static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit = 1e-8};
-/* Least number of cells of a measurement from which costs are extrapolated. */
+/* Minimum number of cells of a measurement from which costs are extrapolated. */
 enum { MEASURED_CELLS = 10000 };
 
 static double rate_of(double measured, double first, int threads)
@@ -43,7 +43,7 @@ static void measure(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* Data of an update besides the meshes. */
+/* The data of an update, besides the meshes. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;
@@ -64,7 +64,7 @@ static session_scalar *own_scalar(const session_mesh *mesh)
     return NULL;
 }
 
-/* Returns the scalar whose ranges are in the nodes; if there is none, the first that is drawn. */
+/* Returns the scalar whose ranges are in the nodes; if there is none, the first scalar that is drawn. */
 static session_scalar *choose_own_scalar(session_mesh *mesh)
 {
     session_scalar *own = own_scalar(mesh);
@@ -79,7 +79,7 @@ static session_scalar *choose_own_scalar(session_mesh *mesh)
     return own;
 }
 
-/* Returns half the surface of the mesh's bounds. */
+/* Returns half the surface area of the mesh's bounding box. */
 static double surface_of(const session_mesh *mesh)
 {
     double d[3];
@@ -87,14 +87,14 @@ static double surface_of(const session_mesh *mesh)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Chooses the builder. A tree over a selection is mostly used in one step too, but has few cells, so its builder hardly
- * matters. */
+/* Chooses the tree builder. A tree over a selection is mostly used in one step, too, but has few cells, so its builder
+ * hardly matters. */
 static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_selection *selection)
 {
     return !selection && mesh->full_tree_steps == 1 ? MMBVH_MORTON : MMBVH_SAH;
 }
 
-/* Builds a tree over the selection, or over all cells if that is NULL. */
+/* Builds a tree over the selection, or over all cells if selection is NULL. */
 static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const mmbvh_selection *selection,
                                 base_error *error)
 {
@@ -169,15 +169,16 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
     return status ? status : refit_ranges(u, mesh, error);
 }
 
-/* Returns whether the tree has grown so much relative to its mesh that it should be rebuilt. Boxes that were not
- * refitted count unchanged. */
+/* Returns whether the tree has become so much more expensive, relative to its mesh, that it should be rebuilt. Boxes
+ * that were not refitted count as unchanged. */
 static bool is_decayed(const session_mesh *mesh)
 {
     const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * surface_of(mesh);
     return tree > worst_cost * built;
 }
 
-/* Lists the part of the tree that the scalars show. The ranges must be up to date there. */
+/* Lists which nodes of the tree the scalars show, as intervals of values per scalar. The ranges must be up to date
+ * there. */
 static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
 {
     int count = 0;
@@ -218,11 +219,11 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
     const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
-    mesh->candidates_key = status ? ~key : key; /* after a failure the bounds belong to no key */
+    mesh->candidates_key = status ? ~key : key; /* after a failure the bounds belong to no set of candidates */
     return status;
 }
 
-/* ---- the parent tree ----------------------------------------------------------------------------------------- */
+/* ---- the tree over all parts ----------------------------------------------------------------------------------- */
 
 static uint64_t parts_key(const session_meshes *meshes, int *count)
 {
@@ -237,8 +238,8 @@ static uint64_t parts_key(const session_meshes *meshes, int *count)
     return key;
 }
 
-/* Fills the boxes of the parts. Their ranges are unbounded: several fields share the tree, and culling by range begins
- * at the parts' roots. */
+/* Fills in the bounding boxes of the parts. Their ranges are unbounded: several fields share the tree, and nodes are
+ * tested by range from the parts' roots on. */
 static void fill_boxes(const session_meshes *meshes, float *boxes, int count)
 {
     int part = 0;
@@ -280,14 +281,14 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
     return status;
 }
 
-/* ---- full or partial ----------------------------------------------------------------------------------------- */
+/* ---- choice between full and partial trees --------------------------------------------------------------------- */
 
 static double full_price(const tree_update *u, const session_mesh *mesh)
 {
     return rate_of(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
 }
 
-/* Returns whether there is a full tree of these cells. */
+/* Returns whether there is a full tree over the current cells. */
 static bool has_full_tree(const session_mesh *mesh)
 {
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
@@ -307,14 +308,14 @@ static bool has_new_values(const session_mesh *mesh)
     return false;
 }
 
-/* Returns whether nothing has changed that determines the visible cells. */
+/* Returns whether nothing has changed that determines the visible cells, so that the partial tree is still valid. */
 static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
 {
     if (!mesh->has_tree || !mesh->is_partial || mesh->is_topology_stale || mesh->is_geometry_stale) return false;
     return !has_new_values(mesh) && mesh->candidates_key == key;
 }
 
-/* Updates a partial tree. key: of the candidates. */
+/* Updates a partial tree. key: the hash of the candidates. */
 static insitu_status update_partial(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
     if (is_partial_fresh(mesh, key)) return INSITU_OK;
@@ -325,7 +326,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     const double seconds = omp_get_wtime() - start;
     measure(&u->trees->rates.select, seconds, mesh->given.cell_count);
     u->report->build_ms += 1e3 * seconds;
-    /* The full tree is built if the partial one would cost half of its price or more. */
+    /* The full tree is built if the partial one would cost at least half of its price. */
     const bool is_forced = u->choice == SCENE_TREE_PARTIAL;
     const bool is_partial = is_forced || 2 * selection.count <= mesh->drawn_count;
     status = build_tree(u, mesh, is_partial ? &selection : NULL, error);
@@ -358,8 +359,9 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
     return status;
 }
 
-/* A thread's update of some of the parts. Blocks are many and small: a region for each would cost more than it saves.
- * So if there are several parts per thread, one thread updates each. The rates are not learnt from them. */
+/* One thread's update of some of the parts. Blocks are many and small: a parallel region for each would cost more than
+ * it saves. So if there are several parts per thread, each part is updated by one thread. Rates are not measured
+ * then. */
 typedef struct thread_update {
     tree_update update;
     session_trees trees;
@@ -407,7 +409,7 @@ static insitu_status update_apart(const tree_update *u, session_mesh *const *par
     return error->status;
 }
 
-/* Lists the needed parts, or only counts them if parts is NULL. */
+/* Lists the parts that are needed and returns their number; only counts them if parts is NULL. */
 static int list_needed(const session_meshes *meshes, session_mesh **parts)
 {
     int count = 0;

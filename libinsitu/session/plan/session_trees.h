@@ -1,4 +1,4 @@
-/* Trees over this rank's meshes and the ranges of their scalars, and their update. */
+/* Builds and updates the trees over this rank's meshes and the ranges of their scalars. */
 #ifndef SESSION_TREES_H
 #define SESSION_TREES_H
 
@@ -12,16 +12,16 @@ typedef struct session_rates {
     double build, select, refit;
 } session_rates;
 
-/* State besides the meshes' own trees. */
+/* The state of all trees, besides the meshes' own trees. */
 typedef struct session_trees {
     session_rates rates;
-    mmbvh parent; /* over the trees of parent_key; empty if there is at most one tree */
+    mmbvh parent; /* tree over the trees that parent_key identifies; empty if there is at most one tree */
     uint64_t parent_key;
     bool is_parent_stale;
 } session_trees;
 
-/* Builds or refits the marked trees that are out of date. choice: the scene's. Adds to the report's times. Local:
- * errors are passed on by the next reduction. */
+/* Builds or refits those of the marked meshes' trees that are out of date. choice: the scene's kind of tree. Adds to
+ * the report's times. Local: errors are passed on by the next reduction. */
 insitu_status session_update_trees(session_trees *trees, const session_meshes *meshes, const session_space *space,
                                    scene_tree choice, const session_team *team, insitu_report *report,
                                    base_error *error);

@@ -5,7 +5,8 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* Visits the fields of the plan's isosurfaces and volumes. Views of an image share their layers. */
+/* Iterates over the fields of the plan's isosurfaces and volumes. Views of an image share their layers, so each layer
+ * is visited once. */
 typedef struct field_walk {
     const session_plan *plan;
     int image; /* number of the next image */

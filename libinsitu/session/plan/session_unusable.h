@@ -7,11 +7,11 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns a hash of this rank's cells with such values in the plan's layers; 0: there are none. As long as it is the
- * same on every rank, so are the warnings. Local. */
+/* Returns a hash of this rank's cells with values that are not finite in the plan's layers; 0 if there are none. As
+ * long as it does not change on any rank, the warnings do not change either. Local. */
 uint64_t session_unusable_key(const session_plan *plan, const session_meshes *meshes);
 
-/* Counts such cells over all ranks, and warns. Collective. */
+/* Counts the cells with values that are not finite over all ranks, and warns of them. Collective. */
 insitu_status session_warn_of_unusable(const session_plan *plan, const session_catalogue *catalogue,
                                        const session_meshes *meshes, const session_team *team, session_report *report,
                                        base_error *error);

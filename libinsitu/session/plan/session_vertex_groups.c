@@ -19,8 +19,8 @@ static session_key key_of_place(const double place[3])
     return key;
 }
 
-/* Assigns groups to the vertices of a part's drawn cells. Until then of_vertex is -2 - i for the i-th twin. one_vertex
- * (not NULL by id) gets the number of one vertex of each group. */
+/* Assigns groups to the vertices of a part's drawn cells. Before that, of_vertex is -2 - i for the i-th twin.
+ * one_vertex, which is NULL unless vertices are equal by id, gets the number of one vertex of each group. */
 static void group_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
@@ -36,8 +36,8 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
         while (grid_walk_next(&walk, &vertex)) {
             if (of_vertex[vertex] < 0) {
                 const int64_t twin = -2 - of_vertex[vertex];
-                const session_key key =
-                    twin >= 0 ? key_of_place(border->twins[twin].place) : session_vertex_key(mesh, vertex, basis->by_id);
+                const session_key key = twin >= 0 ? key_of_place(border->twins[twin].place)
+                                                  : session_vertex_key(mesh, vertex, basis->by_id);
                 of_vertex[vertex] = session_keys_add(&out->keys, &key);
                 if (one_vertex) one_vertex[of_vertex[vertex]] = out->firsts[part] + vertex;
             }
@@ -67,7 +67,7 @@ static bool group_vertices(const groups_basis *basis, session_vertex_groups *out
     return true;
 }
 
-/* ---- groups that other ranks may have -------------------------------------------------------------------------- */
+/* ---- groups that other ranks may have, too --------------------------------------------------------------------- */
 
 static void place_of_vertex(const groups_basis *basis, const session_vertex_groups *groups, int64_t number,
                             double place[3])
@@ -92,7 +92,8 @@ static void place_of(const groups_basis *basis, const session_vertex_groups *gro
         memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
 }
 
-/* Finds the home of each group in another rank's box, and counts the homes; -1: this rank alone has the group. */
+/* Finds the home rank of each group that lies in another rank's box, and counts the groups per home; -1: only this rank
+ * has the group. */
 static void find_homes(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out, int *home)
 {
     for (int64_t group = 0; group < out->count; group++) {
@@ -108,7 +109,7 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
     }
 }
 
-/* Lists the shared groups by their homes. */
+/* Lists the shared groups, sorted by their home ranks. */
 static bool list_shared(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out)
 {
     int *home = base_alloc((size_t)out->count * sizeof *home);

@@ -21,7 +21,7 @@ enum { KEY_WORDS = 3 };
 
 /* ---- keys of all vertices ------------------------------------------------------------------------------------- */
 
-/* Marks the vertices of cells that are not ghosts with 0, the others with -1. */
+/* Sets the entries of vertices of cells that are not ghosts to 0, and the others to -1. */
 static void mark_vertices(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -72,9 +72,9 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
     return session_no_memory(error, vertex_count(sums) * 60, "gradients at vertices");
 }
 
-/* ---- requests between ranks ---------------------------------------------------------------------------------- */
+/* ---- requests to other ranks ----------------------------------------------------------------------------------- */
 
-/* The messages of an exchange. */
+/* The messages of an exchange of sums. */
 typedef struct sums_mail {
     double (*places)[3];
     session_mail questions, asked, answers, answered;
@@ -92,7 +92,7 @@ static void mail_free(sums_mail *mail)
     base_free(mail->asked_numbers);
 }
 
-/* Finds the position of a vertex for each of this rank's keys. */
+/* Finds the position of one vertex for each of this rank's keys. */
 static bool find_places(const session_vertex_sums *sums, double (**out)[3])
 {
     *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
@@ -112,7 +112,8 @@ static bool find_places(const session_vertex_sums *sums, double (**out)[3])
     return true;
 }
 
-/* Packs for each rank the keys in its box. *numbers: the keys' numbers, in the order of the message. */
+/* Packs the keys that lie in each other rank's box into messages. *numbers: the index of each key, in the order of the
+ * messages. */
 static bool write_questions(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
                             const double (*places)[3], session_mail *out, int64_t **numbers)
 {
@@ -139,7 +140,7 @@ static bool write_questions(const session_vertex_sums *sums, const session_team 
     return true;
 }
 
-/* Ensures space for the requested keys behind this rank's own. */
+/* Ensures space for the requested keys after this rank's own. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
     session_key_table all;
@@ -150,8 +151,8 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
     return true;
 }
 
-/* Adds the requested keys, or, if all vertices have keys, looks them up. *numbers: their numbers, in the order of the
- * message; -1: this rank has no such vertex. */
+/* Adds the keys that other ranks have requested or, if all vertices already have keys, looks them up. *numbers: the
+ * index of each, in the order of the messages; -1: this rank has no such vertex. */
 static bool read_questions(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;
@@ -238,7 +239,8 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
     return out->bits != NULL;
 }
 
-/* Finds all vertices with one of the keys: this rank's own, which a crack may double, and the requested ones. */
+/* Finds all vertices with one of the keys: this rank's own keys, several of whose vertices may be doubled along a
+ * crack, and the requested ones. */
 static void find_entries(const session_vertex_sums *sums, const session_sum_part *part, const key_filter *filter,
                          int threads)
 {
@@ -271,7 +273,7 @@ static session_gradient_basis basis_of(const session_vertex_sums *sums, const se
                                     sums->length,       threads};
 }
 
-/* Lists the cells of each part, and computes this rank's bounds of their contributions. */
+/* Lists the cells of each part that contribute to sums, and computes this rank's bounds of their contributions. */
 static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
@@ -309,7 +311,7 @@ static insitu_status make_sums(const session_team *team, session_vertex_sums *su
     const int64_t bytes = sums->keys.count * session_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
     if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
         session_no_memory(error, bytes, "gradients at vertices");
-    /* The last entry is 1 if this rank has failed. */
+    /* the last entry is 1 if this rank has failed */
     double largest[3] = {sums->bounds.rise, sums->bounds.sharpness, error->status != INSITU_OK};
     insitu_status status =
         session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");

@@ -1,4 +1,4 @@
-/* Sums of gradients at vertices over all ranks (scalars/session_gradients.h). */
+/* Sums gradients at vertices over all ranks (scalars/session_gradients.h). */
 #ifndef SESSION_VERTEX_SUMS_H
 #define SESSION_VERTEX_SUMS_H
 
@@ -7,33 +7,35 @@
 #include "session_gradients.h"
 #include "session_space.h"
 
-/* One of this rank's parts of the meshes. */
+/* One of this rank's parts of the meshes, with the keys of its vertices. */
 typedef struct session_sum_part {
     session_mesh *mesh;
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
-    int32_t *entries; /* key of each vertex, or -1 */
+    int32_t *entries; /* index of each vertex's key, or -1 */
 } session_sum_part;
 
-/* This rank's work on the sums of the same scalars of one mesh or several. part_count 0: it has none of them. */
+/* The data of this rank for the sums of the same scalars on one or several meshes. part_count is 0 if this rank has
+ * none of the meshes. */
 typedef struct session_vertex_sums {
     int part_count;
     session_sum_part *parts;
     int field_count;
-    bool by_id;   /* vertices are equal by global ids, else by coordinates */
-    bool are_all; /* every vertex of each part has a key: all ranks get all their cells' sums */
+    bool by_id;   /* set if vertices are equal by global ids; otherwise they are equal by coordinates */
+    bool are_all; /* set if every vertex of each part has a key, so that all ranks get the sums of all their cells */
     session_key_table keys;
-    int64_t own_count; /* number of this rank's keys; the keys after them were asked for by other ranks */
+    int64_t own_count; /* number of this rank's keys; the keys after them were requested by other ranks */
     session_gradient_bounds bounds;
     double length;
-    int64_t *sums; /* session_sum_words() per key */
+    int64_t *sums; /* the sums, session_sum_words() words per key */
 } session_vertex_sums;
 
 /* Gives a key to every vertex of a cell that is not a ghost. Local. */
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
 
-/* Computes the sums of this rank's keys, over all ranks. Keys and entries must be set. A rank that has failed before
- * calls this with its error in *error. An error at the very end is stored only in *error. Collective, else agreed. */
+/* Computes the sums of this rank's keys over all ranks. Keys and entries must be set. A rank that has failed before
+ * calls this with its error in *error. An error at the very end is stored only in *error. Collective, otherwise
+ * agreed. */
 insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
                                 session_vertex_sums *sums, base_error *error);
 
