@@ -35,7 +35,8 @@ static const char *allowed_words(int kind)
  * this code, and the product of an index and a stride below it is far from overflow. */
 static const uint64_t most_bytes = (uint64_t)1 << 48;
 
-/* Checks a stride. It may be negative: then the elements lie before the first one. A stride of 0 bytes means packed. */
+/* Checks a stride in bytes. A negative stride is valid: the elements then lie before the first one. A stride of 0 means
+ * that the elements are packed. */
 static insitu_status check_stride(const void *data, const char *name, int64_t count, int64_t stride, int64_t size,
                                   bool is_anywhere, insitu_status bad, base_error *error)
 {
@@ -43,7 +44,7 @@ static insitu_status check_stride(const void *data, const char *name, int64_t co
         return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", name,
                          (long long)stride, (long long)size);
     const uint64_t step = stride < 0 ? 0 - (uint64_t)stride : (uint64_t)stride;
-    const uint64_t steps = count > 1 ? (uint64_t)count - 1 : 1; /* steps from the first element to the last */
+    const uint64_t steps = count > 1 ? (uint64_t)count - 1 : 1; /* number of steps from the first element to the last */
     const bool fits = count == 0 || step <= most_bytes / steps;
     if (!fits || (stride < 0 && count && step * steps > (uintptr_t)data))
         return base_fail(error, bad, "%s have a stride of %lld bytes: %lld of them lie outside of memory", name,

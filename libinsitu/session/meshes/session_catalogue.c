@@ -31,13 +31,13 @@ static size_t append_fault(char *text, size_t capacity, size_t at, const base_er
     return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
 }
 
-/* What this rank's parts of a mesh have in common. */
+/* Properties that this rank's parts of a mesh have in common. */
 typedef struct part_summary {
     bool is_given, has_cells, has_ids, is_refined;
-    const base_error *problem; /* of the first part that is at fault; NULL: of none */
+    const base_error *problem; /* error of the first part that has one; NULL: no part has an error */
 } part_summary;
 
-/* Vertices have ids where all parts with cells have some. */
+/* Summarizes the parts of a mesh. Its vertices have ids if all parts with cells have ids, and there is at least one. */
 static part_summary summarize(const session_parts *parts)
 {
     part_summary out = {.has_ids = true};
@@ -62,7 +62,7 @@ static const session_field *find_given(const session_mesh *part, const char *nam
     return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
 }
 
-/* Tells whether no part before this one has the field, so that it is listed here. */
+/* Returns whether no earlier part has the field. The field is then listed with this part. */
 static bool is_first_with(const session_parts *parts, int part, const session_field *field)
 {
     for (int i = 0; i < part; i++)
@@ -70,7 +70,7 @@ static bool is_first_with(const session_parts *parts, int part, const session_fi
     return true;
 }
 
-/* Finds what is wrong with a field on some part: what was told of it, or that it is not the same on all blocks. */
+/* Finds an error of a field on any part: its description is invalid, or it is not the same on all blocks. */
 static void find_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;
@@ -91,7 +91,7 @@ static void find_problem(const session_parts *parts, const session_field *first,
     }
 }
 
-/* Visits the fields that the parts have, each once, by the first part that has it. */
+/* Iterator over the fields of the parts. Each field is visited once, with the first part that has it. */
 typedef struct field_visit {
     const session_parts *parts;
     int part, next;
@@ -160,7 +160,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* What is wrong on some blocks alone counts, as other ranks do not know of it. */
+/* An error that only some blocks have is part of the hash, because other ranks do not know of it. */
 uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -559,7 +559,8 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
-/* Hashes when the cells and the coordinates of this rank's parts of a mesh were last new; 0 if it has none. */
+/* Computes hashes of the stamps at which the cells and the coordinates of this rank's parts of a mesh last changed; 0
+ * if this rank has no part. */
 static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2])
 {
     bool has_any = false;

@@ -25,7 +25,7 @@ bool session_is_reordered(const insitu_mesh *given)
     return has_gaps || session_vertex_turn(given->vertex_order, type);
 }
 
-/* Returns whether a mesh of mixed cells has any cell in another order than VTK's. */
+/* Returns whether a mesh of mixed cells contains a cell whose vertices are in another order than VTK's. */
 static bool has_turned_cells(const session_mesh *mesh)
 {
     const grid *g = &mesh->cells;
@@ -34,10 +34,10 @@ static bool has_turned_cells(const session_mesh *mesh)
     return cell < g->cell_count;
 }
 
-/* Entries of the caller's connectivity that cells use, and their layout. */
+/* The entries of the caller's connectivity that belong to cells, and their layout in rows. */
 typedef struct cell_rows {
     const grid_array *connectivity;
-    int64_t count, row, used; /* `used` entries of each row are read */
+    int64_t count, row, used; /* number of entries, entries of each row, and how many of these are read */
 } cell_rows;
 
 static int64_t entry_of(const cell_rows *rows, int64_t i)

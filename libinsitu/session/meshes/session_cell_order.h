@@ -1,15 +1,14 @@
-/* Cells whose vertices are stored in connectivity in another order than VTK's, or in rows with more entries than
- * vertices. */
+/* Copies cells whose vertices are not stored in VTK's order, or are stored in rows with more entries than vertices. */
 #ifndef SESSION_CELL_ORDER_H
 #define SESSION_CELL_ORDER_H
 
 #include "session_mesh.h"
 
-/* Returns whether session_order_cells() has anything to do. */
+/* Returns whether session_order_cells() must copy any cells. */
 bool session_is_reordered(const insitu_mesh *given);
 
-/* Returns the positions of VTK's vertices in the other order; NULL if the orders are equal for the type. Each
- * permutation is its own inverse. */
+/* Returns, for each vertex in VTK's order, its position in the other order; NULL if both orders are equal for this type
+ * of cell. Each permutation is its own inverse. */
 const signed char *session_vertex_turn(insitu_vertex_order order, int type);
 
 /* Copies the cells' vertices into the mesh's topology, contiguously and in VTK's order. Bad indices are copied

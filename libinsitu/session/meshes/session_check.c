@@ -29,7 +29,7 @@ typedef struct face_edge {
     int64_t low, high, face;
 } face_edge;
 
-/* A growing buffer per thread; initially zero. */
+/* A buffer of one thread that grows as needed. It must be zero initially. */
 typedef struct face_room {
     face_edge *edges;
     int64_t capacity;
@@ -38,13 +38,13 @@ typedef struct face_room {
 typedef enum face_fault {
     FACES_GOOD,
     FACES_NO_MEMORY,
-    FACES_TOO_FEW,       /* a cell with less than 4 faces */
-    FACE_BAD_INDEX,      /* a face that does not exist */
-    FACE_BAD_OFFSETS,    /* offsets outside face_connectivity, or decreasing */
-    FACE_TOO_SMALL,      /* less than 3 vertices */
-    FACE_BAD_VERTEX,     /* a vertex that does not exist */
-    FACE_BAD_COORDINATE, /* not finite; not checked in ghosts */
-    FACES_OPEN           /* an edge that does not belong to exactly two faces */
+    FACES_TOO_FEW,       /* the cell has less than 4 faces */
+    FACE_BAD_INDEX,      /* the cell refers to a face that does not exist */
+    FACE_BAD_OFFSETS,    /* the offsets lie outside face_connectivity, or decrease */
+    FACE_TOO_SMALL,      /* a face has less than 3 vertices */
+    FACE_BAD_VERTEX,     /* a face refers to a vertex that does not exist */
+    FACE_BAD_COORDINATE, /* a coordinate is not finite; this is not checked in ghosts */
+    FACES_OPEN           /* some edge does not belong to exactly two faces */
 } face_fault;
 
 typedef struct face_place {
@@ -151,7 +151,7 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
                                     base_error *error)
 {
     const char *name = mesh->label;
-    const long long base = mesh->given.index_base; /* indices and offsets are reported as the caller has them */
+    const long long base = mesh->given.index_base; /* indices and offsets are reported in the caller's numbering */
     const long long at = cell, face = place->face + base, vertex = place->vertex + base;
     switch (fault) {
     case FACES_NO_MEMORY:
@@ -201,7 +201,7 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 
 typedef struct fault_place {
     int type;
-    int64_t first, next; /* offsets */
+    int64_t first, next; /* begin and end offset of the cell */
     int64_t vertex;      /* index as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
@@ -231,7 +231,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
-/* Checks a polygon. Only for this type the number of vertices differs from cell to cell. */
+/* Checks a polygon. Polygons are the only type whose number of vertices differs from cell to cell. */
 static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_place *place)
 {
     const grid *g = &mesh->cells;
@@ -257,7 +257,8 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
-    if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD; /* padding has no vertices; others are in range */
+    /* cells of the padding have no vertices; those of all others are in range */
+    if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD;
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
         place->next = grid_offset_end(&g->offsets, cell);
@@ -274,7 +275,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, place);
 }
 
-/* The type as it stands in the array, which may be of int64. */
+/* Returns the type as stored in the caller's array, which may contain integers of 64 bits. */
 static long long given_type(const session_mesh *mesh, int64_t cell)
 {
     const grid *g = &mesh->cells;
@@ -303,7 +304,7 @@ static const char *type_name(int type)
     }
 }
 
-/* Returns the name of the type that the caller gave: a polyhedron may be read as another type. */
+/* Returns the name of the type that the caller gave, since a polyhedron may be read as another type. */
 static const char *given_name(const session_mesh *mesh, int64_t cell)
 {
     return type_name(session_given_type(mesh, cell));
@@ -338,7 +339,8 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
-/* Reports a bad cell, which is checked again; if it is valid now, memory ran out before. */
+/* Reports the error of a bad cell, which is checked a second time. If it is valid now, memory ran out the first
+ * time. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
@@ -384,7 +386,7 @@ static int64_t check_each(const session_mesh *mesh, int64_t begin, int64_t end, 
     return cell;
 }
 
-/* Returns the lowest bad cell, or cell_count. */
+/* Checks all cells in parallel. Returns the lowest bad cell, or cell_count if all are valid. */
 static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
 {
     const int64_t count = mesh->cells.cell_count;
@@ -400,7 +402,8 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
             const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
-            /* A run ends at a bad cell, or at a polygon, which it cannot check. */
+            /* The fast check ends at a bad cell, or at a polygon, which it cannot check; the cells after that are
+             * checked one by one. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
             if (at < end) at = check_each(mesh, at, end, &room, &mine);
             if (at < end) first_bad = at;
@@ -424,10 +427,10 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
                      mesh->label, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
-/* Largest coordinate with which squares and volumes do not overflow double. */
+/* Largest coordinate for which squares and volumes do not overflow a double. */
 static const double largest_coordinate = 1e100;
 
-/* Reports the first drawn cell with too large a coordinate. */
+/* Reports the first drawn cell that has a coordinate above the largest allowed one. */
 static insitu_status describe_far_cell(const session_mesh *mesh, base_error *error)
 {
     const grid *g = &mesh->cells;
@@ -450,8 +453,8 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
     return INSITU_OK;
 }
 
-/* Reports the first drawn cell with volume in a mesh without z, in which it would have none. Only mixed cells are
- * checked here, as insitu_set_mesh() knows the type of others. */
+/* Reports the first drawn cell of a volume type in a mesh without z coordinates, where it would have no volume. Only
+ * mixed cells are checked here, because insitu_set_mesh() checks the type of all others. */
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
@@ -489,7 +492,7 @@ static void find_flat(const grid *g, int threads, uint64_t *flat)
     }
 }
 
-/* Finds the cells without volume, which are omitted from trees. If they have changed, the tree is dropped. */
+/* Finds the cells without volume, which are omitted from trees. If these cells have changed, the tree is dropped. */
 static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads, base_error *error)
 {
     const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat;
@@ -520,7 +523,8 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
         mesh->upper[axis] = tally.upper[axis];
     }
     mesh->drawn_count = tally.drawn;
-    mesh->ghost_count = tally.ghosts - (mesh->cells.cell_count - session_cell_count(mesh)); /* without padding */
+    /* cells of the padding are not counted */
+    mesh->ghost_count = tally.ghosts - (mesh->cells.cell_count - session_cell_count(mesh));
     mesh->inverted_count = tally.inverted;
     mesh->flat_count = tally.flat;
     mesh->shell_count = tally.shells;
@@ -537,12 +541,12 @@ static insitu_status describe_misfit(const session_mesh *mesh, base_error *error
                      "mesh \"%s\": lattice: block %lld of rank %d, whose refinement along %c is %lld, covers part of a "
                      "cell of this block, whose refinement is %lld: finer blocks begin and end at borders of coarser "
                      "cells",
-                     mesh->label, (long long)m->block, m->rank, "ijk"[m->axis], (long long)m->refinement,
+                     mesh->label, (long long)m->block, m->rank, "ijk"[m->axis], (long long)m -> refinement,
                      (long long)own);
 }
 
-/* Checks a mesh. If cells are invalid, the topology computed from them is dropped, as the caller may correct them in
- * place. */
+/* Checks a mesh. If cells are invalid, the topology computed from them is dropped, because the caller may correct the
+ * arrays in place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     if (mesh->misfit.is_any) return describe_misfit(mesh, error);

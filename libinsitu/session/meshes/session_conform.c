@@ -1,6 +1,7 @@
-/* The rooms below read coordinates as float32 or float64, indices as int32 or int64, flags as bytes, int32 or int64,
- * all aligned: their loops are compiled once for each combination of these. Other arrays are converted here, so that
- * nobody else meets them. Unsigned indices are no other ones as long as they are below half of their range. */
+/* The code that processes meshes reads coordinates as float32 or float64, indices as int32 or int64, and flags as
+ * bytes, int32 or int64, all aligned: its loops are compiled once for each combination of these types. Arrays of other
+ * types are converted here, so that no other code meets them. Unsigned indices are read as signed ones, without a copy,
+ * as long as they are below half of their range. */
 #include "session_conform.h"
 
 #include <string.h>
@@ -9,15 +10,15 @@
 #include "region.h"
 #include "session_agree.h"
 
-/* What the numbers of an array mean. */
+/* The meaning of the numbers in an array. */
 typedef enum conform_role { OF_PLACES, OF_INDICES, OF_TYPES, OF_FLAGS } conform_role;
 
-/* One of the arrays. */
+/* An array of a mesh that may have to be copied. */
 typedef struct conform_array {
     insitu_array *array;
     conform_role role;
     int64_t count;
-    int64_t below; /* of indices: what sound ones are at most */
+    int64_t below; /* an upper bound of valid indices, if the array contains indices */
 } conform_array;
 
 static conform_array array_of(insitu_mesh *m, int number)
@@ -37,14 +38,14 @@ static conform_array array_of(insitu_mesh *m, int number)
     }
 }
 
-/* The type as which indices are read, in place or from a copy. */
+/* Returns the type as which indices are read, either in place or from a copy. */
 static insitu_type index_type(insitu_type type, int64_t below)
 {
     if (type == INSITU_INT64 || type == INSITU_UINT64) return INSITU_INT64;
     return type == INSITU_UINT32 && below > INT32_MAX ? INSITU_INT64 : INSITU_INT32;
 }
 
-/* The type as which the array is read; *is_copied: from a copy. */
+/* Returns the type as which the array is read. *is_copied is set if it must be read from a copy. */
 static insitu_type read_type(const conform_array *of, bool has_map, bool *is_copied)
 {
     const insitu_type type = of->array->type;
@@ -86,7 +87,7 @@ static int64_t integer_at(insitu_type type, const char *p)
     }
 }
 
-/* A cell's type by the caller's map; no type where it has none. */
+/* Returns the type of a cell according to the caller's map, or GRID_NO_TYPE if the map does not contain its number. */
 static unsigned char mapped_type(const session_conformed *conformed, int64_t number)
 {
     if (number < 0 || number >= conformed->type_count) return GRID_NO_TYPE;
@@ -168,7 +169,8 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
     return true;
 }
 
-/* Puts a copy's place into the description, taken over from the last description's copies or new. */
+/* Makes the description refer to the copy of an array, if it needs one. The copy is taken over from the last
+ * description if is_kept, and is otherwise allocated. Returns false if memory runs out. */
 static bool place_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
 {
     const conform_array of = array_of(given, number);
@@ -208,7 +210,7 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     session_drop_conformed(&mesh->conformed);
     mesh->conformed = made;
     mesh->original = *original;
-    mesh->original.cell_type_map = NULL; /* it has been copied */
+    mesh->original.cell_type_map = NULL; /* the map has been copied above */
     mesh->given = given;
     mesh->given.cell_type_map = NULL;
     return INSITU_OK;

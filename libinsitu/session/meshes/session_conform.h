@@ -1,21 +1,22 @@
-/* Copies of a mesh's arrays that the rooms below do not read where they are: integers as coordinates, small integers,
- * flags of more than a byte, numbers of the code's own for cell types, and arrays that are not aligned. */
+/* Copies those arrays of a mesh that other code cannot read in place: coordinates given as integers, small integers,
+ * flags of more than one byte, cell types in the caller's own numbers, and arrays that are not aligned. */
 #ifndef SESSION_CONFORM_H
 #define SESSION_CONFORM_H
 
 #include "session_mesh.h"
 
-/* Stores the description in mesh->original, and in mesh->given with the copies in place of such arrays. Copies are
- * allocated here and filled by session_fill_conformed(). Those of what has not changed (INSITU_CHANGED_* bits of
- * changed) stay as they are. On an error some copies are gone, and the mesh can
- * only be dropped. */
+/* Stores the description in mesh->original and, with the copies in place of such arrays, in mesh->given. Copies are
+ * allocated here and filled by session_fill_conformed(). Copies of arrays that have not changed, according to the
+ * INSITU_CHANGED_* bits of `changed`, are kept. After an error some copies are missing, and the mesh can only be
+ * dropped. */
 insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *original, unsigned changed,
                                    base_error *error);
 
-/* Fills the copies from the caller's arrays. Parallel. */
+/* Fills the copies from the caller's arrays. Uses all threads. */
 void session_fill_conformed(session_mesh *mesh, int threads);
 
-/* Tells whether the map from numbers to cell types is the one that was copied; NULL: there is none. */
+/* Returns whether the map from numbers to cell types equals the one that was copied. NULL means that there is no
+ * map. */
 bool session_has_types(const session_mesh *mesh, int count, const int *map);
 
 #endif

@@ -11,10 +11,10 @@
 
 enum { MOST_SAMPLES = 1024 };
 
-/* The data that a rank sends to all others. */
+/* The data that each rank sends to all others. */
 typedef struct rank_part {
     session_box box;
-    int64_t first; /* begin of this rank's share of the ids */
+    int64_t first; /* first id of this rank's share of the ids */
     int64_t has_ids;
 } rank_part;
 
@@ -33,8 +33,8 @@ static int compare_ids(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns one of this rank's ids, at its quantile of a sample of them. Any evenly chosen sample suffices, as all ranks
- * receive the result. */
+/* Returns one of this rank's ids, namely the quantile of this rank in a sample of its ids. Any evenly chosen sample
+ * suffices, as all ranks receive the result. */
 static int64_t quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);

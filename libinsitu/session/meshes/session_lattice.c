@@ -81,7 +81,7 @@ static insitu_status check_strides(const char *what, const int64_t strides[3], c
                                    base_error *error)
 {
     int order[3];
-    int64_t reach = 1; /* count of numbers from the first to the last of the axes so far */
+    int64_t reach = 1; /* the number of elements from the first to the last one along the axes processed so far */
     order_axes(strides, counts, order);
     for (int i = 0; i < 3; i++) {
         const int axis = order[i];
@@ -256,7 +256,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
         changes |= INSITU_CHANGED_TOPOLOGY;
     const bool is_moved = memcmp(a->first, b->first, sizeof a->first) != 0;
     if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_zero(a->refinement)))
-        changes |= INSITU_CHANGED_TOPOLOGY; /* others are covered, and cover */
+        changes |= INSITU_CHANGED_TOPOLOGY; /* other cells are then covered by finer blocks, or cover coarser ones */
     for (int axis = 0; axis < 3; axis++)
         if (a->origin[axis] != b->origin[axis] || a->spacing[axis] != b->spacing[axis] ||
             a->first[axis] != b->first[axis] || !session_is_same_array(&a->axes[axis], &b->axes[axis]))

@@ -1,10 +1,10 @@
-/* Structured blocks, in the caller's description and as a grid. */
+/* Structured blocks: checks of the caller's description, and the grid made of it. */
 #ifndef SESSION_LATTICE_H
 #define SESSION_LATTICE_H
 
 #include "session_mesh.h"
 
-/* Checks the description of mesh->lattice, which must be given. Local. */
+/* Checks the description mesh->lattice, which must not be NULL. Local. */
 insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error);
 
 /* Returns whether the cells are quads, because one axis has no cells. */
@@ -13,14 +13,14 @@ bool session_is_plane(const insitu_lattice *lattice);
 /* Returns whether the coordinates are given along a lattice's axes instead of by vertex. */
 bool session_has_axes(const insitu_mesh *mesh);
 
-/* Returns the INSITU_CHANGED_* bits for the differences of two lattices, either of which may be NULL. ALL: the shape
- * differs. */
+/* Returns the INSITU_CHANGED_* bits for the differences between two lattices, either of which may be NULL.
+ * INSITU_CHANGED_ALL means that their shapes differ. */
 unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *b);
 
 /* Keeps a copy of given.lattice in the mesh, if there is one, and makes given.lattice point to it. Local. */
 void session_take_lattice(session_mesh *mesh);
 
-/* Completes the grid of a mesh that has a lattice: type, indices and, unless they are given by vertex, the
+/* Completes the grid of a mesh that has a lattice: the cell type, the indices and, unless they are given by vertex, the
  * coordinates. */
 void session_read_lattice(session_mesh *mesh, grid *g);
 

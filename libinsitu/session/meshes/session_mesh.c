@@ -45,7 +45,7 @@ grid_array session_grid_array(const insitu_array *array)
 
 grid_array session_coordinates(const insitu_mesh *mesh, int axis)
 {
-    static const double zero = 0; /* its first half is a float's zero */
+    static const double zero = 0; /* the first half of its bytes is also a zero of type float */
     const insitu_array *given = &mesh->coordinates[axis];
     if (given->data) return session_grid_array(given);
     return (grid_array){.data = (const char *)&zero, .is_wide = session_type_size(mesh->coordinates[0].type) == 8};
@@ -290,7 +290,7 @@ bool session_next_part(session_part_walk *walk)
     return false;
 }
 
-/* Frees what is made of the cells. */
+/* Frees the data that is derived from the cells. */
 static void drop_made(session_mesh *mesh)
 {
     session_drop_outers(mesh, true);
@@ -352,7 +352,7 @@ static void free_mesh(session_mesh *mesh)
     base_free(mesh);
 }
 
-/* Returns how many meshes stand before the block, or before the end of all blocks of that name. */
+/* Returns the number of meshes that precede the block or, if is_end, all meshes up to the last block of that name. */
 static int count_before(const session_meshes *meshes, const char *name, int64_t block, bool is_end)
 {
     int low = 0, high = meshes->count;
@@ -368,7 +368,7 @@ static int count_before(const session_meshes *meshes, const char *name, int64_t 
     return low;
 }
 
-/* Returns the index at which the block is, or would be inserted, among the meshes. */
+/* Returns the index of the block among the meshes, or the index at which it would be inserted. */
 static int mesh_position(const session_meshes *meshes, const char *name, int64_t block)
 {
     return count_before(meshes, name, block, false);
@@ -394,7 +394,7 @@ session_mesh *session_find_block(const session_meshes *meshes, const char *name,
     return mesh && mesh->block == block && strcmp(mesh->name, name) == 0 ? mesh : NULL;
 }
 
-/* Ensures space for one more mesh. */
+/* Ensures that there is space for one more mesh. Returns false if memory runs out. */
 static bool make_room(session_meshes *meshes)
 {
     if (meshes->count < meshes->capacity) return true;
@@ -421,7 +421,7 @@ static void insert_mesh(session_meshes *meshes, session_mesh *mesh)
     meshes->count++;
 }
 
-/* NULL where memory runs out. */
+/* Returns the name of a mesh or block for messages; NULL if memory runs out. */
 static char *make_label(const char *name, int64_t block)
 {
     const size_t size = strlen(name) + 24;
@@ -448,7 +448,7 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t
     return mesh;
 }
 
-/* Removes so many meshes from the first on. */
+/* Removes `count` meshes, beginning with the one at index `first`. */
 static void remove_meshes(session_meshes *meshes, int first, int count)
 {
     for (int i = first; i < first + count; i++) {

@@ -8,36 +8,38 @@
 #include "mmbvh.h"
 
 typedef struct session_field {
-    insitu_field given; /* name is a copy of ours, the values are borrowed */
-    grid_array values;  /* or of the first component, if each is an array of its own: */
+    insitu_field given; /* the name is a copy that the session owns, the values are the caller's */
+    grid_array values;  /* array of all components or, if each component has its own array (apart), of the first one */
     grid_array *apart;
     int64_t component_stride;
-    base_error problem;          /* what was wrong with the last insitu_set_field(), */
-    bool is_problem_of_contents; /* or with its values, found by this step's check */
+    base_error problem;          /* error of the last insitu_set_field(), or an error of the values */
+    bool is_problem_of_contents; /* set if the error is one of the values, found by the check of this step */
     bool has_index;
     bool is_copy_stale; /* the values or the index have changed since the copy was made */
-    bool is_wanted;     /* needed by statistics of this step; fields of images have scalars */
-    bool is_filled;     /* given.fill was called in this step; its values are valid unless it failed: */
+    bool is_wanted;     /* set if statistics of this step need the field; fields that images show have scalars */
+    /* set if given.fill was called in this step; the values are valid unless fill_problem holds an error */
+    bool is_filled;
     base_error fill_problem;
-    bool is_derived;          /* the session makes it of other fields, in copy (plan/session_derived.h) */
-    bool is_source;           /* a derived field that this step needs is made of it */
-    uint64_t made_of;         /* hash of the inputs of a derived field's values; 0: no values yet */
+    /* set if the session computes the field from other fields, in `copy` (plan/session_derived.h) */
+    bool is_derived;
+    bool is_source;           /* set if a derived field that this step needs is computed from it */
+    uint64_t made_of;         /* hash of the inputs of a derived field's values; 0: there are no values yet */
     int64_t version;          /* incremented at each known change of the values */
-    insitu_patch *patches;    /* given.patches, a table of ours */
-    insitu_array *components; /* given.components, a table of ours */
-    char *copy;               /* NULL until made; packed tuples, components interleaved */
+    insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
+    insitu_array *components; /* copy of the table given.components, owned by the session */
+    char *copy;               /* packed tuples with interleaved components; NULL: not copied yet */
     int64_t copy_bytes;
 } session_field;
 
-/* The cells over which an extent is taken. All are drawn and have only finite values. */
+/* The sets of cells over which an extent is computed. All of these cells are drawn and have only finite values. */
 typedef enum session_extent_kind {
-    SESSION_SEEN,     /* all of them */
-    SESSION_POSITIVE, /* for the minimum, only cells all of whose values are positive */
-    SESSION_SOLID,    /* without shells */
+    SESSION_SEEN,     /* all these cells */
+    SESSION_POSITIVE, /* all these cells; but for the minimum, only those all of whose values are positive */
+    SESSION_SOLID,    /* all these cells except shells */
     SESSION_EXTENTS
 } session_extent_kind;
 
-/* low > high: there are no values. */
+/* Minimum and maximum of a scalar's values; low > high means that there are no values. */
 typedef struct session_extremes {
     bool is_known;
     double low, high;
@@ -47,43 +49,48 @@ typedef struct session_extremes {
 typedef struct session_plane {
     double normal[3]; /* unit normal */
     double point[3];  /* a point on the plane */
-    /* the point is at `offset` along the normal from the middle of the data's bounds, and moves with them */
+    /* set if the point is at `offset` along the normal from the centre of the data's bounds, and moves with them */
     bool is_central;
-    /* share: additional shift along the normal, as a fraction (-1 .. 1) of half the data's extent */
+    /* offset of the point; share is an additional shift along the normal, as a fraction (-1 .. 1) of half the data's
+     * extent */
     double offset, share;
 } session_plane;
 
 /* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;     /* index of the field in the mesh; -1: distances */
-    int component; /* as grid_field.component */
+    int field;     /* index of the field in the mesh; -1: the scalar is the distance from a plane */
+    int component; /* same as grid_field.component */
     bool is_recentred;
-    uint64_t joined;    /* scene_field.joined of recentred values */
-    int64_t made;       /* how often their values were made */
-    uint64_t of_places; /* the session_joint.places that they were made of */
-    bool is_used;       /* an image of this step uses it */
-    bool wants_ranges;  /* an image of this step needs its trees' ranges; colours need none */
-    bool needs_all;     /* an image of this step may need any cell */
-    /* unless needs_all: intervals of the values that this step's images show; cells that meet one are candidates */
+    uint64_t joined;    /* value of scene_field.joined, if the values are recentred */
+    int64_t made;       /* number of times that the values have been computed */
+    uint64_t of_places; /* value of session_joint.places for which the values were computed */
+    bool is_used;       /* set if an image of this step uses the scalar */
+    /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
+    bool wants_ranges;
+    bool needs_all; /* set if an image of this step may need any cell */
+    /* Intervals of the values that this step's images show, unless needs_all is set. Only cells whose values intersect
+     * an interval are needed. */
     int interval_count;
     mmbvh_interval *intervals;
-    session_plane plane;       /* the plane that distances are from */
-    float *distances;          /* at vertices, a declared copy; NULL until computed */
-    double *vertex_values;     /* cell values recentred to vertices, reported as a copy; NULL until computed */
-    grid_field own;            /* the cells' own values, where recentred ones are in use */
-    int32_t *gradient_entries; /* each vertex's entry in gradients, or -1; NULL until computed. A declared copy, for
-                                  smooth normals of the last step that drew some */
+    session_plane plane; /* the plane from which distances are computed */
+    float *distances;    /* distance of each vertex, a copy reported to the user; NULL: not computed yet */
+    /* cell values recentred to vertices, a copy reported to the user; NULL: not computed yet */
+    double *vertex_values;
+    grid_field own; /* the original values of the cells, if recentred ones are used */
+    /* index of each vertex in `gradients`, or -1; NULL: not computed yet. A copy reported to the user, for smooth
+     * normals of the last step that drew some */
+    int32_t *gradient_entries;
     float (*gradients)[3];
     int64_t gradient_count;
-    bool are_values_stale; /* recentred values must be computed again */
-    bool is_suspect;       /* the values were set anew and may have changed */
+    bool are_values_stale; /* set if recentred values must be computed again */
+    bool is_suspect;       /* set if the caller passed the values again, so that they may have changed */
     bool has_checksum;
     uint64_t checksum;
     uint64_t sample;     /* checksum of a few of the values */
-    int64_t version;     /* number of changes of the values that checksums have found */
-    bool has_own_ranges; /* ranges are in the tree's nodes, else in pairs */
-    float *pairs;        /* NULL until computed */
+    int64_t version;     /* checksum of a sample of the values */
+    bool has_own_ranges; /* set if ranges are stored in `pairs`, and not in the tree's nodes */
+    float *pairs;        /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
     bool are_ranges_stale;
     int64_t unusable;
     session_extremes extremes[SESSION_EXTENTS];
@@ -97,169 +104,181 @@ typedef struct session_face {
 
 struct session_mesh;
 
-/* The cells whose values of a scalar lie within bounds; for a field at vertices, all vertices' values. */
+/* The cells whose values of a scalar lie within bounds. If the field is at vertices, the values of all vertices of the
+ * cell must lie within them. */
 typedef struct session_threshold {
-    bool is_given; /* else all cells */
-    int field;     /* index of the field in the mesh; -1: the mesh does not have it, so that no cell is within */
-    int component; /* as grid_field.component */
+    bool is_given; /* if not set, all cells are selected */
+    int field;     /* index of the field in the mesh; -1: the mesh does not have it, so that no cell is selected */
+    int component; /* same as grid_field.component */
     double low, high;
 } session_threshold;
 
-/* The faces of a mesh that only one cell has, among the cells of a threshold over all ranks, and a mesh of tets and
- * pyramids on them; a declared copy (session_outer_mesh.h). */
+/* The faces that belong to only one of the cells selected by a threshold, over all ranks, and a mesh of tets and
+ * pyramids that is built on these faces. It is a copy reported to the user (session_outer_mesh.h). */
 typedef struct session_outer {
     session_threshold threshold;
-    int64_t version; /* the version of the values that the threshold has tested, if there is one */
-    bool is_wanted;  /* an image of this step needs it */
+    int64_t version; /* version of the values to which the threshold was applied, if there is a threshold */
+    bool is_wanted;  /* set if an image of this step needs it */
     bool are_faces_known;
     int64_t face_count;
-    session_face *faces;       /* in the order of the cells */
-    struct session_mesh *mesh; /* NULL until made; its name is the mesh's */
-    double *coordinates;       /* the mesh's vertices × 3 */
+    session_face *faces;       /* sorted by cell */
+    struct session_mesh *mesh; /* the mesh, which has the name of the whole mesh; NULL: not made yet */
+    double *coordinates;       /* 3 coordinates per vertex of the mesh */
     int64_t *connectivity, *offsets;
     unsigned char *types;
-    int64_t *loops; /* as render_part.loops */
-    /* per vertex and per cell of the outer mesh: that of the whole mesh whose values it has */
+    int64_t *loops; /* same as render_part.loops */
+    /* for each vertex and each cell of the outer mesh: the one of the whole mesh whose values it has */
     int64_t *vertex_origins, *cell_origins;
     int64_t bytes;
 } session_outer;
 
 /* Arrays owned by the session that are read in place of the caller's (session_topology.h). They are computed once per
- * topology, and are declared copies. */
+ * topology, and are copies reported to the user. */
 typedef struct session_topology {
-    bool is_made;                     /* up to date for the current cells, even if there was nothing to compute */
-    bool has_own_order;               /* `connectivity` is read, with the caller's offsets and types */
-    bool has_own_cells;               /* the next members are read, else the caller's cells */
-    grid_array offsets, connectivity; /* no offsets: all cells have type cell_type */
-    unsigned char *cell_types;        /* NULL: all cells have type cell_type */
+    /* set if the arrays are up to date for the current cells, even if nothing had to be computed */
+    bool is_made;
+    bool has_own_order;               /* set if `connectivity` is read, together with the caller's offsets and types */
+    bool has_own_cells;               /* set if the next members are read, and not the caller's cells */
+    grid_array offsets, connectivity; /* offsets are NULL if all cells have the type cell_type */
+    unsigned char *cell_types;        /* NULL: all cells have the type cell_type */
     int cell_type;
-    bool has_own_faces;                         /* the next members are read, else the caller's faces */
-    grid_array face_offsets, face_connectivity; /* no data: there are no polyhedra */
-    /* lengths of the arrays that are read, the caller's or these */
+    bool has_own_faces;                         /* set if the next members are read, and not the caller's faces */
+    grid_array face_offsets, face_connectivity; /* empty if there are no polyhedra */
+    /* lengths of the arrays that are read, either the caller's or these */
     int64_t connectivity_count, face_connectivity_count;
     int64_t cell_bytes, face_bytes;
     int64_t polyhedron_count; /* number of polyhedra that the caller gave */
-    int64_t recognised_count; /* number of these that are read as tets, hexes, wedges or pyramids */
+    int64_t recognised_count; /* number of these polyhedra that are read as tets, hexes, wedges or pyramids */
 } session_topology;
 
-/* Separate vertices for each corner of each cell, read in place of the vertices that cells share (session_torn.h). A
- * declared copy. Corners are numbered as in the caller's connectivity, without the unused ends of rows. */
+/* Separate vertices for each corner of each cell, which are read in place of the vertices that cells share
+ * (session_torn.h). They are a copy reported to the user. Corners are numbered as in the caller's connectivity, without
+ * the unused ends of rows. */
 typedef struct session_torn {
-    bool is_torn; /* if false, all else is empty */
-    bool is_made; /* from the current coordinates */
+    bool is_torn; /* if not set, all other members are empty */
+    bool is_made; /* set if the coordinates are up to date */
     int64_t corner_count;
-    grid_array shared;  /* the connectivity that is torn */
-    grid_array corners; /* the corner of each entry of shared; the map is its own inverse */
+    grid_array shared;  /* the connectivity whose corners get separate vertices */
+    grid_array corners; /* the corner of each entry of `shared`; the permutation is its own inverse */
     grid_array coordinates[3];
     int64_t bytes;
 } session_torn;
 
-/* A structured block. */
+/* A structured block of cells. */
 typedef struct session_lattice {
-    insitu_lattice given; /* given.lattice of the mesh points to it, unless that is NULL */
+    insitu_lattice given; /* given.lattice of the mesh points to it, or is NULL if the mesh is not structured */
     grid_lattice cells;
-    double *places[3]; /* coordinates along the axes, of uniform and rectilinear ones: a declared copy */
+    double *places[3]; /* coordinates along the axes, if they are uniform or rectilinear; a copy reported to the user */
     int64_t bytes;     /* size of places in bytes */
 } session_lattice;
 
 enum { SESSION_CONFORMED = 9 };
 
-/* Arrays that are read from copies in other types (session_conform.h), declared ones. */
+/* Copies of arrays whose type cannot be read in place (session_conform.h). They are reported to the user. */
 typedef struct session_conformed {
-    char *copies[SESSION_CONFORMED]; /* NULL: read where they are */
-    unsigned char *types;            /* of the code's own numbers for them; NULL: it has none */
+    char *copies[SESSION_CONFORMED]; /* NULL: the array is read in place */
+    unsigned char *types;            /* cell types of the caller's own numbers; NULL: the caller has no own numbers */
     int type_count;
     int64_t bytes;
 } session_conformed;
 
-/* The cells of a block with a level of refinement, without ghost layers, as indices of its level. It is sent to other
- * ranks as words. */
+/* The box of cells of a block with a level of refinement, without ghost layers, given by indices of its level. It is
+ * sent to other ranks as 64-bit words. */
 typedef struct session_level_box {
-    uint64_t mesh; /* hash of its name */
+    uint64_t mesh; /* hash of the mesh's name */
     int64_t block, rank;
     int64_t lower[3], upper[3], refinement[3];
 } session_level_box;
 
-/* A finer block that covers part of a cell of this block. */
+/* Describes a finer block that covers only part of a cell of this block, which is an error. */
 typedef struct session_misfit {
     bool is_any;
-    int axis;                  /* along which it ends within the cell */
+    int axis;                  /* axis along which the finer block ends within the cell */
     int64_t block, refinement; /* the finer block's number on its rank, and its refinement along the axis */
     int rank;
 } session_misfit;
 
-/* Block number of a mesh that is not given as blocks, whose numbers start at 0. */
+/* Block number of a mesh that is not given as blocks; blocks have numbers from 0 on. */
 #define SESSION_WHOLE INT64_MIN
 
 /* One rank's part of a mesh, or one block of it. Blocks of one mesh have the same name. */
 typedef struct session_mesh {
     char *name;
-    int64_t block;        /* SESSION_WHOLE, or the block's number */
+    int64_t block;        /* the block's number, or SESSION_WHOLE */
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
-    insitu_mesh original; /* the caller's description, */
-    insitu_mesh given;    /* with copies for the arrays that cannot be read in place */
+    insitu_mesh original; /* the caller's description */
+    insitu_mesh given;    /* the description with copies in place of the arrays that cannot be read in place */
     session_conformed conformed;
     session_topology topology;
     session_torn torn;
     session_lattice lattice;
-    unsigned char *covered; /* NULL, or a byte a cell read in place of ghosts: those, and the cells that finer blocks
-                               cover (outer/session_covers.h); a declared copy */
+    /* One byte per cell, read in place of `ghosts`: set for ghosts and for cells that finer blocks cover
+     * (outer/session_covers.h). A copy reported to the user; NULL: `ghosts` is read */
+    unsigned char *covered;
     session_misfit misfit;
     grid cells;
-    bool is_given;               /* false after an insitu_set_mesh() that failed: problem says why */
-    base_error problem;          /* what was wrong with the last insitu_set_mesh(), */
-    bool is_problem_of_contents; /* or with the arrays' contents, found by the step's check */
+    bool is_given;               /* false after an insitu_set_mesh() that failed; `problem` then holds the error */
+    base_error problem;          /* error of the last insitu_set_mesh(), or an error of the arrays' contents */
+    bool is_problem_of_contents; /* set if the error is one of the arrays' contents, found by the check of this step */
     int field_count;
     session_field *fields;
 
-    int64_t cells_stamp, places_stamp; /* session_meshes.stamp when cells and coordinates last changed */
+    /* values of session_meshes.stamp when the cells and the coordinates last changed */
+    int64_t cells_stamp, places_stamp;
     bool is_check_stale;
-    bool is_topology_stale;    /* the tree belongs to other cells */
-    bool is_geometry_stale;    /* the tree belongs to other coordinates */
+    bool is_topology_stale;    /* set if the tree was built for other cells */
+    bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
-    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count; /* shells are drawn and flat */
-    bool has_shells_alone; /* as session_catalogue_mesh.has_shells_alone: on all ranks */
-    double size_sum;       /* the sum of the cube roots of drawn cells' volumes */
-    uint64_t *flat;        /* NULL: no cell is flat; else as in cells */
+    /* shells are cells that are drawn and flat */
+    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
+    bool has_shells_alone; /* same as session_catalogue_mesh.has_shells_alone, that is, over all ranks */
+    double size_sum;       /* sum of the cube roots of the volumes of the drawn cells */
+    uint64_t *flat;        /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
-    uint64_t apart;  /* session_catalogue_mesh.apart */
-    bool is_refined; /* session_catalogue_mesh.is_refined */
-    bool is_needed;  /* an image of this step draws it */
+    uint64_t apart;  /* same as session_catalogue_mesh.apart */
+    bool is_refined; /* same as session_catalogue_mesh.is_refined */
+    bool is_needed;  /* set if an image of this step draws the mesh */
     bool has_tree;
     mmbvh tree;
-    bool is_partial;         /* the tree contains only the candidates of candidates_key, as long as nothing changes */
-    bool are_bounds_partial; /* the full tree's bounds are those of the candidates, likewise */
-    double built_surface;    /* half the surface of the mesh's bounds when the tree was built */
+    /* set if the tree contains only the candidates of candidates_key, as long as nothing changes */
+    bool is_partial;
+    /* set if the bounds of the full tree's nodes enclose only the candidates of candidates_key */
+    bool are_bounds_partial;
+    double built_surface; /* half the surface area of the mesh's bounds when the tree was built */
     uint64_t candidates_key;
-    /* number of steps that the current full tree, or the last one, has been used; 0: there was none yet */
+    /* number of steps in which the current (or last) full tree has been used; 0: there was none yet */
     int full_tree_steps;
-    double rent; /* seconds spent on partial trees since the cells last changed, beyond the cost of a full tree */
+    double rent; /* seconds spent on partial trees since the cells last changed, minus the cost of a full tree */
     int scalar_count;
     session_scalar *scalars;
 
-    int outer_count; /* one per threshold, and one without a threshold */
+    int outer_count; /* number of outer surfaces: one per threshold, and one without a threshold */
     session_outer **outers;
 } session_mesh;
 
-/* The fill function of the caller that is running (session_filled.h). */
+/* The caller's fill function that is running (session_filled.h). */
 typedef struct session_filling {
-    const char *mesh, *field; /* NULL: none is running */
-    base_error refused;       /* error of the first session call that the fill function made */
+    const char *mesh, *field; /* mesh and field that it fills; NULL: none is running */
+    base_error refused;       /* error of the first call of the session that the fill function made */
 } session_filling;
 
 /* All meshes of this rank. */
 typedef struct session_meshes {
     int count, capacity;
-    session_mesh **items;               /* sorted by name, then by block */
-    bool are_cells_changed;             /* cells or coordinates have changed since the last agreed extent */
-    bool are_names_changed;             /* names have changed since the last agreed catalogue */
-    bool are_levels_changed;            /* blocks with levels of refinement have changed since covered cells were found */
-    int64_t level_box_count;            /* number of refined blocks near this rank's, including its own */
+    session_mesh **items; /* sorted by name, then by block */
+    /* set if cells or coordinates have changed since the ranks last agreed on an extent */
+    bool are_cells_changed;
+    bool are_names_changed; /* set if names have changed since the ranks last agreed on a catalogue */
+    /* set if blocks with levels of refinement have changed since covered cells were computed */
+    bool are_levels_changed;
+    int64_t level_box_count; /* number of refined blocks near those of this rank, including its own */
     session_level_box *level_boxes;
-    int64_t stamp;                      /* incremented by each change of cells or coordinates */
-    base_error pending;                 /* error of a set call for which there was no mesh to keep it; for one step */
-    char *pending_mesh, *pending_field; /* its mesh and field; NULL: any */
-    int aside_count;                    /* number of meshes that this step ignores, stored in items behind count */
+    int64_t stamp; /* incremented by each change of cells or coordinates */
+    /* error of a set call that cannot be stored with a mesh; it is kept for one step */
+    base_error pending;
+    char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
+    /* number of meshes that this step ignores; they are stored in items, after the first `count` */
+    int aside_count;
     session_filling filling;
 } session_meshes;
 
@@ -280,23 +299,25 @@ static inline int64_t session_type_size(insitu_type type)
     return 0;
 }
 
-/* Tells whether the place and the stride of an array are multiples of its elements' size. */
+/* Returns whether the address and the stride of an array are multiples of its element size. */
 bool session_is_aligned(const insitu_array *array);
 
-/* An array as the rooms below read it; its indices count from 0. */
+/* Returns the array in the form that the mesh processing reads. Its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
 /* Returns the vertices' coordinates along an axis; if z is not given, a single 0 for all vertices. */
 grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
-/* As above, for an array whose indices count from the mesh's index_base. */
+/* Returns an array of indices in the form that the mesh processing reads. Its indices count from the mesh's
+ * index_base. */
 grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
 
-/* As above, for offsets of so many cells or faces into so many entries, whose last one may be missing. */
+/* Returns an array of offsets in the form that the mesh processing reads. There are `count` cells or faces with a total
+ * of `entries` entries; the last offset may be missing. */
 grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
 
-/* Allocates count + 1 indices, all 0, of 4 bytes where largest fits into them, else of 8. Returns false where memory
- * runs out; the error then names the mesh and what the indices are of. */
+/* Allocates count + 1 indices, all 0, of 4 bytes if `largest` fits into them, and otherwise of 8 bytes. Returns false
+ * if memory runs out; the error then names the mesh and `what`, the purpose of the indices. */
 bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
                           base_error *error);
 
@@ -312,36 +333,37 @@ static inline void session_put_index(const grid_array *array, int64_t i, int64_t
 /* Frees an array owned by the session. */
 void session_drop_array(grid_array *array);
 
-/* This rank's parts of a mesh: the mesh itself, or its blocks. */
+/* This rank's parts of a mesh, which are either the mesh itself or its blocks. */
 typedef struct session_parts {
-    int count; /* 0: there is none of this name */
+    int count; /* 0: this rank has no mesh of this name */
     session_mesh **items;
 } session_parts;
 
 session_parts session_find_parts(const session_meshes *meshes, const char *name);
-/* Returns the parts from this index on that have the name of the first. */
+/* Returns the parts that have the same name as the one at index `first`, which must be the first of them. */
 session_parts session_parts_at(const session_meshes *meshes, int first);
-/* Returns the block; NULL if there is none of this name and number. */
+/* Returns the block with this name and number, or NULL if there is none. */
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block);
-/* The same of a mesh that is not given as blocks. */
+/* Returns the mesh with this name that is not given as blocks, or NULL if there is none. */
 static inline session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
 {
     return session_find_block(meshes, name, SESSION_WHOLE);
 }
-int session_find_field(const session_mesh *mesh, const char *name); /* index, or -1 */
+/* returns the field's index, or -1 if the mesh does not have it */
+int session_find_field(const session_mesh *mesh, const char *name);
 
-/* Adds a field without values; its name must be new and is copied. Returns NULL if memory runs out. */
+/* Adds a field without values. Its name is copied and must not exist yet. Returns NULL if memory runs out. */
 session_field *session_add_field(session_mesh *mesh, const char *name);
 
-/* Adds an empty mesh or block, which must be new. Returns NULL if memory runs out. */
+/* Adds an empty mesh or block, which must not exist yet. Returns NULL if memory runs out. */
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error);
-/* Remove a block, or a mesh with all its blocks, if there is such a one. */
+/* Removes a block, or a mesh with all its blocks. Does nothing if it does not exist. */
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block);
 void session_remove_mesh(session_meshes *meshes, const char *name);
 
-/* Free the data that depends on the fields' values, on the cells, or all data of the mesh. */
+/* Frees the scalars of the mesh, which depend on the values of its fields. */
 void session_drop_scalars(session_mesh *mesh);
-/* Frees one scalar; those after it move up. */
+/* Frees one scalar. The scalars after it move down by one index. */
 void session_drop_scalar(session_mesh *mesh, int number);
 void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
@@ -353,33 +375,33 @@ void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Frees the copies of the caller's tables: patches and components. */
 void session_drop_field_tables(session_field *field);
-/* Frees what depends on the cells after these have changed; fields stay. */
+/* Frees the data that depends on the cells, after these have changed. Fields are kept. */
 void session_renew_cells(session_meshes *meshes, session_mesh *mesh);
-/* Removes the derived fields, and with them all scalars and thresholds, which go by the numbers of fields. */
+/* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
 void session_drop_derived(session_mesh *mesh);
-/* Frees the mesh of outer faces, and if with_faces also the faces; its threshold stays. */
+/* Frees the mesh of outer faces and, if with_faces, the faces themselves. The threshold is kept. */
 void session_drop_outer(session_outer *outer, bool with_faces);
-/* Drops all outer surfaces of a mesh; if cells are new, thresholds too. */
+/* Frees all outer surfaces of a mesh. If the cells are new, thresholds are also removed. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
-/* Drops all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
- * need the mesh. */
+/* Frees all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
+ * still refer to the mesh. */
 void session_refuse_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
-/* Visits the meshes that may become parts of a picture: the caller's meshes, then the meshes of their outer faces.
+/* Iterator over the meshes that may become parts of an image: the caller's meshes, then the meshes of their outer
+ * faces.
  *
- *     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) use(walk.part);
- */
+ *     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) use(walk.part); */
 typedef struct session_part_walk {
     const session_meshes *meshes;
     session_mesh *part;
-    session_mesh *whole;  /* the mesh to which the part's outer faces belong; NULL: the part is a mesh itself */
-    session_outer *outer; /* these faces, or NULL */
+    session_mesh *whole;  /* the mesh whose outer faces the part contains; NULL: the part is a mesh of the caller */
+    session_outer *outer; /* the outer surface that the part belongs to; NULL: the part is a mesh of the caller */
     int mesh_at, whole_at, outer_at;
 } session_part_walk;
 
-/* Returns false after the last part. */
+/* Advances to the next part. Returns false after the last one. */
 bool session_next_part(session_part_walk *walk);
 
 /* Returns the number of cells that the caller gave; a lattice's array of cells may have padding. */
@@ -394,24 +416,24 @@ static inline int64_t session_vertex_count(const session_mesh *mesh)
     return mesh->torn.is_torn ? mesh->torn.corner_count : mesh->cells.vertex_count;
 }
 
-/* Returns the first error of a set call that has not been returned by a step yet, or NULL. */
+/* Returns the first error of a set call that no step has returned yet; NULL: there is none. */
 const base_error *session_pending_error(const session_meshes *meshes);
 
-/* Stores an error of a set call for which there is no mesh to keep it. field: NULL if the error does not belong to a
+/* Stores an error of a set call that cannot be stored with a mesh. field is NULL if the error does not belong to a
  * single field. */
 void session_keep_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
-/* Stores an error in a field's values for the rest of the step; copies it to *first if that holds no error yet. */
+/* Stores an error of a field's values for the rest of the step, and copies it to *first if that holds no error yet. */
 void session_keep_problem(session_field *field, const base_error *problem, base_error *first);
 
-/* Removes a mesh from the list for the rest of a step, as if this rank had no part of it. */
+/* Removes a mesh from the list for the rest of the step, as if this rank had no part of it. */
 void session_put_aside(session_meshes *meshes, session_mesh *mesh);
-/* Returns the meshes that were put aside to the list. */
+/* Puts the meshes that were put aside back into the list. */
 void session_take_back(session_meshes *meshes);
 
-/* Refuses a public call if it is made inside a fill function, as it would change data that the step reads. Returns
- * whether it was refused; the error is stored in filling.refused, and the step fails with it. Local. */
+/* Refuses a public call made inside a fill function, as it would change data that the step reads. Returns whether it
+ * was refused; the error is stored in filling.refused, and the step fails with it. Local. */
 bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
 /* Returns whether cells are described by the owners of their faces. */
@@ -420,14 +442,14 @@ static inline bool session_has_owners(const insitu_mesh *mesh)
     return mesh->owner.data || mesh->boundary_owner.data;
 }
 
-/* Returns whether the mesh is a block with a level of refinement. */
+/* Returns whether the mesh is a block that has a level of refinement. */
 static inline bool session_has_levels(const insitu_mesh *mesh)
 {
     const insitu_lattice *l = mesh->lattice;
     return l && mesh->cell_count > 0 && (l->refinement[0] || l->refinement[1] || l->refinement[2]);
 }
 
-/* Returns the number of given faces. Those of the separate list for the boundary come after the others. */
+/* Returns the number of faces that the caller gave. Those of the separate list of boundary faces follow the others. */
 static inline int64_t session_face_count(const insitu_mesh *mesh)
 {
     return mesh->face_count + mesh->boundary_face_count;

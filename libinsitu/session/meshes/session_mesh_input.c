@@ -1,6 +1,6 @@
-/* The set calls fill in the table of meshes. Only descriptions are checked here; a step reads the arrays. An error is
- * returned immediately, and kept with the mesh or the field until that is set again, so that the next step can return
- * it on every rank. */
+/* The set calls store meshes and fields in the table of meshes. Only descriptions are checked here; the arrays are read
+ * by a step. An error is returned immediately, and is also kept with the mesh or the field until that is set again, so
+ * that the next step can return it on every rank. */
 #include "session_mesh_input.h"
 
 #include <stdio.h>
@@ -66,7 +66,7 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Returns whether cells without z coordinates may be visible: as shells in the plane z = 0. */
+/* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
 static bool may_be_plane(const insitu_mesh *mesh)
 {
     if (mesh->lattice) return session_is_plane(mesh->lattice);
@@ -122,7 +122,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks arrays of pointers, whose type is that of the elements to which they point. */
+/* Checks arrays of pointers. Their type is that of the elements to which they point. */
 static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_array *lists = &mesh->face_lists;
@@ -256,7 +256,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Returns whether cells must differ, whatever the caller declares. */
+/* Returns whether the cells of two descriptions must differ, regardless of what the caller declares as changed. */
 static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 {
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
@@ -273,8 +273,8 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->boundary_face_connectivity_count != b->boundary_face_connectivity_count;
 }
 
-/* The changes that two descriptions with as many cells and vertices show: arrays at other addresses, or read in another
- * way, have not been checked yet. */
+/* Returns the INSITU_CHANGED_* bits of the changes between two descriptions with equal numbers of cells and vertices:
+ * arrays that have another address or layout have not been checked yet. */
 static unsigned seen_changes(const session_mesh *mesh, const insitu_mesh *b)
 {
     const insitu_mesh *a = &mesh->original;
@@ -299,7 +299,7 @@ static unsigned seen_changes(const session_mesh *mesh, const insitu_mesh *b)
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-/* On an error, which is of memory, the mesh is to be refused. */
+/* Stores a description in the table. An error can only be lack of memory; the caller must then refuse the mesh. */
 static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
 {
     unsigned changed = given->changed;
@@ -343,7 +343,7 @@ insitu_status session_place_error(base_error *error, const char *mesh, const cha
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
 }
 
-/* A mesh is either whole or of blocks: the other is removed. */
+/* Removes the other kind of mesh with this name: a mesh is either a whole or consists of blocks. */
 static void remove_others(session_meshes *meshes, const char *name, int64_t block)
 {
     const session_parts parts = session_find_parts(meshes, name);

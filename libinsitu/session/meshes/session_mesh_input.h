@@ -5,11 +5,13 @@
 #include "session_arrays.h"
 #include "session_mesh.h"
 
-/* Implements insitu_set_mesh(), if block is SESSION_WHOLE, or insitu_set_block(). *error is cleared first. Local. */
+/* Implements insitu_set_mesh(), if block is SESSION_WHOLE, and otherwise insitu_set_block(). *error is cleared first.
+ * Local. */
 insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
                                base_error *error);
 
-/* Stores the error of a check, preceded by "mesh "name": " and the field's name if there is one. */
+/* Stores the error of a check, with `mesh "name": ` and, if there is a field, its name in front of the message. Returns
+ * its status. */
 insitu_status session_place_error(base_error *error, const char *mesh, const char *field, const base_error *what);
 
 #endif

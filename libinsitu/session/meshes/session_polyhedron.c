@@ -1,6 +1,7 @@
 /* The distance between samples depends on the mean size of cells, which is computed from volumes. So a volume must
  * depend only on the cell's geometry: another rank may list a face beginning at another vertex or in the opposite
- * direction, and faces in another order. Differences by rounding remain, but not in the mean size (session_space.c). */
+ * direction, and the faces in another order. Volumes may still differ by rounding, but the mean size does not
+ * (session_space.c). */
 #include "session_polyhedron.h"
 
 #include <string.h>
@@ -82,8 +83,9 @@ static double volume_from(const double origin[3], double corners[3][3])
     return tet_volume(d[0], d[1], d[2]);
 }
 
-/* Returns the entry of a face's least vertex, at which its canonical fan of triangles begins. If the face contains that
- * vertex twice, either entry is right: the fan has the same triangles, and some without area. */
+/* Returns the entry of a face's vertex with the least index, at which its canonical fan of triangles begins. If the
+ * face contains that vertex twice, either entry may be returned: the fan then has the same triangles, and some of area
+ * 0. */
 static int64_t least_entry(const grid *g, int64_t from, int64_t to)
 {
     int64_t least = from;
@@ -121,11 +123,12 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     }
 }
 
-/* Upper bound of the rounding of the volume of a triangle's tet with a corner in the same plane, as a share of the
- * cell's box. With u = 2^-53: an edge is computed by three differences, each with an error of u of the box's side (the
- * mean cancels, whatever it is); a determinant's six products of three edges add 9 u, and 2 u and 3 u for products and
- * sums: 6 times 14 u, over 6. 32 u leaves a margin for the sum over triangles, whose number is small compared to 1 / u,
- * the box's own rounding, and squares of u. */
+/* Upper bound of the rounding error of the volume of a tet formed by a triangle and a corner in the same plane, as a
+ * fraction of the volume of the cell's bounding box. With u = 2^-53: an edge is computed by three differences, each
+ * with an error of u times the box's side (the mean cancels, whatever it is). The six products of three edges of a
+ * determinant add 9 u, and products and sums another 2 u and 3 u: 6 times 14 u, divided by 6. The bound of 32 u leaves
+ * a margin for the sum over triangles, whose number is small compared to 1 / u, for the box's own rounding, and for
+ * squares of u. */
 static const double flat_share = 0x1p-48;
 
 double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)

@@ -1,14 +1,15 @@
-/* All numbers here are results of reductions, and so are the same on every rank and for every partition. A new space
- * requires new trees, so the old one is kept while the cells stay approximately in place, even if the mesh moves
+/* All numbers here are results of reductions, so that they are the same on every rank and for every partition. A new
+ * space requires new trees. So the old one is kept while the cells stay approximately in place, even if the mesh moves
  * slightly in every step. */
 #include "session_space.h"
 
 #include "session_agree.h"
 
-/* Rounds the mean size to 13 bits, an error of at most 1.6e-4. Steps are derived from it, and the sum over cells has an
- * error of about 1e-12, which depends on the order of cells, of their vertices and of ranks. Numbers are rounded up
- * from the golden ratio on, which is far from all fractions of small integers; the means of regular and refined
- * lattices are such fractions. Halves are too, so that ordinary rounding would be decided by that error. */
+/* Rounds the mean size to 13 bits, with a relative error of at most 1.6e-4. The sampling distance is derived from it,
+ * and the sum over cells has an error of about 1e-12, which depends on the order of cells, of their vertices and of
+ * ranks. Remainders of at least 0.382 (2 minus the golden ratio) are rounded up, because this number is far from all
+ * fractions of small integers, and the means of regular and refined lattices are such fractions. One half is such a
+ * fraction too, so that ordinary rounding would be decided by the error. */
 static double rounded_size(double size)
 {
     enum { BITS = 13 };
@@ -42,7 +43,7 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
         status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .solid_count = totals[2], .rank_count = (int)totals[1]};
-    /* The mean is over cells with a volume: flat cells do not affect samples. */
+    /* The mean is computed over cells with a volume, because samples are not taken in flat cells. */
     if (totals[2] > 0) out->cell_size = rounded_size(all_sizes / (double)totals[2]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];
@@ -91,7 +92,7 @@ static void choose_origin(session_space *space)
         space->lower[axis] = e->lower[axis];
         space->upper[axis] = e->upper[axis];
     }
-    int exponent = 0; /* half_diagonal = m 2^exponent, m in [0.5, 1) */
+    int exponent = 0; /* half_diagonal = m 2^exponent, with m in [0.5, 1) */
     if (e->half_diagonal > 0 && frexp(e->half_diagonal, &exponent) == 0.5) exponent--;
     space->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
     space->has_origin = true;

@@ -1,4 +1,4 @@
-/* Global bounds, and the origin and scale of float32 numbers; the same on every rank. */
+/* The global bounds, and the origin and scale of float32 coordinates. They are the same on every rank. */
 #ifndef SESSION_SPACE_H
 #define SESSION_SPACE_H
 
@@ -6,29 +6,31 @@
 
 #include "session_mesh.h"
 
-/* Global bounds of the drawn cells and quantities derived from them. */
+/* Global bounds of the drawn cells, and quantities derived from them. */
 typedef struct session_extent {
-    double lower[3], upper[3]; /* both 0 if there are no cells */
+    double lower[3], upper[3]; /* bounds of the drawn cells; both 0 if there are no cells */
     double half_diagonal;
-    int64_t cell_count;  /* drawn ones */
+    int64_t cell_count;  /* number of drawn cells */
     int64_t solid_count; /* cells that have a volume */
     double cell_size;    /* mean cube root of the volumes of solid cells; 0 if there are none */
-    int rank_count;      /* ranks that have some */
+    int rank_count;      /* number of ranks that have drawn cells */
 } session_extent;
 
-/* Returns the axis along which the data is flat, the last of several; -1 if the data is not flat, because it has cells
- * with a volume, or because its extent along each axis exceeds 1e-6 of the largest extent. That is about sixteen
- * roundings of float32, and 1/30 pixel of the widest picture. Local; the same on every rank. */
+/* Returns the axis along which the data is flat, or the last one if there are several. Returns -1 if the data is not
+ * flat, because it has cells with a volume, or because its extent along each axis exceeds 1e-6 of the largest extent.
+ * That is about sixteen roundings of float32, and 1/30 pixel of the widest picture. Local; the result is the same on
+ * every rank. */
 int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {
-    bool has_extent, has_origin; /* set by an earlier step */
+    bool has_extent, has_origin; /* set if the extent or the origin was computed in an earlier step */
     session_extent extent;
-    double lower[3], upper[3]; /* bounds for which origin and scale were chosen */
+    double lower[3], upper[3]; /* bounds for which the origin and the scale were chosen */
     double origin[3], scale;
 } session_space;
 
-/* Computes global bounds of checked meshes, then origin and scale; if these are new, trees are dropped. Collective. */
+/* Computes the global bounds of checked meshes, then the origin and the scale. If these are new, all trees are dropped.
+ * Collective. */
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error);
 
 #endif

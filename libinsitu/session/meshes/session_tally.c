@@ -54,12 +54,12 @@ double tally_signed_volume(int type, double points[][3])
     return signed_volume(type, points);
 }
 
-/* Upper bound of the rounding of the volume of a flat cell, as a share of its box's volume ex ey ez. With u = 2^-53: a
- * determinant is six products of one component along each axis, none longer than the box, and each has at most 8
- * roundings (3 of edges, 2 of products, 3 of sums), so its error is at most 48 u of the box. The sum of n of them has n
- * - 1 more roundings of 6 of the box each, and is divided by shares: (8 + n - 1) 6 n / shares, which is 8 u for a tet,
- * 90 u for a hex, 39 u for a wedge, 22 u for a pyramid. 128 u leaves a margin for the division's rounding, the box's
- * own and squares of u. */
+/* Upper bound of the rounding error of the volume of a flat cell, as a fraction of the volume ex ey ez of its bounding
+ * box. With u = 2^-53: a determinant is six products of one component along each axis, none longer than the box, and
+ * each has at most 8 roundings (3 of edges, 2 of products, 3 of sums), so its error is at most 48 u of the box. The sum
+ * of n determinants has n - 1 more roundings of 6 boxes each, and is divided by a divisor d: (8 + n - 1) 6 n / d, which
+ * is 8 u for a tet, 90 u for a hex, 39 u for a wedge, 22 u for a pyramid. The bound of 128 u leaves a margin for the
+ * division's rounding, the box's own rounding and squares of u. */
 static const double flat_share = 0x1p-46;
 
 MMBVH_INLINE bool is_flat(double volume, double box)
@@ -81,7 +81,7 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
     return box;
 }
 
-/* Returns whether the cell has no volume at any of its corners. A cell that intersects itself may have a sum of 0
+/* Returns whether the volume is 0 at each of the cell's corners. A cell that intersects itself may have a sum of 0
  * without being flat. */
 static bool is_flat_everywhere(int type, double points[][3])
 {
@@ -91,7 +91,8 @@ static bool is_flat_everywhere(int type, double points[][3])
     return is_flat(sum / of.shares, box_volume(points, grid_type_vertices(type)));
 }
 
-/* Computes the cube root as lanes do (session_lane_loops.c): the library's would take longer than the volume. */
+/* Computes the cube root of the volume in the same way as the vectorized code (session_lane_loops.c). The math
+ * library's function would take longer than the volume. */
 MMBVH_INLINE double cell_size(double volume)
 {
     if (!(volume > 1e-280 && volume < 1e280)) return cbrt(volume);
@@ -107,7 +108,8 @@ MMBVH_INLINE double cell_size(double volume)
     return y;
 }
 
-/* Adds a cell's volume. For a flat cell it must be 0, whatever sign and size rounding left. */
+/* Adds a cell's volume to the sums. The volume of a flat cell must be added as 0, whatever sign and size rounding gives
+ * it. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn++;
@@ -163,11 +165,11 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 
 /* ---- corners with different signs ---------------------------------------------------------------------------- */
 
-/* A corner counts as flat if its volume is less than this share of the cell's largest. Hexes with two coincident
+/* A corner counts as flat if its volume is less than this fraction of the cell's largest one. Hexes with two coincident
  * vertices have such corners, and so have cells with a vertex on a nearly straight edge. */
 static const double least_share = 1e-6;
 
-/* Computes the areas at a quad's corners, along the normal at the first corner. */
+/* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
 static void quad_corners(double points[][3], double out[4])
 {
     double normals[4][3];
@@ -229,13 +231,14 @@ MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_g
         if (vertex < 0 || vertex >= g->vertex_count) return false;
         for (int axis = 0; axis < 3; axis++) {
             points[i][axis] = fetch_number(&g->coordinates[axis], vertex, wide_number);
-            poison += points[i][axis] - points[i][axis]; /* 0 while all are finite, then NaN */
+            /* remains 0 while all coordinates are finite, and becomes NaN otherwise */
+            poison += points[i][axis] - points[i][axis];
         }
     }
     return is_ghost || poison == 0;
 }
 
-/* Adds one cell; returns false if it is bad. */
+/* Adds one cell to the sums. Returns false if the cell is bad. */
 MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, double *least,
                            const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
@@ -260,7 +263,8 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
     return true;
 }
 
-/* Returns the run of cells from this one on that have its type and contiguous vertices, for processing in lanes. */
+/* Returns the longest run of cells, beginning with this one, that have its type and contiguous vertices. They can be
+ * processed by vectorized code. */
 MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
     const grid *g = &mesh->cells;
@@ -271,20 +275,20 @@ MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
     if (next > cell) alike.entry = fetch_first(g, cell, count, shape);
-    alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is a run by itself */
+    alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is a run of length 1 */
     return alike;
 }
 
-/* Buffer for the connectivity of some of a lattice's cells. */
+/* Buffer for the connectivity of some cells of a lattice. */
 enum { ROW_CELLS = 512 };
 typedef struct lattice_row {
     grid cells;
     int32_t vertices[ROW_CELLS * GRID_MAX_CELL_VERTICES];
 } lattice_row;
 
-/* Returns the run of a lattice's cells from this one on in one row, and writes their connectivity into the buffer. A
- * cell that is not drawn is a run by itself, as is each cell of a lattice whose cells are not consecutive along an
- * axis. */
+/* Returns the run of cells of a lattice that begins with this one and stays in one row, and writes their connectivity
+ * into the buffer. A cell that is not drawn is a run of length 1, as is each cell of a lattice whose cells are not
+ * consecutive along an axis. */
 static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
 {
     const grid *g = &mesh->cells;
@@ -309,12 +313,12 @@ static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, 
     return alike;
 }
 
-/* Tallies the first cells of the run in lanes, and returns their number; *alone: number of the next cells that must be
- * tallied one by one. */
+/* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone is set to the
+ * number of following cells that must be added one by one. */
 static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    if (alike->count < LANES || alike->g->lattice) return 0; /* a run of a single cell */
+    if (alike->count < LANES || alike->g->lattice) return 0; /* there is only one cell in the run */
     lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
@@ -327,8 +331,9 @@ static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, 
     return taken;
 }
 
-/* Tallies cells of a run again, each with its own box. This is needed only if the least volume may be flat compared to
- * the box of all of them; computing all boxes would take a thirtieth of the time for a mesh of tets. */
+/* Adds the cells of a run a second time, each with its own bounding box. This is needed only if the least volume may be
+ * flat compared to the box of all of them. Computing all boxes would take a thirtieth of the time for a mesh of
+ * tets. */
 static mesh_tally tally_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
@@ -343,10 +348,10 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
     return is_flat(least, box);
 }
 
-/* The lengths of the drawn cells along an axis. */
+/* The lengths of the drawn cells along one axis. */
 typedef struct axis_lengths {
-    int64_t positive, negative; /* numbers of positive and negative lengths; others are 0 */
-    double sizes;               /* sum of their cube roots */
+    int64_t positive, negative; /* numbers of positive and of negative lengths; all others are 0 */
+    double sizes;               /* sum of the cube roots of the lengths */
     double lower, upper;
 } axis_lengths;
 
@@ -371,7 +376,8 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     const grid *g = &mesh->cells;
     if (!g->coordinates[0].axis || g->ghosts) return false;
     mesh_tally t = tally_empty();
-    int64_t sized = 1, difference = 1; /* products over the axes: of positive + negative, of positive - negative */
+    /* products over the axes of (positive + negative) and of (positive - negative) */
+    int64_t sized = 1, difference = 1;
     t.drawn = 1;
     t.sizes = 1;
     for (int axis = 0; axis < 3; axis++) {
@@ -392,7 +398,7 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     return true;
 }
 
-/* Tallies some cells of a uniform or rectilinear lattice, which are boxes, or flat. */
+/* Adds some cells of a uniform or rectilinear lattice to the sums. These cells are boxes, or are flat. */
 static int64_t run_axes(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;

@@ -1,4 +1,4 @@
-/* Sums over a mesh's cells that its check computes: bounds, counts and sizes. */
+/* Sums over a mesh's cells that are computed when the mesh is checked: bounds, counts and sizes. */
 #ifndef SESSION_TALLY_H
 #define SESSION_TALLY_H
 
@@ -6,34 +6,35 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    int64_t drawn, ghosts, inverted, flat, shells; /* shells are drawn and flat */
-    double sizes; /* sum of cube roots of volumes; added block by block, so that it rounds like a sum of few terms */
+    int64_t drawn, ghosts, inverted, flat, shells; /* shells are cells that are drawn and flat */
+    /* sum of the cube roots of the volumes; added block by block, so that it rounds like a sum of few terms */
+    double sizes;
 } mesh_tally;
 
 mesh_tally tally_empty(void);
 void tally_merge(mesh_tally *sum, const mesh_tally *part);
 
-/* Adds one valid cell of any type. */
+/* Adds a valid cell of any type to the sums. */
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
-/* Returns whether the volumes at the corners of a hex, wedge or pyramid, or the areas at those of a quad, have both
- * signs. They do if vertices are read in another order than they are stored in. */
+/* Returns whether the volumes at the corners of a hex, wedge or pyramid, or the areas at the corners of a quad, have
+ * both signs. They do if the vertices are read in another order than the one in which they are stored. */
 bool tally_has_both_signs(int type, double points[][3]);
 
-/* Returns the mean of the volumes at the corners of a cell of the four types, from its vertices' positions; negative if
- * the cell is left-handed. */
+/* Returns the mean of the volumes at the corners of a tet, hex, wedge or pyramid, computed from the positions of its
+ * vertices. It is negative if the cell is left-handed. */
 double tally_signed_volume(int type, double points[][3]);
 
-/* Returns whether a valid cell has no volume except for rounding, as shells have none. A ghost never counts. */
+/* Returns whether a valid cell has no volume up to rounding, as shells have none. Returns false for a ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
-/* Checks and tallies cells begin .. end - 1; returns the first bad one, or end. */
+/* Checks cells begin .. end - 1 and adds them to the sums. Returns the first bad cell, or end if all are valid. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 
-/* The run for the mesh's layout, NULL where cells are to be taken one by one: where there may be polyhedra, or
- * coordinates that are not all float or all double. */
-/* Tallies a uniform or rectilinear lattice at once, from the lengths along its axes. Returns false, with nothing added,
- * if the mesh is of another kind or has ghost flags. */
+/* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one,
+ * because there may be polyhedra, or because coordinates are not all float or all double. */
+/* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,
+ * without adding anything, if the mesh is of another kind or has ghost flags. */
 bool tally_axes(const session_mesh *mesh, mesh_tally *tally);
 
 tally_run tally_choose(const session_mesh *mesh);

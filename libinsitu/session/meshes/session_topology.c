@@ -1,21 +1,21 @@
-/* All other code reads cells -> faces -> vertices. Finite-volume codes store faces -> vertices and, for each face, the
- * cell that owns it and the neighbour beyond. The link between the two is computed here, once per topology: the faces
- * of each cell, in the order of their numbers. The direction of a face's loop does not matter, so faces are not
- * reversed. The faces' vertices are read in place; only if each face has its own list, or those of the boundary are in
- * a separate list, they are copied into one.
+/* All other code reads the faces of each cell, and the vertices of each face. Finite-volume codes store the vertices of
+ * each face and, for each face, the cell that owns it and the neighbouring cell. The list of the faces of each cell, in
+ * the order of their numbers, is computed here once per topology. The direction of a face's loop does not matter, so
+ * faces are not reversed. The faces' vertices are read in place. Only if each face has its own list, or if those of the
+ * boundary are in a separate list, they are copied into one.
  *
  * A polyhedron with six quads may be a hex, which is drawn in a fraction of the time. It is recognized by its faces
  * alone, never by coordinates: all ranks that have the cell recognize it alike, and so does every step of a moving
  * mesh.
  *
- *      t3 ------ t2
- *      /|        /|      The base is any face of the right size. The face on the other side of each of its edges
- *     / |       / |      is a side, which tells what stands above the edge's ends: t0 and t1 above a0 and a1. The
- *    t0 ------ t1 |      cell is closed if neighbouring sides agree in what is above the vertex between them, if
- *     | a3 ----|- a2     the one face that is left goes around the tops in their order, and if no two vertices are
- *     | /      | /       the same: then every face has its place, and every edge is one of two faces. It is a hex
- *     |/       |/        where the base has four vertices, and a wedge where it has three. Sides that are triangles
- *     a0 ----- a1        have one top, which is that of a pyramid or a tet. The faces' own directions do not matter.
+ *           t3 ------ t2
+ *          /|        /|      The base is any face of the right size. The face on the other side of each of its edges
+ *         / |       / |      is a side, which determines the vertices above the edge's ends: t0 and t1 above a0 and
+ *        t0 ------ t1 |      a1. The cell is closed if neighbouring sides agree in the vertex above the corner between
+ *        | a3 ----|- a2      them, if the remaining face is the loop of the tops in their order, and if no two vertices
+ *        | /      | /        are the same. Then every face has its place, and every edge belongs to two faces. It is a
+ *        |/       |/         hex if the base has four vertices, and a wedge if it has three. Sides that are triangles
+ *        a0 ----- a1         have one top, which is that of a pyramid or a tet. The faces' directions do not matter.
  *
  * If any cell is invalid, nothing is recognized in the mesh, so that session_check.c reports the error in the caller's
  * terms. */
@@ -137,7 +137,7 @@ static insitu_status check_row(const session_mesh *mesh, int64_t face, const ses
     return INSITU_OK;
 }
 
-/* Returns the total number of all faces' vertices, or -1 if a list is bad. */
+/* Returns the total number of vertices of all faces, or -1 if a list is invalid. */
 static int64_t count_listed(const session_mesh *mesh, base_error *error)
 {
     int64_t total = 0;
@@ -183,7 +183,7 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-static const int64_t outside = INT64_MIN; /* a halo cell, or no cell for a face of a separate list */
+static const int64_t outside = INT64_MIN; /* marks a halo cell, or the missing cell of a face in a separate list */
 
 session_face_sides session_sides(const insitu_mesh *given)
 {
@@ -204,7 +204,7 @@ void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_
     if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
     for (int i = 0; i < 2; i++)
         if (cells[i] >= given->cell_count && cells[i] - given->cell_count < given->halo_cell_count) cells[i] = outside;
-    /* CGNS uses 0 for no cell, on either side. */
+    /* CGNS uses 0 for a missing cell, on either side of the face. */
     if (cells[1] >= 0 && (cells[0] == outside || (base == 1 && cells[0] == -1))) {
         cells[0] = cells[1];
         cells[1] = -1;
@@ -230,7 +230,7 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
     return INSITU_OK;
 }
 
-/* Stores in offsets[c + 1] the number of faces of cell c. */
+/* Counts the faces of each cell. The count of cell c is stored in offsets[c + 1]. */
 static insitu_status count_faces(const session_mesh *mesh, const session_face_sides *sides, const grid_array *offsets,
                                  base_error *error)
 {
@@ -244,8 +244,8 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
     return INSITU_OK;
 }
 
-/* Turns counts into offsets, then stores each face at the offsets of its cells. This advances each offset to the next
- * cell's begin; the last loop shifts them back. */
+/* Converts counts into offsets, then stores each face at the offsets of its cells. This advances each offset to the
+ * begin of the next cell; the last loop shifts the offsets back. */
 static void put_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
@@ -289,11 +289,11 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
 enum { MOST_FACES = 6 };
 
 typedef struct face_ring {
-    int count; /* 3 or 4 */
+    int count; /* number of vertices: 3 or 4 */
     int64_t vertex[4];
 } face_ring;
 
-/* Reads a face's vertices; returns false if it does not have 3 or 4 vertices, or does not exist. */
+/* Reads a face's vertices. Returns false if the face does not exist, or does not have 3 or 4 vertices. */
 static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
 {
     const grid *g = &mesh->cells;
@@ -310,8 +310,8 @@ static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
     return true;
 }
 
-/* Finds the unused face on the edge between `ends`, and stores the vertices next to them on it; returns -1 if there is
- * none. */
+/* Finds an unused face that contains the edge between `ends`, and stores the two vertices next to the edge on that
+ * face. Returns its index, or -1 if there is none. */
 static int find_side(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {
@@ -328,7 +328,7 @@ static int find_side(const face_ring *rings, int count, unsigned used, const int
     return -1;
 }
 
-/* Returns whether the ring is the loop of the tops, beginning at any of them and in either direction. */
+/* Returns whether the face is the loop of the top vertices, beginning at any of them and in either direction. */
 static bool goes_around(const face_ring *ring, const int64_t *top, int n)
 {
     if (ring->count != n) return false;
@@ -349,7 +349,8 @@ static bool are_distinct(const int64_t *vertices, int count)
     return true;
 }
 
-/* Constructs the cell on a base, with sides of side_size vertices, in VTK's order except for its handedness. */
+/* Constructs the cell on the given base, with sides of side_size vertices, in VTK's order except for its handedness.
+ * Returns false if the faces do not form such a cell. */
 static bool erect(const face_ring *rings, int count, int base, int side_size, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int n = rings[base].count, tops = side_size == 3 ? 1 : n;
@@ -381,8 +382,8 @@ static void swap_vertices(int64_t *vertices, int i, int j)
     vertices[j] = v;
 }
 
-/* Mirrors a left-handed cell, judged by the current positions of its vertices, since faces may have either direction.
- * Pictures are the same in both cases. */
+/* Mirrors a left-handed cell, based on the current positions of its vertices, since faces may have either direction.
+ * Images are the same in both cases. */
 static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
@@ -393,7 +394,8 @@ static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
     if (count == 2 * n) swap_vertices(vertices, n + 1, 2 * n - 1);
 }
 
-/* Returns the type that a polyhedron's faces form, with its vertices in that type's order, or GRID_POLYHEDRON. */
+/* Returns the type of cell that a polyhedron's faces form, with its vertices in that type's order. Returns
+ * GRID_POLYHEDRON if they form none of these types. */
 static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     static const struct {
@@ -424,8 +426,8 @@ static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GR
 enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
-    bool is_faulty;                /* some cell is invalid */
-    int64_t polyhedra, recognised; /* number of original polyhedra, and of those with another type now */
+    bool is_faulty;                /* set if some cell is invalid */
+    int64_t polyhedra, recognised; /* numbers of original polyhedra, and of those that are read as another type */
     int64_t of_type[TYPES];        /* number of cells by their new type */
     int64_t entries;               /* number of entries of all cells, with their new types */
     unsigned char *types;
@@ -485,7 +487,7 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
     }
 }
 
-/* Returns the type that all cells have, or 0. */
+/* Returns the type that all cells have, or 0 if types differ. */
 static int only_type(const recognition *r, int64_t count)
 {
     int type = TYPES - 1;
@@ -517,7 +519,7 @@ static void put_offsets(const session_mesh *mesh, const recognition *r, const gr
     }
 }
 
-/* Writes the cells by the types found, and makes the grid read them. Cells of one type need neither types nor
+/* Writes the cells with the types found, and makes the grid read them. Cells of one type need neither types nor
  * offsets. */
 static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
 {

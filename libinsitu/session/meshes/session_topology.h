@@ -1,11 +1,11 @@
-/* The cells in the form that all other code reads: the caller's arrays, or arrays owned by the session if cells are
- * described by their faces. */
+/* Provides the cells in the form that all other code reads: the caller's arrays, or arrays owned by the session if
+ * cells are described by their faces. */
 #ifndef SESSION_TOPOLOGY_H
 #define SESSION_TOPOLOGY_H
 
 #include "session_mesh.h"
 
-/* Returns the vertices of a face that is given by its own list. */
+/* Returns the list of the vertices of a face, if each face has its own list. */
 static inline const void *session_face_list(const insitu_mesh *mesh, int64_t face)
 {
     const int64_t stride = mesh->face_lists.stride_bytes ? mesh->face_lists.stride_bytes : (int64_t)sizeof(void *);
@@ -16,7 +16,7 @@ static inline const void *session_face_list(const insitu_mesh *mesh, int64_t fac
 typedef struct session_face_row {
     grid_array list;
     int64_t first, size;
-    int64_t limit; /* number of entries of the list */
+    int64_t limit; /* number of entries of the list that contains the row */
 } session_face_row;
 
 session_face_row session_given_face(const insitu_mesh *mesh, int64_t face);
@@ -28,19 +28,19 @@ typedef struct session_face_sides {
 } session_face_sides;
 
 session_face_sides session_sides(const insitu_mesh *given);
-/* Stores the two cells of a face. A missing cell is negative, and it is cells[1] unless both are missing. */
+/* Stores the two cells of a face. A missing cell is negative; it is cells[1], unless both are missing. */
 void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
 
 /* Makes the grid read the current arrays: the session's own if they exist, else the caller's. Local. */
 void session_read_topology(session_mesh *mesh);
 
-/* Returns the type that the caller gave the cell, whatever type it is read as. */
+/* Returns the type that the caller gave the cell, regardless of the type as which it is read. */
 int session_given_type(const session_mesh *mesh, int64_t cell);
 
-/* Computes the data that the description leaves to the library, once per topology: cells' faces from owner and
- * neighbour, faces' vertices in one array from several, cells' vertices in VTK's order, and tets, hexes, wedges and
- * pyramids from polyhedra with such faces. Then makes the grid read it. Errors in owner, neighbour and lists are
- * reported; session_check.c finds all others. After an error nothing is stored. Local. */
+/* Computes the data that the description leaves to the library, once per topology: the cells' faces from owner and
+ * neighbour, one array of the faces' vertices from several, the cells' vertices in VTK's order, and tets, hexes, wedges
+ * and pyramids from polyhedra with such faces. Then it makes the grid read this data. Errors in owner, neighbour and
+ * lists are reported; session_check.c finds all others. After an error nothing is stored. Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

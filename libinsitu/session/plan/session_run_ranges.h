@@ -24,7 +24,9 @@ typedef struct session_run_range {
 
 typedef struct session_image_ranges {
     char *image, *path;
-    int layers; /* number of the variant of the image (scene_variant.layers) */
+    /* index of the combination of the image's sweep to which the ranges belong (scene_variant.layers); 0 without a
+     * sweep */
+    int layers;
     int count;
     session_run_range *items;
     bool is_changed; /* set if a range has changed since the file was written */
