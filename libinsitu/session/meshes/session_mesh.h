@@ -248,7 +248,9 @@ typedef struct session_mesh {
     uint64_t candidates_key;
     /* number of steps in which the current (or last) full tree has been used; 0: there was none yet */
     int full_tree_steps;
-    double rent; /* seconds spent on partial trees since the cells last changed, minus the cost of a full tree */
+    /* seconds spent on partial trees since the cells last changed, minus the time that refits of a full tree would have
+     * taken */
+    double rent;
     int scalar_count;
     session_scalar *scalars;
 

@@ -22,7 +22,7 @@ static const double *place_of(const double *places, int64_t stride, int64_t i)
     return (const double *)(const void *)((const char *)places + i * stride);
 }
 
-/* Chooses the bins' size and number; returns their total number. */
+/* Computes the size of the bins and their number along each axis. Returns the total number of bins. */
 static int64_t size_bins(session_bins *b, const double *places, int64_t stride, int64_t count)
 {
     double upper[3], widest = 0;
@@ -64,7 +64,7 @@ void session_bins_free(session_bins *bins)
     *bins = (session_bins){0};
 }
 
-/* Moves the walk to the row of bins at its current position. */
+/* Moves the iterator to the row of bins at its current position. */
 static void enter_row(session_bin_walk *walk)
 {
     const session_bins *b = walk->bins;

@@ -1,4 +1,4 @@
-/* Points in cubic bins. The number of bins is about the number of points for points on a surface. */
+/* Sorts points into cubic bins. For points on a surface, the number of bins is about the number of points. */
 #ifndef SESSION_BINS_H
 #define SESSION_BINS_H
 
@@ -6,19 +6,20 @@
 #include <stdint.h>
 
 typedef struct session_bins {
-    double lower[3], per_place; /* bins to a unit of length */
+    double lower[3], per_place; /* lower corner of the bins, and the number of bins per unit of length */
     int64_t counts[3];
-    int64_t *starts, *items; /* the points of bin b are items[starts[b]] .. items[starts[b + 1] - 1] */
+    int64_t *starts, *items; /* bin b contains the points items[starts[b]] .. items[starts[b + 1] - 1] */
 } session_bins;
 
-/* Bins count points, whose positions are stride bytes apart. Returns false if memory runs out. */
+/* Sorts `count` points into bins. Their positions begin at `places` and are `stride` bytes apart. Returns false if
+ * memory runs out. */
 bool session_bins_create(session_bins *bins, const double *places, int64_t stride, int64_t count);
 void session_bins_free(session_bins *bins);
 
-/* Visits the points near a box: all points inside it, and some outside.
+/* Iterator over the points near a box. It visits all points inside the box, and some outside.
  *
- *     for (session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin); session_next_binned(&walk, &point);)
- */
+ *     for (session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin); session_next_binned(&walk,
+ * &point);) */
 typedef struct session_bin_walk {
     const session_bins *bins;
     int64_t low[3], high[3], at[3];

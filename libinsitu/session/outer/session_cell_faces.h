@@ -1,10 +1,12 @@
-/* Iterates over the faces of a cell of any type. A shell is its only face. */
+/* Iterates over the faces of a cell of any type. A shell (a cell without volume) has one face, which is the shell
+ * itself. */
 #ifndef SESSION_CELL_FACES_H
 #define SESSION_CELL_FACES_H
 
 #include "grid.h"
 
-/* Quads and triangles of the types with a fixed number of vertices, in VTK's order; -1: there is no fourth vertex. */
+/* The faces of a type of cell with a fixed number of vertices, in VTK's order. The fourth vertex of a triangle is
+ * -1. */
 typedef struct session_face_table {
     int count;
     signed char vertices[6][4];
@@ -31,10 +33,11 @@ static inline const session_face_table *session_faces_of_type(int type)
 
 typedef struct session_cell_faces {
     const grid *cells;
-    const session_face_table *table; /* NULL for polyhedra, and for shells except those of a lattice */
+    /* the faces of the cell's type; NULL for polyhedra, and for shells except those of a lattice */
+    const session_face_table *table;
     int64_t count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
-    int64_t first; /* index of the first entry of connectivity */
+    int64_t first; /* index of the cell's first entry in the connectivity */
     int64_t size;  /* number of a shell's vertices; 0: the cell is not a shell */
 } session_cell_faces;
 
@@ -68,10 +71,11 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
     return out;
 }
 
-/* The vertices around a face; session_face_vertex() returns number 0 .. size - 1. */
+/* The vertices around a face. session_face_vertex() returns the vertex with a number of 0 .. size - 1. */
 typedef struct session_face_loop {
     const session_cell_faces *faces;
-    const signed char *places; /* corner numbers in the cell; NULL: entries of the list from `first` on */
+    /* corner numbers within the cell; NULL: the vertices are the entries of the list from `first` on */
+    const signed char *places;
     const grid_array *list;
     int64_t first, size;
 } session_face_loop;

@@ -6,8 +6,9 @@
 #include "session_cell_faces.h"
 #include "vector3.h"
 
-/* Coordinates on the face are rounded to multiples of 1 / PARTS if they are within a hundredth of a part of one: 2:1,
- * 3:1 and 4:1 are then exact, however coordinates round. */
+/* Coordinates on the face are rounded to the nearest multiple of 1 / PARTS if they differ from it by at most a
+ * hundredth of 1 / PARTS. Then the positions at refinements of 2:1, 3:1 and 4:1 are exact, however the vertices'
+ * coordinates are rounded. */
 enum { PARTS = 96 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
@@ -35,7 +36,7 @@ double session_place_distance(const double a[3], const double b[3])
     return sqrt(vector3_dot(off, off));
 }
 
-/* Returns the box around places, of which there is one at least. */
+/* Returns the bounding box of the positions. There must be at least one. */
 static session_box box_around(const double places[][3], int count)
 {
     session_box box;
@@ -49,8 +50,8 @@ static session_box box_around(const double places[][3], int count)
     return box;
 }
 
-/* Computes the face's normal, box, area and width. side: 1 if the cell is behind the face, by the orientation of its
- * vertices, -1 if it is in front. */
+/* Computes the face's normal, box, area and width. side is 1 if the cell is behind the face, according to the
+ * orientation of its vertices, and -1 if it is in front. */
 static void measure(session_coarse_face *f, double side)
 {
     double a[3], b[3];
@@ -65,7 +66,7 @@ static void measure(session_coarse_face *f, double side)
     for (int axis = 0; axis < 3 && f->area > 0; axis++) f->normal[axis] *= side / (2 * f->area);
 }
 
-/* Returns the side of the face on which its cell lies, as measure() takes it. */
+/* Returns on which side of the face its cell lies: 1 if it is behind the face, -1 if it is in front. */
 static double side_of(const grid *g, int64_t cell, const session_coarse_face *f)
 {
     double sums[3] = {0, 0, 0}, off[3], place[3];
@@ -99,7 +100,7 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
     return true;
 }
 
-/* Tells whether the place is beyond all corners along the direction, or before all, by more than slack. */
+/* Returns whether the position lies, along the direction, more than `slack` above all corners or below all corners. */
 static bool is_beyond(const session_face_outline *f, const double place[3], const double direction[3], double slack)
 {
     const double at = vector3_dot(direction, place), most = slack * sqrt(vector3_dot(direction, direction));
@@ -188,7 +189,7 @@ bool session_is_at_corner(const session_coarse_face *face, const double place[3]
     return false;
 }
 
-/* Rounds a coordinate to a multiple of 1 / PARTS if it is one up to rounding. */
+/* Rounds a coordinate to a multiple of 1 / PARTS if it differs from one only by rounding. */
 static double rounded(double at)
 {
     const double parts = round(at * PARTS);
@@ -207,7 +208,8 @@ static void place_on(const session_coarse_face *f, const double at[2], double ou
     }
 }
 
-/* Finds the coordinates of a position by Newton's method, from the middle; a triangle is half of a parallelogram. */
+/* Computes the coordinates of a position on the face by Newton's method, starting from the face's centre. A triangle is
+ * treated as half of a parallelogram. */
 static bool solve(const session_coarse_face *f, const double place[3], double at[2])
 {
     double on[3], slopes[2][3], off[3];

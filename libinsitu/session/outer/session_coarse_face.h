@@ -1,4 +1,4 @@
-/* Triangles and quads of cells on which vertices may hang, and positions on them. */
+/* Triangles and quads of cells on which hanging vertices may lie, and positions on these faces. */
 #ifndef SESSION_COARSE_FACE_H
 #define SESSION_COARSE_FACE_H
 
@@ -7,8 +7,8 @@
 
 typedef struct session_coarse_face {
     int count; /* number of corners: 3 or 4 */
-    /* in loop order, beginning at the least corner towards the lesser of its neighbours; a triangle's fourth is its
-     * third */
+    /* corners in loop order, beginning with the least one and continuing to the lesser of its neighbours; a triangle's
+     * fourth corner equals its third */
     double places[4][3];
     double normal[3]; /* unit vector that points away from the cell */
     session_box box;
@@ -17,42 +17,42 @@ typedef struct session_coarse_face {
 
 enum { SESSION_FACE_WORDS = 13 };
 
-/* A triangle or quad of a cell, as little of it as tells where it is not. */
+/* The part of a triangle or quad that suffices to exclude most positions from it. */
 typedef struct session_face_outline {
     int count;
-    int64_t vertices[4]; /* in the cell's order */
+    int64_t vertices[4]; /* vertices in the order in which the cell has them */
     double places[4][3];
     session_box box;
-    double reach; /* no two corners are farther apart */
+    double reach; /* upper bound of the distance between any two corners */
 } session_face_outline;
 
-/* False where the face is no triangle or quad of a cell. */
+/* Reads the outline of a face. Returns false if the face is not a triangle or quad of a cell with volume. */
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
-/* Tells whether the place, in the outline's box, may be within slack of the face: it is not beyond all of the face's
- * corners, along its normal or across one of its edges. */
+/* Returns whether a position in the outline's box may be within `slack` of the face. It returns false if the position
+ * is beyond all corners of the face, either along its normal or across one of its edges. */
 bool session_may_hold(const session_face_outline *outline, const double place[3], double slack);
 
-/* Reads a face and its vertices, in the order of its places. False where it is no triangle or quad of a cell, or has no
- * area. */
+/* Reads a face. *vertices receives its vertices in the order of out->places. Returns false if the face is not a
+ * triangle or quad of a cell with volume, or if its area is 0. */
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
 
-/* Write the face as words for another rank, and read it from them. */
+/* Writes the face as 64-bit words for another rank; the second function reads it from them. */
 void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS]);
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out);
 
 /* Returns whether the position is within slack of a corner. */
 bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack);
 
-/* Computes the weights of the corners at a position, with 0 for a triangle's fourth; returns false if the position is
- * farther than slack from the face. */
+/* Computes the corners' weights at a position on the face; the fourth weight of a triangle is 0. Returns false if the
+ * position is farther than `slack` from the face. */
 bool session_find_on_face(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
 
-/* Returns an upper bound of the rounding of the mesh's coordinates; 0 for NULL. */
+/* Returns an upper bound of the rounding errors of the mesh's coordinates; 0 if mesh is NULL. */
 double session_place_rounding(const session_mesh *mesh);
 
 double session_place_distance(const double a[3], const double b[3]);
 
-/* Define an order of positions, and of faces by area and then by positions. */
+/* Defines an order of positions, and an order of faces by area and then by positions. */
 int session_compare_places(const double a[3], const double b[3]);
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
 

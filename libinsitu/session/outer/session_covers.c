@@ -1,6 +1,7 @@
-/* Each rank tells the ranks near it of its blocks' boxes: those whose own blocks' common box, in cells of the coarsest
- * level, meets the box. Boxes are binned by their middles, so that the work grows with the number of blocks and of
- * those that cover each. They are kept, for the faces between levels. */
+/* Each rank sends the boxes of its blocks to the ranks near it. These are the ranks for which the bounding box of all
+ * their own blocks intersects the block's box; boxes are compared in units of cells of the coarsest level. The boxes
+ * are sorted into bins by their centres, so that the work grows only with the number of blocks and the number of blocks
+ * that cover each. The boxes are kept, because the faces between levels are found from them later. */
 #include "session_covers.h"
 
 #include <math.h>
@@ -19,20 +20,20 @@
 
 enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 
-/* Boxes in bins by their middles, in cells of the coarsest level. */
+/* Boxes sorted into bins by their centres, in units of cells of the coarsest level. */
 typedef struct box_bins {
     int64_t count;
-    int64_t *boxes; /* numbers of boxes */
+    int64_t *boxes; /* indices of the boxes */
     double (*middles)[3];
-    double widest; /* half the largest side of any */
+    double widest; /* half of the largest side length of all boxes */
     session_bins bins;
 } box_bins;
 
 typedef struct cover_search {
     const session_team *team;
     int64_t count;
-    session_level_box *boxes; /* this rank's, then received ones */
-    box_bins finer;           /* those that may cover cells */
+    session_level_box *boxes; /* the boxes of this rank, followed by the received ones */
+    box_bins finer;           /* bins of those boxes that may cover cells */
 } cover_search;
 
 static void bins_free(box_bins *bins)
@@ -57,7 +58,8 @@ static session_level_box box_of(const session_mesh *mesh, int rank)
     session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
     session_hash_text(&out.mesh, mesh->name);
     for (int axis = 0; axis < 3; axis++) {
-        if (!l->cells[axis]) continue; /* quads lie beside each other, whatever their place along it */
+        /* along the axis without cells, the quads of all blocks count as lying in the same place */
+        if (!l->cells[axis]) continue;
         out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
         out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
         out.refinement[axis] = l->refinement[axis];
@@ -70,7 +72,7 @@ static bool is_coarsest(const session_level_box *box)
     return box->refinement[0] == 1 && box->refinement[1] == 1 && box->refinement[2] == 1;
 }
 
-/* Finer along some axis, and coarser along none. */
+/* Returns whether box a belongs to a finer level than b: it is finer along some axis and not coarser along any. */
 static bool is_finer(const session_level_box *a, const session_level_box *b)
 {
     bool is_any = false;
@@ -94,7 +96,8 @@ static bool is_level(const session_mesh *mesh)
     return mesh->is_given && session_has_levels(&mesh->given) && mesh->cells.lattice;
 }
 
-/* The common box of this rank's refined blocks, widened by far more than it may be rounded. */
+/* Computes the bounding box of this rank's refined blocks, in units of cells of the coarsest level. It is extended by
+ * one such cell, which is far more than rounding requires. */
 static session_box common_box(const session_meshes *meshes)
 {
     session_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -132,7 +135,8 @@ static bool does_meet(const session_level_box *box, const session_box *common)
     return true;
 }
 
-/* Lists the boxes for each rank whose common box they meet; counts words where there is no room. */
+/* Writes, for each rank, the boxes that intersect the rank's common box. If mail->words is NULL, the words are only
+ * counted. */
 static void send_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
 {
     mail->total = 0;
@@ -191,7 +195,8 @@ static insitu_status share_boxes(cover_search *s, const session_meshes *meshes, 
 
 /* ---- which cells ------------------------------------------------------------------------------------------------ */
 
-/* Those of the coarsest level cover no cell. */
+/* Sorts boxes into bins. Unless with_coarsest is set, the boxes of the coarsest level are left out, because they cover
+ * no cells. Returns false if memory runs out. */
 static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_coarsest, box_bins *out)
 {
     out->boxes = base_alloc((size_t)(count + 1) * sizeof *out->boxes);
@@ -210,22 +215,23 @@ static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_c
     return session_bins_create(&out->bins, out->middles[0], (int64_t)sizeof *out->middles, out->count);
 }
 
-/* Rounds down. */
+/* Returns a / b, rounded down. */
 static int64_t quotient(int64_t a, int64_t b)
 {
     const int64_t q = a / b;
     return a % b < 0 ? q - 1 : q;
 }
 
-/* Finds the cells of the coarse box that the fine one covers, in the indices of the coarse level; false where there are
- * none. misfit: the axis along which the fine box ends within a cell; -1: it does not. */
+/* Computes which cells of the coarse box the fine one covers, as index ranges of the coarse level. Returns false if it
+ * covers none. *misfit is the axis along which the fine box ends within a cell, or -1 if it does not. */
 static bool find_covered(const session_level_box *coarse, const session_level_box *fine, int64_t lower[3],
                          int64_t upper[3], int *misfit)
 {
     *misfit = -1;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
-        const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by; /* in cells of of x by levels */
+        /* in units of 1 / (of * by) of a cell of the coarsest level */
+        const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
         lower[axis] = quotient(begin, of);
         upper[axis] = -quotient(-end, of);
         if (lower[axis] * of != begin || upper[axis] * of != end) *misfit = axis;
@@ -250,7 +256,8 @@ static void mark_cells(const session_mesh *mesh, const int64_t lower[3], const i
             for (int64_t i = from[0]; i < to[0]; i++) covered[i * strides[0] + j * strides[1] + k * strides[2]] = 1;
 }
 
-/* Makes a byte a cell, if some are covered, else *out is NULL. */
+/* Finds the cells of the block that finer blocks cover. *out has one byte per cell, or is NULL if no cell is covered.
+ * Returns false if memory runs out. */
 static bool cover(const cover_search *s, session_mesh *mesh, unsigned char **out)
 {
     const session_level_box box = box_of(mesh, s->team->rank);
@@ -273,7 +280,8 @@ static bool cover(const cover_search *s, session_mesh *mesh, unsigned char **out
     return true;
 }
 
-/* Adds the caller's own flags. They may be read from a copy, which is not filled yet. */
+/* Adds the caller's own ghost flags. They may have to be read from a copy, which is filled here because it is not
+ * filled yet. */
 static void add_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 {
     const insitu_array *ghosts = &mesh->given.ghosts;
@@ -324,7 +332,8 @@ insitu_status session_update_covers(session_meshes *meshes, const session_team *
 
 /* ---- faces between levels --------------------------------------------------------------------------------------- */
 
-/* Finds the middle of the place beside the face, as wide as the face's cell, in cells of the coarsest level. */
+/* Computes the centre of the cell on the other side of the face, if that cell has the same size as the face's cell. The
+ * result is in units of cells of the coarsest level. */
 static void place_beside(const session_mesh *mesh, const session_level_box *box, const session_face *face,
                          double out[3])
 {
@@ -347,7 +356,7 @@ static void place_beside(const session_mesh *mesh, const session_level_box *box,
     }
 }
 
-/* Finds the finest box of the mesh that has the place; NULL: there is none. */
+/* Returns the finest box of the mesh that contains the position, or NULL if there is none. */
 static const session_level_box *find_finest(const session_meshes *meshes, const box_bins *bins, uint64_t mesh,
                                             const double at[3])
 {

@@ -1,8 +1,8 @@
-/* The cells of refined blocks that finer blocks of the same mesh cover, on any rank.
+/* Finds the cells of refined blocks that finer blocks of the same mesh cover, on any rank.
  *
- * Which cells these are follows from whole numbers: a block's first cell, its cells without ghost layers, and its
- * refinement. A cell is covered by one finer block as a whole or not at all, as long as finer blocks begin and end at
- * borders of coarser cells; one that does not is an error. */
+ * The covered cells are determined by integers: the index of a block's first cell, the numbers of its cells without
+ * ghost layers, and its refinement. Finer blocks must begin and end at borders of coarser cells, so that a cell is
+ * either covered completely or not at all. A block that does not is an error. */
 #ifndef SESSION_COVERS_H
 #define SESSION_COVERS_H
 
@@ -10,12 +10,14 @@
 #include "session_outer_faces.h"
 #include "session_team.h"
 
-/* Finds the covered cells of all refined blocks, and marks them as ghosts of the session's own. Blocks whose covered
- * cells are others than before are to be checked again; those that do not fit have a misfit. Collective, agreed. */
+/* Finds the covered cells of all refined blocks, and marks them as ghosts in an array of the session. Blocks whose
+ * covered cells have changed must be checked again. Blocks that do not end at borders of coarser cells get a `misfit`.
+ * Collective; all ranks return the same status. */
 insitu_status session_update_covers(session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Drops the outer faces beyond which blocks of another level lie, of whatever rank; those of thresholds and of quads
- * stay. Blanked cells are not known: a face beside one of another level is dropped too. Local. */
+/* Removes the outer faces on whose other side there is a block of another level, on any rank. The faces of thresholds
+ * and of quads are kept. Ghost flags of the caller are not taken into account, so that a face next to a ghost cell of
+ * another level is also removed. Local. */
 insitu_status session_drop_faces_between_levels(const session_meshes *meshes, const session_face_part *parts, int count,
                                                 base_error *error);
 

@@ -12,39 +12,40 @@
 #include "session_twins.h"
 #include "vector3.h"
 
-/* Distance, as a share of a face's width, within which a vertex counts as lying on the face: it covers the rounding of
- * codes that compute hanging vertices in other ways. Hanging vertices are at least an eighth of the width apart. Ranks'
- * boxes are extended by the same share (session_homes.h). */
+/* Distance, as a fraction of a face's width, within which a vertex counts as lying on the face. It covers the rounding
+ * errors of codes that compute hanging vertices in other ways. Hanging vertices are at least an eighth of the width
+ * apart. The ranks' boxes are extended by the same fraction (session_homes.h). */
 static const double place_slack = 1e-5;
 
-/* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces with the vertex as
- * a corner: a face that is divided once, along one side, has twice the area of its parts. */
+/* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces that have the
+ * vertex as a corner. A face that is divided once, along one side, has twice the area of its parts. */
 static const double least_ratio = 1.25;
 
-/* Two faces have opposite orientation if the product of their normals is below this. Exactly opposite faces have -1,
- * apart from the curvature of divided faces; a wall at right angles has 0, up to rounding. */
+/* Two faces have opposite orientation if the dot product of their normals is below this. Exactly opposite faces have
+ * -1, apart from the curvature of divided faces; walls at right angles have 0, up to rounding. */
 static const double opposite = -0.1;
 
 enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
     session_coarse_face face;
-    int64_t groups[4]; /* the groups of the corners if the face is this rank's own; else -1 */
+    int64_t groups[4]; /* the groups of the corners if the face is this rank's own; all -1 if it was received */
     int source;        /* the rank that sent the face */
-    int64_t number;    /* its index in that rank's message */
+    int64_t number;    /* index of the face in that rank's message */
 } searched_face;
 
-/* A vertex that may hang, and the faces that were found at it. */
+/* A vertex that may hang, and the faces that were found at its position. */
 typedef struct candidate {
     double place[3];
     int64_t group;
-    /* heads of two linked lists of contacts: faces that it lies on, and faces that it is a corner of; -1: empty */
+    /* heads of two linked lists of contacts: with the faces on which the vertex lies, and with the faces of which it is
+     * a corner; -1: the list is empty */
     int64_t hits, corners;
-    int64_t face; /* the face on which it hangs; -1: none */
+    int64_t face; /* the face on which the vertex hangs; -1: it does not hang */
     double weights[4];
 } candidate;
 
-/* A face at a candidate, and the contact listed before it. */
+/* A face at a candidate's position, and the index of the contact that precedes it in the list. */
 typedef struct contact {
     int64_t face, last;
     double weights[4]; /* set if the candidate is not a corner of the face */
@@ -53,11 +54,12 @@ typedef struct contact {
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *states; /* a face_state for each face of the borders */
+    unsigned char *states; /* one face_state for each face of the borders */
     int64_t face_count, own_count, candidate_count, face_room;
-    searched_face *faces; /* this rank's that were read at first, then received ones, then this rank's others */
+    /* this rank's faces that were read first, then the received faces, then further ones of this rank */
+    searched_face *faces;
     candidate *candidates;
-    double rounding; /* bound of the rounding of coordinates */
+    double rounding; /* upper bound of the rounding errors of coordinates */
     int64_t contact_count, contact_room;
     contact *contacts;
     session_bins bins; /* bins of the candidates */
@@ -96,7 +98,7 @@ bool session_has_twins(const session_joint *joint)
     return joint->count > 1 || (joint->meshes[0]->is_refined && !joint->by_id);
 }
 
-/* Lists the parts, with a byte for each vertex of each. Returns false if memory runs out. */
+/* Stores the meshes of the parts, and allocates one byte per vertex for each part. Returns false if memory runs out. */
 static bool list_faces_of(const session_joint_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
@@ -109,7 +111,7 @@ static bool list_faces_of(const session_joint_parts *parts, int first, int count
     return is_done;
 }
 
-/* Finds the borders of this rank's parts of one mesh of the joint. */
+/* Finds the outer faces, and their vertices, of this rank's parts of one mesh of the joint. */
 static insitu_status update_mesh_borders(const session_joint *joint, int m, const session_joint_parts *parts,
                                          const session_team *team, base_error *error)
 {
@@ -136,7 +138,8 @@ static insitu_status update_mesh_borders(const session_joint *joint, int m, cons
     return status;
 }
 
-/* Makes room for the borders of the parts; those of as many parts are kept. */
+/* Allocates the borders of the parts. If the number of parts has not changed, the borders are kept. Returns false if
+ * memory runs out. */
 static bool make_borders(session_hanging *hanging, int count)
 {
     if (hanging->borders && hanging->border_count == count) return true;
@@ -146,7 +149,7 @@ static bool make_borders(session_hanging *hanging, int count)
     return hanging->borders != NULL;
 }
 
-/* Marks the meshes whose borders are not those of their present cells on some rank. */
+/* Marks the meshes whose borders were computed for other cells on some rank. */
 static insitu_status find_stale_borders(const session_joint *joint, const session_joint_parts *parts,
                                         const session_team *team, int *stale, base_error *error)
 {
@@ -212,7 +215,8 @@ static bool bin_candidates(hanging_search *s)
 
 typedef enum face_state {
     FACE_UNREAD,
-    FACE_WANTED, /* a candidate that is none of its corners is near, or another rank's box */
+    /* a candidate that is not one of its corners is near the face, or the face intersects another rank's box */
+    FACE_WANTED,
     FACE_READ
 } face_state;
 
@@ -237,8 +241,8 @@ static bool is_in(const session_box *box, const double place[3], double slack)
     return true;
 }
 
-/* Tells whether a candidate may be on the face: is_hit, one that lies on a face; else, one that is none of its corners.
- */
+/* Returns whether a candidate may be on the face. If is_hit, only candidates that lie on some face are considered;
+ * otherwise only those that are not corners of this face. */
 static bool has_candidate(const hanging_search *s, int m, const session_face_outline *f, double slack, bool is_hit)
 {
     session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, slack);
@@ -263,11 +267,11 @@ static bool is_wanted(const hanging_search *s, int m, const session_face *face, 
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    const double slack = place_slack * f.reach + s->rounding; /* at least slack_of() */
+    const double slack = place_slack * f.reach + s->rounding; /* at least as large as the result of slack_of() */
     return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && meets_rank(s, &f.box, slack));
 }
 
-/* Adds a face to those that were read, if it is a triangle or quad. */
+/* Appends a face to those that were read, if it is a triangle or quad. Returns false if memory runs out. */
 static bool read_face(hanging_search *s, int m, const session_face *face)
 {
     int64_t vertices[4];
@@ -286,8 +290,8 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
     return true;
 }
 
-/* Reads the faces of this rank that may bear a candidate or are near other ranks; or, is_hit, those that are left near
- * candidates that lie on faces. */
+/* Reads the faces of this rank that a candidate may lie on, or that are near other ranks. If is_hit, it reads the
+ * remaining faces that are near candidates which lie on faces. Returns false if memory runs out. */
 static bool read_faces(hanging_search *s, bool is_hit)
 {
     const session_border *borders = s->basis->joint->hanging.borders;
@@ -313,7 +317,8 @@ static bool read_faces(hanging_search *s, bool is_hit)
     return is_done;
 }
 
-/* Reads this rank's faces that matter at first. */
+/* Reads the faces of this rank that a candidate may lie on, or that are near other ranks. Returns false if memory runs
+ * out. */
 static bool read_own_faces(hanging_search *s)
 {
     int64_t count = 0;
@@ -329,7 +334,8 @@ static double slack_of(const hanging_search *s, const session_coarse_face *f)
     return place_slack * f->width + s->rounding;
 }
 
-/* Lists the faces for each rank whose box they meet; counts words where there is no room. */
+/* Writes, for each rank, the faces that intersect the rank's box. If mail->words is NULL, the words are only
+ * counted. */
 static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
     const session_homes *homes = s->basis->joint->homes;
@@ -349,7 +355,7 @@ static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sen
     }
 }
 
-/* sent: which face each of the mail is. */
+/* Packs the faces for other ranks. *sent receives the index of each packed face. Returns false if memory runs out. */
 static bool pack_faces(const hanging_search *s, session_mail *mail, int64_t **sent)
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
@@ -383,7 +389,7 @@ static bool take_faces(hanging_search *s, const session_mail *in)
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
 
-/* Adds the face to one of the candidate's lists, whose head is *last. */
+/* Adds the face to one of the candidate's lists, whose head is *last. Returns false if memory runs out. */
 static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *last)
 {
     if (s->contact_count == s->contact_room) {
@@ -400,7 +406,8 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
     return true;
 }
 
-/* Adds the face to the list of faces on which the candidate lies, if it does. */
+/* Adds the face to the list of faces on which the candidate lies, if it lies on it. Returns false if memory runs
+ * out. */
 static bool try_hit(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -410,7 +417,8 @@ static bool try_hit(hanging_search *s, int64_t number, candidate *c)
     return add_contact(s, number, weights, &c->hits);
 }
 
-/* Adds the face to the list of faces with the candidate as a corner, if the candidate lies on some face. */
+/* Adds the face to the list of faces that have the candidate as a corner, if it has, and if the candidate lies on some
+ * face. Returns false if memory runs out. */
 static bool try_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -432,8 +440,8 @@ static bool try_faces(hanging_search *s, try_function *try_one)
     return is_done;
 }
 
-/* Returns the largest area of the faces that have the candidate as a corner and face the opposite way; 0 if there are
- * none. */
+/* Returns the largest area of those faces that have the candidate as a corner and whose normal is opposite to that of
+ * f; 0 if there are none. */
 static double area_against(const hanging_search *s, const candidate *c, const session_coarse_face *f)
 {
     double area = 0;
@@ -466,8 +474,8 @@ static bool find_contacts(hanging_search *s)
 
 /* ---- results -------------------------------------------------------------------------------------------------- */
 
-/* Requests the received faces that are used: packs their numbers for the ranks that sent them. firsts: per used face,
- * the index of its first value among those that will be received. */
+/* Requests those received faces on which vertices hang: packs their numbers for the ranks that sent them. *firsts
+ * receives, for each such face, the index of its first value among the values that will be received. */
 static bool want_faces(const hanging_search *s, session_mail *wanted, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
@@ -478,7 +486,7 @@ static bool want_faces(const hanging_search *s, session_mail *wanted, int64_t **
     for (int64_t i = 0; i < s->face_count; i++) first[i] = -1;
     for (int64_t i = 0; i < s->candidate_count; i++)
         if (s->candidates[i].face >= 0) first[s->candidates[i].face] = 0;
-    for (int64_t i = s->own_count; i < s->face_count; i++) { /* in the order of ranks */
+    for (int64_t i = s->own_count; i < s->face_count; i++) { /* these faces are sorted by rank */
         if (first[i] < 0) continue;
         first[i] = 4 * wanted->total;
         wanted->words[wanted->total++] = (uint64_t)s->faces[i].number;
@@ -505,7 +513,8 @@ static bool keep_vertices(const hanging_search *s, const int64_t *firsts, sessio
     return true;
 }
 
-/* Stores which values other ranks request. requests: for each rank, numbers of faces in this rank's message to it. */
+/* Stores which values the other ranks request. `requests` holds, for each rank, indices of faces in the message that
+ * this rank sent to it. */
 static bool keep_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                           const session_mail *requests, session_hanging *out)
 {
@@ -528,8 +537,8 @@ static bool keep_requests(const hanging_search *s, const session_mail *mail, con
 
 /* ---- search --------------------------------------------------------------------------------------------------- */
 
-/* Finds the hanging vertices, with faces of other ranks. Errors of this rank alone are stored in *error and not
- * returned. */
+/* Finds the hanging vertices, also on faces of other ranks. Errors that occur only on this rank are stored in *error
+ * and not returned. */
 static insitu_status find_shared(hanging_search *s, session_hanging *out, base_error *error)
 {
     session_mail faces = {0}, in = {0}, wanted = {0}, requests = {0};
@@ -591,7 +600,8 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 
 /* ---- values --------------------------------------------------------------------------------------------------- */
 
-/* Sets the hanging vertices to their faces' values. Returns whether a value changed. */
+/* Sets the values of the hanging vertices to those of their faces at their positions. Returns whether a value
+ * changed. */
 static bool constrain(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;
@@ -607,7 +617,8 @@ static bool constrain(const session_hanging *hanging, const double *received, do
     return is_changed;
 }
 
-/* Exchanges values and sets the hanging vertices once. *is_changed: a value changed on some rank. */
+/* Exchanges values with other ranks, then sets the values of the hanging vertices once. *is_changed is set if a value
+ * changed on any rank. */
 static insitu_status constrain_once(const session_hanging *hanging, const session_team *team, double *means,
                                     int *is_changed, base_error *error)
 {

@@ -23,41 +23,46 @@
 #include "session_neighbours.h"
 #include "session_thresholds.h"
 
-/* The number of threads that have a table of sums of their own, with a word for each vertex. */
+/* Maximum number of threads that have their own table of sums. A table has one 64-bit word per vertex. */
 enum { MOST_TABLES = 4 };
 
-/* What the search has of one part. */
+/* The data that the search stores for one part of the mesh. */
 typedef struct part_cells {
     const grid *grid;
-    unsigned char *is_hidden; /* a byte a cell, not 0 for those beyond the threshold; NULL: there is no threshold */
-    int64_t first_cell;       /* number of its first cell among those of all parts */
-    int64_t first_vertex;     /* the same of vertices */
-    uint64_t *hashes;         /* one for each vertex */
-    unsigned char *is_open;   /* a byte a vertex: its sum is not 0, so that it may be a corner of an outer face */
+    /* one byte per cell, nonzero if the cell is beyond the threshold; NULL: there is no threshold */
+    unsigned char *is_hidden;
+    int64_t first_cell;   /* number of the part's first cell among those of all parts */
+    int64_t first_vertex; /* number of the part's first vertex among those of all parts */
+    uint64_t *hashes;     /* one hash per vertex */
+    /* one byte per vertex, nonzero if its sum of hashes is not 0, so that it may be a corner of an outer face */
+    unsigned char *is_open;
 } part_cells;
 
-/* A face that may be an outer one. */
+/* A face that may be an outer face. */
 typedef struct found_face {
     session_face face;
-    int part; /* -1: the face is none after all */
+    int part; /* -1: the face has turned out not to be an outer face */
 } found_face;
 
 typedef struct face_search {
     const session_face_part *parts;
     int part_count;
     int threads;
-    part_cells *cells;                /* of each part */
-    int64_t cell_count, vertex_count; /* of all parts */
-    uint64_t *hashes;                 /* one for each vertex */
-    int table_count;                  /* of vertex_sums; when there are more threads, they share tables */
-    uint64_t *vertex_sums;  /* exclusive or of the hashes of a vertex's faces, in table_count tables */
-    uint64_t *hash_sums;    /* the same of all vertices with one hash (& mask), as vertices in one place are one */
+    part_cells *cells;                /* one entry per part */
+    int64_t cell_count, vertex_count; /* total numbers over all parts */
+    uint64_t *hashes;                 /* one hash per vertex */
+    /* number of tables in vertex_sums; if there are more threads, they share tables */
+    int table_count;
+    uint64_t *vertex_sums; /* exclusive or of the hashes of each vertex's faces, in table_count tables */
+    /* exclusive or of the sums of all vertices with the same hash (& mask): vertices at the same position count as
+     * one */
+    uint64_t *hash_sums;
     uint64_t mask;
-    unsigned char *is_open; /* of all vertices */
+    unsigned char *is_open; /* one byte per vertex of all parts, nonzero if it may be a corner of an outer face */
     int64_t count;
-    found_face *faces; /* in the order of parts and cells */
+    found_face *faces; /* sorted by part and cell */
     session_key *keys;
-    int64_t *groups; /* faces with equal keys share a group */
+    int64_t *groups; /* group of each face; faces with equal keys are in one group */
     int64_t *sizes;  /* number of faces in each group */
 } face_search;
 
@@ -75,7 +80,8 @@ static void search_free(face_search *s)
     base_free(s->sizes);
 }
 
-/* The number of vertices. Those of a part without cells do not count: they may lack the ids that all others have. */
+/* Returns the number of vertices of the part. Vertices of a part without cells do not count: they may lack the ids that
+ * all others have. */
 static int64_t vertices_of(const part_cells *p)
 {
     return p->grid->cell_count ? p->grid->vertex_count : 0;
@@ -83,8 +89,8 @@ static int64_t vertices_of(const part_cells *p)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* Tells whether the face's i-th vertex is not there before. One that it has twice counts once: a quad with two corners
- * in one place is a triangle. */
+/* Returns whether the face's i-th vertex is not among the vertices before it. A vertex that the face contains twice
+ * counts once: a quad with two corners at the same position is a triangle. */
 static inline bool is_new(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
     const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
@@ -93,7 +99,7 @@ static inline bool is_new(const part_cells *p, const session_face_loop *loop, in
     return true;
 }
 
-/* Makes a face's key; false where it has fewer than three vertices. */
+/* Computes a face's key. Returns false if the face has fewer than three different vertices. */
 static bool make_key(const part_cells *p, const session_face_loop *loop, session_key *key)
 {
     uint64_t sums[3] = {0, 0, 0}, vertices = 0;
@@ -137,9 +143,9 @@ static void hash_vertices(const face_search *s, bool by_id)
 
 /* The table to which a thread adds the hashes of faces. */
 typedef struct xor_table {
-    const part_cells *part; /* whose faces are added */
-    uint64_t *vertex_sums;  /* one for each of its vertices */
-    bool is_shared;         /* other threads add to it at the same time */
+    const part_cells *part; /* the part whose faces are added */
+    uint64_t *vertex_sums;  /* one sum for each of the part's vertices */
+    bool is_shared;         /* set if other threads add to the table at the same time */
 } xor_table;
 
 static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
@@ -168,8 +174,8 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
         if (is_new(p, loop, i)) add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
 }
 
-/* Adds the hashes of all faces of a cell whose type has a table of faces. Returns false, and adds nothing, where two of
- * its vertices have one hash: its faces then have fewer vertices than the table says. */
+/* Adds the hashes of all faces of a cell whose type has a table of faces. If two of its vertices have the same hash,
+ * its faces have fewer vertices than in the table; then nothing is added and false is returned. */
 static inline bool add_cell(const xor_table *x, const session_face_table *table, const int64_t *vertices, int count)
 {
     uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
@@ -201,7 +207,8 @@ static void add_faces(const xor_table *x, int64_t cell)
     if (table->count) {
         int64_t vertices[GRID_MAX_CELL_VERTICES];
         const int count = grid_cell_vertices(g, cell, vertices);
-        const bool is_tet = type == GRID_TET; /* with constants the compiler unrolls all of it */
+        /* with constant arguments the compiler unrolls all loops of the function */
+        const bool is_tet = type == GRID_TET;
         if (is_tet ? add_cell(x, session_faces_of_type(GRID_TET), vertices, 4) : add_cell(x, table, vertices, count))
             return;
     }
@@ -212,7 +219,8 @@ static void add_faces(const xor_table *x, int64_t cell)
     }
 }
 
-/* Adds the vertex's sums in all tables to that of its hash. vertex: among those of all parts. */
+/* Adds the vertex's sums in all tables to the sum of its hash. `vertex` is its number among the vertices of all
+ * parts. */
 static void add_vertex(const face_search *s, int64_t vertex)
 {
     uint64_t sum = 0;
@@ -220,7 +228,7 @@ static void add_vertex(const face_search *s, int64_t vertex)
     add_xor(&s->hash_sums[s->hashes[vertex] & s->mask], sum, s->threads > 1);
 }
 
-/* Finds the vertices whose sum of faces is not 0. */
+/* Computes the sums of the hashes of each vertex's faces, and marks the vertices whose sum is not 0. */
 static void cancel_faces(const face_search *s)
 {
 #pragma omp parallel num_threads(s->threads)
@@ -242,12 +250,12 @@ static void cancel_faces(const face_search *s)
     }
 }
 
-/* Faces of some of the cells. */
+/* The faces found in some of the cells. */
 typedef struct face_list {
     int64_t count, room;
     found_face *faces;
     session_key *keys;
-    bool is_lost; /* memory ran out */
+    bool is_lost; /* set if memory ran out */
 } face_list;
 
 static void face_list_free(face_list *list)
@@ -276,7 +284,7 @@ static bool is_open_face(const part_cells *p, const session_face_loop *loop)
     return true;
 }
 
-/* Tells whether the cell may have an outer face, as far as vertices tell. */
+/* Returns whether the cell may have an outer face, judged by its vertices alone. */
 static bool has_open_vertices(const part_cells *p, int64_t cell)
 {
     const grid *g = p->grid;
@@ -288,7 +296,7 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
     return open >= 3;
 }
 
-/* Lists the cell's faces that may be outer ones. */
+/* Appends those faces of the cell to the list that may be outer faces. */
 static void take_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
@@ -304,7 +312,7 @@ static void take_faces(const face_search *s, int part, int64_t cell, face_list *
     }
 }
 
-/* Lists the faces of cells first .. end - 1, among those of all parts. */
+/* Appends the possible outer faces of the cells first .. end - 1 to the list. Cells are numbered over all parts. */
 static void take_share(const face_search *s, int64_t first, int64_t end, face_list *out)
 {
     for (int part = 0; part < s->part_count; part++) {
@@ -315,7 +323,7 @@ static void take_share(const face_search *s, int64_t first, int64_t end, face_li
     }
 }
 
-/* Puts the lists together. */
+/* Concatenates the lists of all threads. Returns false if memory runs out. */
 static bool join_lists(face_search *s, const face_list *lists, int count)
 {
     int64_t total = 0;
@@ -354,7 +362,7 @@ static bool collect_faces(face_search *s)
     return is_done;
 }
 
-/* Finds the groups of equal keys, and their sizes. */
+/* Determines the groups of equal keys, and the number of keys in each. Returns false if memory runs out. */
 static bool count_keys(const session_key *keys, int64_t count, int64_t **groups, int64_t **sizes)
 {
     session_key_table table = {0};
@@ -385,7 +393,8 @@ static void keep_single_faces(face_search *s)
     s->count = kept;
 }
 
-/* Allocates what the search keeps of vertices, and gives each part its share. */
+/* Allocates the arrays of the search that have one entry per vertex, and assigns each part its section of them. Returns
+ * false if memory runs out. */
 static bool make_tables(face_search *s)
 {
     uint64_t slots = 1;
@@ -405,7 +414,8 @@ static bool make_tables(face_search *s)
     return true;
 }
 
-/* Numbers the cells and vertices of all parts, and finds those beyond thresholds. */
+/* Numbers the cells and vertices of all parts, and finds the cells that are beyond thresholds. Returns false if memory
+ * runs out. */
 static bool begin_parts(face_search *s)
 {
     s->cells = base_calloc((size_t)s->part_count + 1, sizeof *s->cells);
@@ -444,8 +454,8 @@ static insitu_status search_own(face_search *s, bool by_id, base_error *error)
 
 enum { KEY_WORDS = 3 };
 
-/* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have it.
- * The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
+/* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have the
+ * face. The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
 static int home_of(const face_search *s, const session_homes *homes, int64_t number)
 {
     const found_face *face = &s->faces[number];
@@ -465,7 +475,8 @@ static int home_of(const face_search *s, const session_homes *homes, int64_t num
     return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]), (int64_t)key.words[0]);
 }
 
-/* Packs the keys of faces in other ranks' boxes by their homes. *order: the face of each key. */
+/* Packs the keys of the faces that lie in other ranks' boxes, sorted by their home ranks. *order receives the face of
+ * each key. Returns false if memory runs out. */
 static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
     int64_t *places = base_calloc((size_t)ranks + 1, sizeof *places);
@@ -495,7 +506,7 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
     return is_done;
 }
 
-/* Computes the reply to each key: the number of its occurrences. */
+/* Computes the reply to each received key, which is the number of its occurrences. Returns false if memory runs out. */
 static bool answer_keys(const session_mail *in, int ranks, session_mail *reply)
 {
     const int64_t count = in->total / KEY_WORDS;
@@ -568,7 +579,7 @@ static void mark_borders(const face_search *s)
     }
 }
 
-/* Gives each part its faces. */
+/* Stores the outer faces that were found with the parts to which they belong. */
 static void keep_faces(const face_search *s, base_error *error)
 {
     int64_t at = 0;

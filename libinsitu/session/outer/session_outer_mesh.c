@@ -12,8 +12,8 @@
 
 /* ---- one face ------------------------------------------------------------------------------------------------ */
 
-/* A face with three or four corners. Their order depends only on their positions: it begins at the least corner,
- * towards the lesser of its neighbours. */
+/* A face with three or four corners. Their order depends only on their positions: it begins with the least corner and
+ * continues to the lesser of its neighbours. */
 typedef struct corner_loop {
     int count;
     int64_t vertices[4];
@@ -55,7 +55,7 @@ static void subtract(const double a[3], const double b[3], double out[3])
     for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
 }
 
-/* Computes the normal, whose length is twice the area. */
+/* Computes the face's normal, with a length of twice its area. */
 static void find_normal(const corner_loop *loop, double out[3])
 {
     double a[3], b[3];
@@ -77,13 +77,14 @@ static double perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* Distance from the face's plane, as a share of the face's width, above which a point counts as lying on one side. The
- * middle of a shell is in its plane; rounding must not decide there, since it depends on where the list of vertices
- * begins. */
+/* Distance from the face's plane, as a fraction of the face's width, above which a point counts as lying on one side.
+ * The centre of a shell lies in its plane, and rounding must not determine its side, since it depends on where the list
+ * of vertices begins. */
 static const double side_slack = 1e-9;
 
-/* Places the apex above the middle of the corners, at half a mean side's distance, on the side of `inside`, or of the
- * loop's own normal. Returns false if the face's area is only rounding. */
+/* Computes the apex of the cell made on a face. It lies above the centre of the corners, at half of the mean side
+ * length, and on the side of `inside` or, if that is in the face's plane, of the loop's own normal. Returns false if
+ * the face's area is 0 up to rounding. */
 static bool find_apex(const corner_loop *loop, const double inside[3], double apex[3])
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
@@ -114,26 +115,26 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 
 /* ---- the mesh ------------------------------------------------------------------------------------------------ */
 
-/* A face with more than four corners, or a concave quad, which is drawn as its triangles (polygon.h). Repeated
- * consecutive corners are dropped. */
+/* A face with more than four corners, or a concave quad, which is drawn as triangles (polygon.h). Repeated consecutive
+ * corners are dropped. */
 typedef struct face_polygon {
     int count;
     int64_t *vertices;
     double (*places)[3];
     int (*triangles)[3];
     void *room;
-    double normal[3]; /* points towards the apexes of the pyramids made on the face */
+    double normal[3]; /* normal that points towards the apexes of the cells made on the face */
 } face_polygon;
 
-/* The mesh under construction. Its arrays are as large as the faces may need at most. */
+/* The mesh under construction. Its arrays have the largest size that the faces may require. */
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
-    int64_t *places; /* per vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
+    int64_t *places; /* for each vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
     float *heights;
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
-    face_polygon polygon; /* has space for the largest polygon */
-    int64_t loop_end;     /* end of the filled part of the polygons' loops */
+    face_polygon polygon; /* buffer with space for the largest polygon */
+    int64_t loop_end;     /* number of entries stored in the polygons' loops */
 } outer_work;
 
 static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
@@ -151,7 +152,7 @@ static int64_t place_vertex(outer_work *w, int64_t origin, const double place[3]
     return *out;
 }
 
-/* Adds a tet on a triangle, or a pyramid on a quad, whose apex has been added. */
+/* Adds a tet on a triangle, or a pyramid on a quad. Its apex must have been added before. */
 static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
     w->out->offsets[w->cell_count] = w->entry_count;
@@ -163,7 +164,7 @@ static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex,
     w->out->connectivity[w->entry_count++] = apex;
 }
 
-/* As above, with a new apex. Adds nothing if the face has no area. */
+/* Adds a tet on a triangle, or a pyramid on a quad, together with its apex. Does nothing if the face's area is 0. */
 static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
 {
     double apex[3];
@@ -172,7 +173,7 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
     if (find_apex(loop, inside, apex)) add_cell_below(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
 }
 
-/* Computes a triangle and its own apex; returns false if it has no area. */
+/* Computes a triangle of the polygon and the triangle's own apex. Returns false if its area is 0. */
 static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, double apex[3])
 {
     double inside[3];
@@ -187,9 +188,10 @@ static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, dou
     return find_apex(out, inside, apex);
 }
 
-/* Computes one apex for all triangles, the mean of their own. Their tets then share faces, and a ray along the line
- * between two triangles goes from one tet into the other; between separate tets it might hit neither. Returns false if
- * the apex is not well above each triangle, because the triangles are too far from a common plane. */
+/* Computes one apex for all triangles of the polygon, which is the mean of their own apexes. Their tets then share
+ * faces, and a ray along the line between two triangles passes from one tet into the other; between separate tets it
+ * might hit neither. Returns false if the apex is not well above each triangle, because the triangles are too far from
+ * a common plane. */
 static bool find_common_apex(const face_polygon *p, double out[3])
 {
     corner_loop loop;
@@ -213,8 +215,8 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     return count > 0;
 }
 
-/* Computes the polygon's normal, on the side of `inside`, or with a positive largest component; its length is about the
- * polygon's width. */
+/* Computes the polygon's normal. It points to the side of `inside` or, if that is in the polygon's plane, has a
+ * positive largest component. Its length is about the polygon's width. */
 static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
@@ -238,7 +240,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
 }
 
-/* Adds the loop of the polygon to which the cells from `first` on belong. */
+/* Appends the loop of the polygon, to which the cells from number `first` on belong. */
 static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -263,7 +265,8 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     add_loop(w, p, first);
 }
 
-/* Returns whether a face is a concave quad. Faces of hexes, wedges and pyramids are patches, whatever their shape. */
+/* Returns whether a face is a concave quad. Faces of hexes, wedges and pyramids are bilinear patches, whatever their
+ * shape. */
 static bool is_concave(const session_face_loop *face, const double (*places)[3], int count)
 {
     return count == 4 && !face->places && polygon_is_concave_quad(places);
@@ -301,9 +304,9 @@ static void add_face(outer_work *w, const session_face *face)
 
 /* Upper bounds of the sizes that the faces require. */
 typedef struct outer_counts {
-    int64_t cells, entries; /* entries of connectivity */
-    int64_t loops;          /* entries of polygons' loops */
-    int64_t corners;        /* corners of one face */
+    int64_t cells, entries; /* numbers of cells and of connectivity entries */
+    int64_t loops;          /* number of entries of the polygons' loops */
+    int64_t corners;        /* largest number of corners of one face */
 } outer_counts;
 
 static outer_counts count_most(const grid *g, const session_outer *outer)
@@ -370,8 +373,8 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
            make_polygon_room(&w->polygon, most.corners);
 }
 
-/* Describes the mesh as a grid. If all cells have one type, types and offsets are omitted, so that kernels that process
- * many cells at once can be used. */
+/* Returns the mesh as a grid. If all cells have one type, types and offsets are omitted, so that vectorized code can be
+ * used. */
 static grid describe(const outer_work *w)
 {
     const session_outer *out = w->out;
@@ -391,7 +394,7 @@ static grid describe(const outer_work *w)
     return g;
 }
 
-/* Completes the mesh. Its scalar becomes the owner of the heights. */
+/* Completes the mesh. Its scalar takes ownership of the array of values. Returns false if memory runs out. */
 static bool finish(const session_mesh *whole, outer_work *w)
 {
     session_mesh *out = w->out->mesh;

@@ -1,9 +1,11 @@
-/* A face is on the boundary if only one cell has it. In meshes with face owners this is given. In other meshes all
- * cells' faces are searched: a face's key is a hash of the first three power sums of its vertices' groups, independent
- * of their order, and each given face needs its own cell that has it. So a face between two cells is detected, and a
- * baffle, whose two sides are one face of such a mesh, may be given once for each side.
+/* A face is on the boundary if only one cell has it. In meshes with face owners this is given. In other meshes the
+ * faces of all cells are searched: a face's key is a hash of the first three power sums of its vertices' groups,
+ * independent of their order, and for each given face there must be a different cell that has it. So a face between two
+ * cells is detected as an error, while a baffle, whose two sides are the same face of such a mesh, may be given once
+ * for each side.
  *
- *     patches -> faces: groups of vertices, value -> is a drawn cell behind it? -> (group, value) of each vertex */
+ * The steps are: list the vertex groups and the value of each face of each patch; determine whether a drawn cell has
+ * the face; output the pair (group, value) for each vertex. */
 #include "session_patches.h"
 
 #include <stdio.h>
@@ -19,15 +21,15 @@ typedef struct patch_faces {
     const session_field *field;
     const session_vertex_numbers *numbers;
     int64_t count;   /* number of faces of all patches */
-    int64_t *starts; /* count + 1 entries: index of each face's first group */
-    int64_t *groups; /* -1: the vertex belongs to no drawn cell */
+    int64_t *starts; /* index of each face's first group, count + 1 entries */
+    int64_t *groups; /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
     unsigned char *is_drawn;
 } patch_faces;
 
 /* The vertices around a face. */
 typedef struct patch_face {
     session_face_row row;
-    int64_t number; /* number of the face in the mesh, from 0; -1: it is given by its vertices */
+    int64_t number; /* number of the face in the mesh, from 0 on; -1: the face is given by its vertices */
 } patch_face;
 
 static insitu_status no_memory(int64_t entries, base_error *error)
@@ -35,7 +37,8 @@ static insitu_status no_memory(int64_t entries, base_error *error)
     return session_no_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
 }
 
-/* Returns an error about a face: "mesh ...: field ...: patch 2: face 17" (or "its face 3") and `what`. */
+/* Stores an error about a face and returns its status. The message is 'mesh ...: field ...: patch 2: face 17', or 'its
+ * face 3', followed by `what`. */
 static insitu_status tell(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
 {
     const insitu_patch *given = &p->field->given.patches[patch];
@@ -58,7 +61,7 @@ static insitu_status tell_range(const patch_faces *p, int patch, int64_t face, c
 
 /* ---- faces ----------------------------------------------------------------------------------------------------- */
 
-/* Gets a face's vertices from the patch's own list. */
+/* Reads a face's vertices from the patch's own list. */
 static void own_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
 {
     session_face_row *row = &out->row;
@@ -111,7 +114,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
     return INSITU_OK;
 }
 
-/* Lists all faces of all patches, in two passes: the first computes the space that they take. */
+/* Lists all faces of all patches, in two passes. The first pass computes the space that they require. */
 static insitu_status list_faces(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
@@ -180,11 +183,11 @@ static insitu_status ask_owners(patch_faces *p, base_error *error)
 /* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
 
 typedef struct cell_search {
-    session_key_table keys;  /* one per face all of whose vertices have groups */
-    int64_t *of_face;        /* per face, the number of its key, or -1 */
-    int64_t *given, *cells;  /* per key: how often it is given, and how many cells have it */
-    unsigned char *is_drawn; /* per key: one of these cells is drawn */
-    unsigned char *is_met;   /* per group: such a face has it */
+    session_key_table keys;  /* keys of those faces all of whose vertices have groups */
+    int64_t *of_face;        /* for each face, the index of its key; -1: it has none */
+    int64_t *given, *cells;  /* for each key, how often it is given, and how many cells have the face */
+    unsigned char *is_drawn; /* for each key, set if one of these cells is drawn */
+    unsigned char *is_met;   /* for each group, set if a face with a key contains it */
 } cell_search;
 
 static void search_free(cell_search *s)
@@ -231,7 +234,7 @@ static void enter_faces(cell_search *s, const patch_faces *p)
     }
 }
 
-/* Computes the key of a cell's face; returns false if one of its vertices is on no given face. */
+/* Computes the key of a cell's face. Returns false if one of its vertices is not on any given face. */
 static bool key_of(const cell_search *s, const patch_faces *p, const session_face_loop *loop, session_key *key)
 {
     *key = (session_key){{0}};

@@ -1,26 +1,27 @@
-/* The values of a cell field on the boundary, at the vertices of its faces. */
+/* Collects the values of a cell field on the boundary, at the vertices of the boundary faces. */
 #ifndef SESSION_PATCHES_H
 #define SESSION_PATCHES_H
 
 #include "session_exchange.h"
 #include "session_mesh.h"
 
-/* Numbers by which equal vertices on this rank are recognized. */
+/* Numbers by which equal vertices of this rank are recognized. */
 typedef struct session_vertex_numbers {
-    const session_key_table *keys; /* keys of drawn cells' vertices; the keys' numbers are the groups */
-    const int64_t *of_vertex;      /* per vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
+    const session_key_table *keys; /* keys of the vertices of drawn cells; the numbers of the keys are the groups */
+    const int64_t *of_vertex;      /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
     bool by_id;
 } session_vertex_numbers;
 
-/* count pairs of a value and a vertex group: each face gives its value once to each group of its vertices. */
+/* A list of `count` pairs of a value and a vertex group. Each face adds its value once for each group of its
+ * vertices. */
 typedef struct session_patch_values {
     int64_t count;
     int64_t *groups;
     double *values;
 } session_patch_values;
 
-/* Collects the finite values that the field's patches have on faces of drawn cells. Faces that the mesh does not have,
- * that two cells share, or that are given twice are errors. Local. */
+/* Collects the finite values that the field's patches have on faces of drawn cells. A face is an error if the mesh does
+ * not have it, if two cells share it, or if it is given twice. Local. */
 insitu_status session_find_patch_values(const session_mesh *mesh, int field, int component,
                                         const session_vertex_numbers *numbers, session_patch_values *out,
                                         base_error *error);

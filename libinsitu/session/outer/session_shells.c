@@ -9,7 +9,7 @@ bool session_has_shells(const session_catalogue *catalogue)
     return false;
 }
 
-/* Takes over the values, rising, each with its colour. */
+/* Copies the isovalues and their colours, sorted by value. */
 static void take_values(const scene_isosurface *layer, scene_lines *out)
 {
     for (int i = 0; i < layer->value_count; i++) {
@@ -23,7 +23,7 @@ static void take_values(const scene_isosurface *layer, scene_lines *out)
     }
 }
 
-/* Just below 1: pixels of which a line covers a part show what is behind. */
+/* The largest float below 1. With an opacity below 1, pixels that a line covers only in part show what is behind. */
 static const float nearly_opaque = 0.99999994F;
 
 scene_surface session_shells_of(const scene_isosurface *layer, int height)

@@ -1,5 +1,5 @@
-/* Isosurfaces on triangles, quads and polygons: the contour lines of their values, on the outer surface of meshes that
- * have no other cells. */
+/* Draws isosurfaces on triangles, quads and polygons. These are the contour lines of the isovalues on the outer surface
+ * of meshes that contain no other cells. */
 #ifndef SESSION_SHELLS_H
 #define SESSION_SHELLS_H
 
@@ -7,13 +7,14 @@
 #include "session_catalogue.h"
 #include "session_mesh.h"
 
-/* Tells whether any mesh has shells alone, on all ranks together. */
+/* Returns whether any mesh contains only shells, over all ranks. */
 bool session_has_shells(const session_catalogue *catalogue);
 
-/* Makes the surface whose lines are the isosurface's on shells. It borrows from the layer; height: of the picture. */
+/* Returns a surface layer that draws the isosurface as contour lines on shells. It refers to data of the layer. height
+ * is that of the image in pixels. */
 scene_surface session_shells_of(const scene_isosurface *layer, int height);
 
-/* Tells whether the layer is on the mesh. */
+/* Returns whether the surface layer is drawn on the mesh. */
 bool session_surface_is_on(const scene_surface *layer, const session_mesh *mesh);
 
 #endif

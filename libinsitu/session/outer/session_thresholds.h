@@ -1,28 +1,29 @@
-/* Thresholds: a surface layer may show the outer faces of only those cells of a mesh whose values of a field lie within
- * bounds. */
+/* Thresholds of surface layers. A layer may show the outer faces of only those cells of a mesh whose values of a field
+ * lie within bounds. */
 #ifndef SESSION_THRESHOLDS_H
 #define SESSION_THRESHOLDS_H
 
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Returns the outer faces of a surface layer on the mesh; NULL if they were not marked. */
+/* Returns the outer faces that a surface layer with this threshold shows on the mesh. Returns NULL if they have not
+ * been marked. */
 session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold);
 
-/* Records that an image of this step shows these faces. Returns false if memory ran out. Local. */
+/* Marks the outer faces as shown by an image of this step. Returns false if memory runs out. Local. */
 bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold);
 
-/* Frees the faces of thresholds that no image of this step shows, as the values on which they depend have probably
- * changed before the next use. */
+/* Frees the faces of thresholds that no image of this step shows, because the values on which they depend will probably
+ * have changed before the next use. */
 void session_drop_thresholds(session_mesh *mesh);
 
-/* Returns whether the faces are unknown, or were found for other values. */
+/* Returns whether the faces have not been computed, or were computed for other values. */
 bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer);
-/* Records that the faces were found for the current values. */
+/* Records that the faces were computed for the current values. */
 void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer);
 
-/* Returns a byte per cell, from base_alloc(), which is nonzero if the cell is beyond the threshold; NaN counts as
- * beyond. Returns NULL if there is no memory. */
+/* Returns one byte per cell, which is nonzero if the cell is beyond the threshold; NaN counts as beyond. The array is
+ * allocated by base_alloc(); NULL if memory runs out. */
 unsigned char *session_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads);
 
 #endif

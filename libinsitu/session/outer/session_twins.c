@@ -15,10 +15,10 @@ enum { CORNER_WORDS = 4 };
 /* A vertex of an outer face. */
 typedef struct face_corner {
     double place[3];
-    double slack; /* vertices nearer than this are the same vertex */
+    double slack; /* vertices that are nearer to it than this are treated as equal */
 } face_corner;
 
-/* A vertex of a face that this rank has once, and the least position of all equal vertices. */
+/* A vertex of a face that only one cell of this rank has, and the least position of all vertices equal to it. */
 typedef struct border_vertex {
     double place[3], least[3];
 } border_vertex;
@@ -28,15 +28,15 @@ typedef struct twin_search {
     const session_joint_parts *parts;
     const session_team *team;
     int64_t corner_count, vertex_count;
-    face_corner *corners;    /* this rank's, then the received ones */
-    border_vertex *vertices; /* of all parts, in the parts' order */
+    face_corner *corners;    /* this rank's corners, followed by the received ones */
+    border_vertex *vertices; /* vertices of all parts, sorted by part */
     double rounding;
     session_bins bins;
 } twin_search;
 
 /* ---- corners -------------------------------------------------------------------------------------------------- */
 
-/* Computes the shortest edge at each vertex of the face. */
+/* Computes the length of the shortest edge at each vertex of the face. */
 static void measure_edges(const grid *g, const session_face *face, double *edges)
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
@@ -53,7 +53,7 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
     }
 }
 
-/* Adds the corners of a part's outer faces; there is room for them. */
+/* Appends the corners of a part's outer faces; the array is large enough. Returns false if memory runs out. */
 static bool add_corners(twin_search *s, const session_mesh *mesh, const session_border *border)
 {
     const grid *g = &mesh->cells;
@@ -92,7 +92,7 @@ static bool list_own(twin_search *s)
 
 /* ---- corners of several ranks --------------------------------------------------------------------------------- */
 
-/* Packs the corners for each rank in whose box they are; only counts the words if mail->words is NULL. */
+/* Writes, for each rank, the corners that lie in the rank's box. If mail->words is NULL, the words are only counted. */
 static void send_corners(const twin_search *s, session_mail *mail)
 {
     const session_homes *homes = s->joint->homes;
