@@ -1,5 +1,5 @@
-/* A rank that returned early would leave the others blocked in their next collective call. So either all ranks end a
- * step after a phase, or none does. If nothing failed this costs one reduction of an integer. */
+/* A rank that returned early would leave the others blocked in their next collective call. So after each phase of a
+ * step, either all ranks end the step or none does. If no error occurred, this costs one reduction of an integer. */
 #include "session_agree.h"
 
 #include <stdio.h>

@@ -1,7 +1,7 @@
-/* Agreement of all ranks on an error.
+/* Makes all ranks agree on an error.
  *
- * Every phase of a step is collective and ends here: it returns one status on all ranks, and if that is an error,
- * *error is the same on all of them. */
+ * Every phase of a step is collective and ends with these functions. They return the same status on all ranks; if it is
+ * an error, *error is also the same on all of them. */
 #ifndef SESSION_AGREE_H
 #define SESSION_AGREE_H
 
@@ -10,20 +10,22 @@
 
 #include "error.h"
 
-/* Ends a phase that may have failed on some ranks: *error becomes that of the lowest rank that failed, on every rank,
- * preceded by "rank N: ". Returns INSITU_OK if no rank failed. Collective. */
+/* Ends a phase that may have failed on some ranks. *error becomes, on every rank, the error of the lowest rank that
+ * failed, preceded by "rank N: ". Returns INSITU_OK if no rank failed. Collective. */
 insitu_status session_agree(MPI_Comm comm, base_error *error);
 
-/* As session_agree(), but without "rank N: ", for errors that do not belong to a rank. Collective. */
+/* Ends a phase in the same way as session_agree(), but does not put "rank N: " in front of the message. It is used for
+ * errors that are not specific to a rank. Collective. */
 insitu_status session_agree_as_is(MPI_Comm comm, base_error *error);
 
-/* Copies one rank's error to every rank. Collective. */
+/* Copies the error of the rank `root` to every rank. Collective. */
 insitu_status session_share_error(MPI_Comm comm, int root, base_error *error);
 
-/* Returns the status of an MPI call. If the call failed, *error names `what` and MPI's reason. Local. */
+/* Converts the return code of an MPI call to a status. If the call failed, *error contains `what` and MPI's reason.
+ * Local. */
 insitu_status session_mpi(base_error *error, int code, const char *what);
 
-/* Records that memory ran out. Local. */
+/* Stores an error that memory ran out for `bytes` bytes of `what`, and returns its status. Local. */
 insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what);
 
 #endif

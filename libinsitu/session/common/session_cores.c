@@ -1,6 +1,6 @@
-/* Ranks that are not bound to cores share all cores. Ranks that are bound to a socket or a container share its cores,
- * and a rank that is bound to its own cores has them for itself. These cases are distinguished by the sets of cores on
- * which the ranks may run; it does not matter what has bound the ranks. */
+/* Ranks that are not bound to cores share all cores of the node. Ranks that are bound to a socket or a container share
+ * its cores, and a rank that is bound to cores of its own does not share them. These cases are distinguished by the
+ * sets of cores on which the ranks may run; it does not matter who has bound the ranks. */
 #define _GNU_SOURCE 1
 #include "session_cores.h"
 
@@ -17,12 +17,12 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
     double share = 0;
     for (int k = 0; k < cores; k++)
         if (may_run[k]) share += 1 / (double)rank_counts[k];
-    share += 1e-6; /* the sum of eight eighths may be slightly less than one */
+    share += 1e-6; /* because of rounding, the sum of eight eighths may be slightly less than one */
     return share > 1 ? (int)share : 1;
 }
 
-/* Marks the cores of OpenMP's places. If there are places, OpenMP has already bound this thread to the first of
- * them. */
+/* Marks the cores that belong to OpenMP's places. If there are places, the set of cores of this thread cannot be used,
+ * because OpenMP has already bound it to the first place. */
 static void find_places(int32_t may_run[MOST_CORES])
 {
     for (int place = 0; place < omp_get_num_places(); place++) {
@@ -35,7 +35,7 @@ static void find_places(int32_t may_run[MOST_CORES])
     }
 }
 
-/* Marks the cores on which this rank may run. Returns false if the system does not provide them. */
+/* Marks the cores on which this rank may run. Returns false if the operating system does not provide them. */
 static bool find_cores(int32_t may_run[MOST_CORES])
 {
     cpu_set_t set;
@@ -58,7 +58,7 @@ int session_cores_of_rank(MPI_Comm node)
     const bool is_known = find_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
         return session_share_of_cores(own, all, MOST_CORES);
-    /* A rank that may not run on all cores has been bound. */
+    /* If a rank may not run on all cores, it has been bound to its own ones. */
     const int cores = omp_get_num_procs(), share = cores / ranks;
     if (cores < sysconf(_SC_NPROCESSORS_ONLN)) return cores;
     return share > 1 ? share : 1;

@@ -1,17 +1,18 @@
-/* Computes how many of its node's cores a rank has for itself. */
+/* Computes the number of cores that a rank has for itself on its node. */
 #ifndef SESSION_CORES_H
 #define SESSION_CORES_H
 
 #include <mpi.h>
 #include <stdint.h>
 
-/* Returns a rank's share of the cores on which it may run, rounded down, and at least 1. A core on which several ranks
- * may run counts for each of them in part. may_run[k]: whether this rank may run on core k; rank_counts[k]: number of
- * ranks that may. Local. */
+/* Returns a rank's share of the cores on which it may run, rounded down, but at least 1. A core on which N ranks may
+ * run counts as 1/N for each of them. may_run[k] is set if this rank may run on core k; rank_counts[k] is the number of
+ * ranks that may run on it. Local. */
 int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores);
 
-/* Returns this rank's share among the ranks of its node. If the system does not provide the cores on which a rank may
- * run, the cores that OpenMP counts are divided by the ranks. Collective over node. */
+/* Returns this rank's share of the cores among the ranks of its node. If the operating system does not provide the set
+ * of cores, the number of cores that OpenMP finds is divided by the number of ranks. Collective over the communicator
+ * node. */
 int session_cores_of_rank(MPI_Comm node);
 
 #endif

@@ -1,10 +1,10 @@
-/* Simulations trap floating-point exceptions to find their own faults (gfortran's -ffpe-trap, feenableexcept()), or
- * flush small numbers to zero (icc's -ftz, gcc's -ffast-math). Traps would kill the run at a box test that divides by
- * zero on purpose, or at a scene's 1e999; flushing would change pictures. Both are settings of a thread. GNU's OpenMP
- * workers inherit them from the thread that first started them; LLVM's inherit them from the thread that opens a
- * parallel region, and at the end of the region changes on any thread are undone. So every call sets the default
- * environment and restores the calling thread's afterwards, outside of parallel regions. Workers have the default
- * environment within each region (region.h), and their own between regions. */
+/* Simulations trap floating-point exceptions to find their own errors (gfortran's -ffpe-trap, feenableexcept()), or
+ * flush denormal numbers to zero (icc's -ftz, gcc's -ffast-math). A trap would end the run in a box test that
+ * intentionally divides by zero, or at the number 1e999 in a scene; flushing would change pictures. Both are settings
+ * of a thread. GNU's OpenMP workers inherit them from the thread that first started them. LLVM's workers inherit them
+ * from the thread that opens a parallel region, and at the end of the region the changes of all threads are undone. So
+ * every call sets the default environment and restores the calling thread's environment afterwards, outside of parallel
+ * regions. Workers have the default environment within each region (region.h), and their own between regions. */
 #include "session_guard.h"
 
 #include <omp.h>

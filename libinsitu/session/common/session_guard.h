@@ -1,5 +1,5 @@
-/* Settings of the caller under which the library must not work, and which it must not change: the floating-point
- * environment, and OpenMP's permission to vary the size of teams (OMP_DYNAMIC). */
+/* Saves and restores settings of the caller with which the library cannot work, and which it must not change
+ * permanently: the floating-point environment, and OpenMP's permission to vary the size of teams (OMP_DYNAMIC). */
 #ifndef SESSION_GUARD_H
 #define SESSION_GUARD_H
 
@@ -10,15 +10,15 @@ typedef struct session_guard {
     int is_dynamic;
 } session_guard;
 
-/* Sets the calling thread's default environment and fixed team sizes, and saves its own settings. */
+/* Saves the calling thread's settings, then sets the default floating-point environment and fixed team sizes. */
 void session_guard_begin(session_guard *guard);
 
 /* Restores the saved settings, including exception flags. */
 void session_guard_end(const session_guard *guard);
 
-/* Restore the calling thread's environment for the parallel region in which OpenMP starts threads: these then begin
- * with the caller's own environment, as if the caller had started them. Both calls must be between the two calls
- * above. */
+/* Restores the calling thread's environment for the parallel region in which OpenMP starts threads;
+ * session_guard_return() ends this. The new threads begin with the caller's own environment, as if the caller had
+ * started them. Both must be called between session_guard_begin() and session_guard_end(). */
 void session_guard_lend(const session_guard *guard);
 void session_guard_return(void);
 

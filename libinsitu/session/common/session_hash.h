@@ -1,4 +1,4 @@
-/* FNV-1a hashes: *hash, initially SESSION_HASH_BEGIN, is updated by bytes. */
+/* FNV-1a hashes. *hash must be initialized with SESSION_HASH_BEGIN, and is updated with the given bytes. */
 #ifndef SESSION_HASH_H
 #define SESSION_HASH_H
 
@@ -13,8 +13,8 @@ static inline void session_hash_bytes(uint64_t *hash, const void *data, size_t s
     for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
 }
 
-/* Updates the hash by a text and its NUL, so that sequences of texts that are split differently have different
- * hashes. */
+/* Updates the hash with a text including its terminating NUL, so that sequences of texts that are split differently
+ * have different hashes. */
 static inline void session_hash_text(uint64_t *hash, const char *text)
 {
     session_hash_bytes(hash, text, strlen(text) + 1);

@@ -1,16 +1,17 @@
-/* Keys of vertices, and a table of them. */
+/* Keys of vertices, and a hash table of keys. */
 #ifndef SESSION_KEYS_H
 #define SESSION_KEYS_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Key of a vertex: a global id, or the bits of three coordinates. Vertices with equal keys are the same vertex. */
+/* Key of a vertex, which is a global id, or the bits of three coordinates. Vertices with equal keys are treated as the
+ * same vertex. */
 typedef struct session_key {
     uint64_t words[3];
 } session_key;
 
-/* Spreads the bits of a word over all of it. */
+/* Mixes the bits of a word, so that each of them affects all bits of the result. */
 static inline uint64_t session_mix(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;
@@ -21,17 +22,18 @@ static inline uint64_t session_mix(uint64_t x)
 
 uint64_t session_key_hash(const session_key *key);
 
-/* Keys, numbered 0, 1, ... in the order of their first appearance. */
+/* A hash table of keys, which are numbered 0, 1, ... in the order of their first appearance. */
 typedef struct session_key_table {
-    session_key *keys; /* count keys */
+    session_key *keys; /* array of `count` keys */
     int64_t count;
-    int64_t *slots; /* mask + 1; -1: free */
+    int64_t *slots; /* mask + 1 slots with the number of a key; -1: the slot is free */
     uint64_t mask;
 } session_key_table;
 
-/* Creates a table with space for `most` keys. Returns false if memory ran out; nothing is then left to free. */
+/* Creates a table with space for `most` keys. Returns false if memory runs out; then there is nothing to free. */
 bool session_keys_create(session_key_table *table, int64_t most);
-/* Return the key's number; session_keys_find() returns -1 if it is missing, session_keys_add() adds it. */
+/* Finds the key's number. session_keys_find() returns -1 if the key is missing; session_keys_add() adds it in this
+ * case. */
 int64_t session_keys_find(const session_key_table *table, const session_key *key);
 int64_t session_keys_add(session_key_table *table, const session_key *key);
 void session_keys_free(session_key_table *table);

@@ -4,7 +4,7 @@
 
 #include "session_agree.h"
 
-enum { MOST_BYTES = 2048 }; /* the longest line */
+enum { MOST_BYTES = 2048 }; /* maximum length of a line */
 
 int session_telling_word(const session_report *report, const session_team *team)
 {

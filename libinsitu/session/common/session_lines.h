@@ -1,4 +1,4 @@
-/* Sends warnings that only one rank knows to all ranks. */
+/* Sends warnings that have been found on only one rank to all ranks. */
 #ifndef SESSION_LINES_H
 #define SESSION_LINES_H
 
@@ -6,13 +6,14 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns this rank's operand for an MPI maximum, from whose result session_telling_rank() computes the rank. Local. */
+/* Returns this rank's input of an MPI reduction by maximum. session_telling_rank() computes a rank from its result.
+ * Local. */
 int session_telling_word(const session_report *report, const session_team *team);
-/* Returns the lowest rank that has lines; -1 if no rank has any. Local. */
+/* Returns the lowest rank that has warnings; -1 if no rank has any. Local. */
 int session_telling_rank(int word, const session_team *team);
 
-/* Adds one rank's lines, possibly none, to all ranks' reports. Lines of other ranks, which are mostly the same, are
- * dropped. Collective. */
+/* Adds the warnings of the rank `root`, possibly none, to the reports of all ranks. Warnings of other ranks, which are
+ * mostly the same, are dropped. Collective. */
 insitu_status session_share_lines(session_report *report, int root, const session_team *team, base_error *error);
 
 #endif

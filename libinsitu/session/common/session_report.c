@@ -1,4 +1,4 @@
-/* A warning that has been reported is stored as a hash of its subject. */
+/* A warning that has been reported is stored as a hash of its subject, so that it is not reported again. */
 #include "session_report.h"
 
 #include <stdarg.h>
@@ -106,7 +106,7 @@ static uint64_t key_of(const session_warning *w)
     return key;
 }
 
-/* Returns the index of a reported warning; told_count if it has not been reported. */
+/* Returns the index of a warning that has been reported; told_count if it has not been reported. */
 static int find_told(const session_report *report, uint64_t key)
 {
     int at = 0;
@@ -114,7 +114,7 @@ static int find_told(const session_report *report, uint64_t key)
     return at;
 }
 
-/* Stores a reported warning. If memory runs out, the warning will be reported again. */
+/* Stores that a warning has been reported. If memory runs out, the warning will be reported again. */
 static void add_told(session_report *report, uint64_t key)
 {
     uint64_t *told = base_realloc(report->told, (size_t)(report->told_count + 1) * sizeof *told);

@@ -9,28 +9,28 @@
 #include "error.h"
 
 typedef struct session_team {
-    MPI_Comm comm;              /* the session's own communicator; MPI's errors are returned */
-    MPI_Comm compositing_comm;  /* used only by compositing */
-    struct comp_claims *claims; /* compositing's (comp.h); owned by the session */
+    MPI_Comm comm;              /* the session's own communicator; its error handler returns errors */
+    MPI_Comm compositing_comm;  /* communicator that is used only by compositing */
+    struct comp_claims *claims; /* memory of compositing (comp.h), owned by the session */
     int rank, ranks;
     int node_ranks; /* number of ranks on this rank's node, including itself */
     int cores;      /* this rank's share of the node's cores (session_cores.h) */
     /* number of ranks on every node, if it is the same on all nodes and ranks are placed node by node or round-robin;
      * else 1 */
     int each_node_ranks;
-    bool is_round_nodes; /* ranks are placed round-robin: consecutive ranks are on different nodes */
-    int threads;         /* number of this rank's threads in this step; 0 before the first */
+    bool is_round_nodes; /* set if ranks are placed round-robin, so that consecutive ranks are on different nodes */
+    int threads;         /* number of this rank's threads in this step; 0 before the first step */
 } session_team;
 
-/* Duplicates the caller's communicator twice. After an error, the communicators duplicated so far are in *out and must
- * be freed. Collective. */
+/* Creates two duplicates of the caller's communicator. After an error, *out contains those that were created, and they
+ * must be freed. Collective. */
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error);
 
-/* Counts the ranks of this rank's node and its share of the cores, and determines how ranks are placed on nodes.
+/* Determines the number of ranks on this rank's node, its share of the cores, and how ranks are placed on nodes.
  * Collective. */
 void session_team_count_node(session_team *team);
 
-/* Frees the communicators. Collective, while MPI is running. */
+/* Frees the communicators. MPI must not have been finalized. Collective. */
 void session_team_free(session_team *team);
 
 #endif

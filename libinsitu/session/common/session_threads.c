@@ -1,13 +1,13 @@
 /* OpenMP's runtimes end the process if they cannot start a thread. So threads are first started here, where a failure
- * only lowers their number: as many as the step needs and SPARE_THREADS more, with the stack size that OpenMP would
+ * only reduces their number: as many as the step needs and SPARE_THREADS more, with the stack size that OpenMP would
  * use. They are kept until every rank has tried, since the ranks of a node share limits (processes of a user or a
  * container, memory, address space). OpenMP then gets the number that could be started; the spare threads, and some
  * memory, are left for other needs.
  *
- * OpenMP keeps its threads for later regions, so a team is tried again only if it grows, or if threads have ended, as
- * GNU's do if a region of the caller has fewer. A destructor in each thread counts those that end.
+ * OpenMP keeps its threads for later regions. So threads are tried again only if more are needed, or if threads have
+ * ended, as GNU's do if a region of the caller uses fewer. A destructor in each thread counts those that end.
  *
- * OpenMP has no call that returns the stack size of workers, so it is measured in the workers. */
+ * OpenMP has no function that returns the stack size of workers, so it is measured in the workers. */
 #define _GNU_SOURCE 1
 #include "session_threads.h"
 
@@ -25,7 +25,8 @@
 
 enum {
     SPARE_THREADS = 4,
-    SPARE_BYTES = 4 << 20 /* OpenMP ends the process if there is no memory for a region or a task */
+    /* memory left free, because OpenMP ends the process if it cannot allocate memory for a region or a task */
+    SPARE_BYTES = 4 << 20
 };
 
 /* ---- number of threads requested ----------------------------------------------------------------------------- */
@@ -35,8 +36,8 @@ typedef struct team_cap {
     const char *reason;
 } team_cap;
 
-/* Returns the maximum number of threads and its reason. Inside a parallel region of the caller GNU's OpenMP would start
- * new threads for every region of the library, so the maximum is 1. */
+/* Returns the maximum number of threads and the reason for it. Inside a parallel region of the caller, GNU's OpenMP
+ * would start new threads for every region of the library, so the maximum is 1. */
 static team_cap cap_of_team(void)
 {
     const int cores = omp_get_num_procs(), limit = omp_get_thread_limit();
@@ -88,7 +89,7 @@ bool session_lacks_threads(const session_threads *threads, int asked, int cores)
 /* ---- trial --------------------------------------------------------------------------------------------------- */
 
 typedef struct trial {
-    pthread_mutex_t gate; /* held until the threads may end */
+    pthread_mutex_t gate; /* locked until the threads may end */
     pthread_t *threads;
     int count;
     void *room;
@@ -101,7 +102,8 @@ static void *pass_gate(void *gate)
     return NULL;
 }
 
-/* Parses a size in the format of the runtimes, as in "512k" or " 16 M". Returns 0 if there is none. */
+/* Parses a size in the format that the OpenMP runtimes use, as in "512k" or " 16 M". Returns the size in bytes, or 0 if
+ * the text contains none. */
 static size_t parse_size(const char *text, size_t unit)
 {
     static const char suffixes[] = "bkmg";
@@ -114,7 +116,7 @@ static size_t parse_size(const char *text, size_t unit)
     return number > SIZE_MAX / unit ? 0 : (size_t)number * unit;
 }
 
-/* Returns the largest stack size set in the environment; 0 if none is. */
+/* Returns the largest stack size that is set in the environment, in bytes; 0 if none is set. */
 static size_t stack_of_environment(void)
 {
     static const struct {
@@ -131,7 +133,7 @@ static size_t stack_of_environment(void)
     return most;
 }
 
-/* Starts up to `wanted` threads. */
+/* Starts up to `wanted` threads. Their number is stored in the trial. */
 static void start_trial(trial *t, int wanted)
 {
     pthread_attr_t attributes;
@@ -141,9 +143,11 @@ static void start_trial(trial *t, int wanted)
     pthread_mutex_lock(&t->gate);
     if (!t->threads || !t->room || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
-    if (stack) pthread_attr_setstacksize(&attributes, stack); /* OpenMP does not use a size that is refused here */
+    /* a size that is refused here is not used by OpenMP either */
+    if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old); /* these threads must not take the caller's signals */
+    /* signals are blocked while threads are started, so that these never receive the caller's signals */
+    pthread_sigmask(SIG_SETMASK, &all, &old);
     while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, pass_gate, &t->gate) == 0)
         t->count++;
     pthread_sigmask(SIG_SETMASK, &old, NULL);
@@ -159,8 +163,8 @@ static void end_trial(trial *t)
     base_free(t->room);
 }
 
-/* Tries to start threads if any rank lacks some, before its first parallel region. All ranks try at the same time, as
- * those of a node share its limits. Collective. */
+/* Tries to start threads before a rank's first parallel region, if any rank needs more than it has. All ranks try at
+ * the same time, since those of a node share its limits. Collective. */
 static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm comm, base_error *error)
 {
     const int living = living_threads(threads), lacking = wanted - living;
@@ -175,7 +179,7 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
     return status;
 }
 
-/* Returns the number of threads of this step; warns if there are fewer than requested. */
+/* Returns the number of threads for this step. Warns if there are fewer than requested. */
 static int choose_threads(const session_threads *threads, int asked, int wanted, session_report *report)
 {
     const bool are_enough = threads->count >= wanted;
@@ -189,7 +193,7 @@ static int choose_threads(const session_threads *threads, int asked, int wanted,
 
 /* ---- stacks -------------------------------------------------------------------------------------------------- */
 
-/* A thread's stack: its size, and the bytes left below the current frame; INT64_MAX if unknown. */
+/* A thread's stack: its size, and the number of bytes left below the current frame. Both are INT64_MAX if unknown. */
 typedef struct thread_stack {
     int64_t left, size;
 } thread_stack;
@@ -208,7 +212,7 @@ static thread_stack own_stack(void)
     return (thread_stack){(int64_t)(here - low), (int64_t)size};
 }
 
-/* Returns the smallest stack of a worker. */
+/* Returns the smallest stack of all workers. */
 static thread_stack least_worker_stack(int threads)
 {
     int64_t left = INT64_MAX, size = INT64_MAX;
@@ -226,15 +230,15 @@ static thread_stack least_worker_stack(int threads)
     return (thread_stack){left, size};
 }
 
-/* Returns the stack size, in kB, that leaves `needed` bytes free: adds what is in use now, and a few pages for the
- * system. */
+/* Returns the stack size in kB with which `needed` bytes are free. It includes what is in use now, and a few pages for
+ * the operating system. */
 static long long kilobytes_for(const thread_stack *stack, int64_t needed)
 {
     enum { OF_SYSTEMS = 16 };
     return ((needed + stack->size - stack->left) >> 10) + OF_SYSTEMS;
 }
 
-/* Fails if a stack is too small. Must be in the first parallel region. Collective. */
+/* Stores an error if a stack is too small. Must be called before any other parallel region. Collective. */
 static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
                                   base_error *error)
 {
@@ -255,7 +259,7 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
                   (long long)least.left >> 10, SESSION_WORKER_STACK >> 10, kilobytes_for(&least, SESSION_WORKER_STACK),
                   kilobytes_for(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
-    if (status) threads->count = 0; /* tried again in the next step */
+    if (status) threads->count = 0; /* threads are tried again in the next step */
     return status;
 }
 

@@ -1,4 +1,5 @@
-/* The threads of a step: how many are requested, how many can be started, and whether their stacks suffice. */
+/* The threads of a step. Determines how many are requested, how many can be started, and whether their stacks are large
+ * enough. */
 #ifndef SESSION_THREADS_H
 #define SESSION_THREADS_H
 
@@ -10,25 +11,26 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Bytes of stack that a step must have, below insitu_step() on the calling thread and below OpenMP on the others. It
- * uses less than three quarters of them (measured by test_session_stack.c): on the calling thread 119 kB with plain and
- * SSE4.2 kernels and 142 kB with AVX2, on a worker 99 and 122 kB; AVX-512's frames are a quarter larger. */
+/* Bytes of stack that a step must have free, below insitu_step() on the calling thread and below OpenMP on the others.
+ * A step uses less than three quarters of them (measured by test_session_stack.c): on the calling thread 119 kB with
+ * plain and SSE4.2 kernels and 142 kB with AVX2, on a worker 99 and 122 kB. The stack frames of AVX-512 kernels are a
+ * quarter larger. */
 enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 
-/* The number of threads that exist or are known to be possible, for the thread that called last. */
+/* The number of threads that exist or are known to be startable, for the thread that made the last call. */
 typedef struct session_threads {
-    int count; /* 0: not yet tried */
+    int count; /* number of threads; 0: not tried yet */
     pthread_t caller;
-    int64_t ended; /* number of threads of any team that had ended at that time */
+    int64_t ended; /* number of threads of any team that had ended when `count` was determined */
 } session_threads;
 
-/* Returns whether this rank requests more threads than it is known to be able to start. asked: the scene's number; if
- * it is 0, the rank requests its share of the cores, or fewer if OpenMP's maximum is lower. Local. */
+/* Returns whether this rank requests more threads than it is known to be able to start. asked is the number set in the
+ * scene. If it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is lower. Local. */
 bool session_lacks_threads(const session_threads *threads, int asked, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If
- * is_new (some rank lacks threads, or the scene was edited), threads are started and their stacks measured; stacks that
- * are too small are an error. Collective. */
+ * is_new is set (because some rank lacks threads, or the scene was edited), threads are started and their stacks
+ * measured; a stack that is too small is an error. Collective. */
 insitu_status session_begin_threads(session_threads *threads, session_team *team, int asked, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error);
 

@@ -49,8 +49,8 @@ static insitu_status draw_numbers(const session_frame_target *target, const rend
     return status;
 }
 
-/* Returns the job without clips, volumes and transparency, so that only its surfaces are visible. surfaces: space for
- * the job's. */
+/* Returns the job without clips, volumes and transparency, so that only its surfaces are visible. `surfaces` is a
+ * buffer for the job's surfaces. */
 static render_job opaque_job(const render_job *job, render_surface_layer *surfaces)
 {
     render_job out = *job;
@@ -67,7 +67,7 @@ static render_job opaque_job(const render_job *job, render_surface_layer *surfac
 
 /* ---- numbers ------------------------------------------------------------------------------------------------- */
 
-/* The numbers of the layer and of its surface, per isovalue of the job. */
+/* The numbers of the layer and of the surface within it, for each isovalue of the job. */
 typedef struct surface_numbers {
     int count;
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
@@ -81,7 +81,8 @@ static void add_numbers(surface_numbers *n, int layer, int surfaces)
     }
 }
 
-/* has_shells: isosurfaces have lines on shells, which count as one surface each. */
+/* Lists the numbers of all surfaces of the image. If has_shells, isosurfaces also have contour lines on shells, which
+ * count as one surface per layer. */
 static surface_numbers number_surfaces(const scene_image *image, bool has_shells)
 {
     surface_numbers out = {0};
@@ -94,7 +95,7 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
     return out;
 }
 
-/* Turns each pixel's numbers (value, isovalue's number, 0, opacity) into value, layer and surface. */
+/* Converts the numbers of each pixel from (value, number of the isovalue, 0, opacity) to value, layer and surface. */
 static void name_surfaces(const scene_image *image, bool has_shells, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image, has_shells);

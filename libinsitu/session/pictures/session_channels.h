@@ -1,4 +1,5 @@
-/* Channels that an EXR file may hold besides colours and depth: the nearest surface's normal, value and numbers. */
+/* Additional channels that an EXR file may contain besides colours and depth: the normal, the value and the numbers of
+ * the nearest surface. */
 #ifndef SESSION_CHANNELS_H
 #define SESSION_CHANNELS_H
 
@@ -12,15 +13,15 @@
 enum { SESSION_CHANNELS = 6 };
 
 typedef struct session_channels {
-    float *normals, *values; /* on rank 0, 4 floats per pixel; the last one of values is the number of the surface */
+    float *normals, *values; /* 4 floats per pixel on rank 0; the last one of `values` is the number of the surface */
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;
 
-/* Returns whether an output of the image has such channels. */
+/* Returns whether an output of the image contains these channels. */
 bool session_wants_channels(const scene_image *image);
 
-/* Draws them in two frames: the job's surfaces, all of them opaque, through the pixels' centres. *taken: the cost of
- * the frames. Collective; the channels must be freed even after an error. */
+/* Draws the channels in two frames, which contain the job's surfaces, all of them opaque, sampled at the pixels'
+ * centres. *taken receives the cost of the frames. The channels must be freed even after an error. Collective. */
 insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
                                     const scene_image *image, const render_job *job, session_channels *out,
                                     session_frame *taken, base_error *error);

@@ -1,4 +1,5 @@
-/* Deep pictures: whether an image needs one, and rank 0's memory for it. */
+/* Deep pictures, which store several samples per pixel. Determines whether an image needs one, and manages its memory
+ * on rank 0. */
 #ifndef SESSION_DEEP_H
 #define SESSION_DEEP_H
 
@@ -13,10 +14,10 @@
 /* Returns whether an output of the image is deep. */
 bool session_wants_deep(const scene_image *image);
 
-/* Initializes a deep picture without samples. On rank 0; local. */
+/* Initializes a deep picture without samples. Called on rank 0 only. Local. */
 insitu_status session_begin_deep(deep_image *deep, const scene_image *image, base_error *error);
 
-/* Converts depths from the rays' t, which compositing uses, to distances along the camera's axis. Local. */
+/* Converts depths from the ray parameter t, which compositing uses, to distances along the camera's axis. Local. */
 void session_finish_deep(deep_image *deep, const render_space *space, int threads);
 
 /* Returns the size of a deep picture in bytes. */

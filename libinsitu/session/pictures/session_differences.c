@@ -1,11 +1,12 @@
-/* The rank that has a hit by differences samples its own cells at the six points around it, and requests samples from
- * every rank whose cells' box contains one of the six points. A request is the hit, 16 bytes; its answer the samples,
- * 32 bytes. In a partition into blocks, only hits near the faces between blocks cause requests.
+/* A rank that has hits whose normals are computed by differences samples its own cells at the six points around each
+ * hit, and requests samples from every rank whose cells' box contains one of these points. A request is the hit (16
+ * bytes); its answer is the samples (32 bytes). If the partition consists of compact blocks, only hits near the faces
+ * between blocks cause requests.
  *
- *     rank A   hits -> own samples -> questions to ranks by their boxes ........... and all samples -> light
- *     rank B                          questions -> own samples -> answers
+ *     rank A   hits -> own samples -> requests to ranks by their boxes ............ and all samples -> light
+ *     rank B                          requests -> own samples -> answers
  *
- * Hits are processed in rounds, so that no rank holds more than a round's messages. */
+ * Hits are processed in rounds, so that the memory for messages on each rank is bounded by that for one round. */
 #include "session_differences.h"
 
 #include <math.h>
@@ -32,16 +33,16 @@ typedef struct differing {
     int near_count;
     int *near;
     render_box *boxes;
-    /* The round's hits and their samples. */
+    /* The hits of the current round and their samples. */
     int64_t first, count;
     render_samples_about *samples;
-    int64_t *asked; /* the hits for which samples are requested, in the order of the message */
+    int64_t *asked; /* the hits for which samples are requested, in the order in which they are in the message */
 } differing;
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */
 
-/* Layout of a maximum over the ranks: the ranges of the surfaces' fields (minima negated), the number of rounds, and a
- * failure. */
+/* Indices in the array that is reduced to its maximum over the ranks: the ranges of the surfaces' fields (with negated
+ * minima), the number of rounds, and an error flag. */
 enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
 
 static insitu_status share_ranges(differing *d, base_error *error)
@@ -68,8 +69,8 @@ static insitu_status share_ranges(differing *d, base_error *error)
     return INSITU_OK;
 }
 
-/* Keeps the ranks near enough to this rank's hits. Hits lie in this rank's box, so their samples are no farther from it
- * than the largest reach. */
+/* Keeps only the ranks that are near enough to this rank's hits. Hits lie in this rank's box, so that the distance of
+ * their samples from it is at most the largest sampling radius. */
 static void keep_near(differing *d)
 {
     const render_box *own = &d->boxes[d->rank];
@@ -97,7 +98,7 @@ static insitu_status share_boxes(differing *d, base_error *error)
 
 /* ---- a round ------------------------------------------------------------------------------------------------- */
 
-/* Packs the round's requests. Returns false if memory ran out. */
+/* Packs the requests of the round. Returns false if memory runs out. */
 static bool write_questions(differing *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
@@ -126,7 +127,7 @@ static bool write_questions(differing *d, session_mail *out)
     return true;
 }
 
-/* Computes the answers to requests, for which the words are aligned. Returns false if memory ran out. */
+/* Computes the answers to received requests. Their words are suitably aligned. Returns false if memory runs out. */
 static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / QUESTION_WORDS;
@@ -140,7 +141,8 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     return true;
 }
 
-/* Exchanges requests and answers. The next delivery passes an error on any rank to all ranks. */
+/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next message exchange passes it
+ * to all ranks. */
 static insitu_status ask_others(differing *d, base_error *error)
 {
     session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};

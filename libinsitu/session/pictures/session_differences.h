@@ -1,4 +1,4 @@
-/* Normals by central differences of a frame's hits, over all ranks. */
+/* Computes the normals of a frame's hits by central differences, over all ranks. */
 #ifndef SESSION_DIFFERENCES_H
 #define SESSION_DIFFERENCES_H
 
@@ -8,9 +8,10 @@
 #include "fragment.h"
 #include "render.h"
 
-/* Lights the hits of job->waiting by the samples of all ranks, adds them to fragments, and frees the list. Adds the
- * time taken to *ms. *error may hold an error of tracing on some ranks. Collective, agreed; an error of this rank at
- * the very end is stored only in *error, for the next phase to agree on. */
+/* Computes the lighting of the hits in job->waiting from the samples of all ranks, adds them to the fragments, and
+ * frees the list. The time taken is added to *ms. *error may hold an error of tracing on some ranks. Collective; all
+ * ranks return the same status. An error that occurs on this rank at the very end is only stored in *error, and is
+ * shared in the next phase. */
 insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
                                        base_error *error);
 

@@ -1,7 +1,7 @@
-/* Draws all due images one after the other, frame by frame, so that the memory of one is freed before the next begins.
+/* Draws all due images one after the other, frame by frame, so that the memory of each is freed before the next begins.
  *
  * Errors that may occur on one rank alone (mostly lack of memory) are agreed on before the next collective call. An
- * image that fails is skipped and the next one is drawn; the first error is the step's. */
+ * image that fails is skipped, and the next one is drawn; the step returns the first error. */
 #include "session_draw.h"
 
 #include <string.h>
@@ -21,21 +21,23 @@
 #include "session_shells.h"
 #include "session_view.h"
 
-/* Number of fragments that a rank computes at once for pixels in which cells overlap: 64 MiB. */
+/* Maximum number of fragments that a rank computes at once for pixels in which cells overlap. They need 64 MiB. */
 enum { overlap_fragments = 1 << 21 };
 
-/* Rank 0's pictures: the current frame, and the sum of frames if there are several. Other ranks only have the size. */
+/* The pictures on rank 0: the current frame, and the sum of frames if there are several. Other ranks only know the
+ * size. */
 typedef struct canvas {
     image frame;
-    session_picture memory; /* memory of the frame; it is owned by the writer, which receives it with the picture */
-    float *depth;           /* depth of the frame, saved here while further frames are drawn without depth */
-    image samples;          /* if only edges take more than one frame: their frames, and their sums */
+    /* memory of the frame; when the picture is passed to the writer, the writer becomes its owner */
+    session_picture memory;
+    float *depth;  /* depth of the frame, saved here while further frames are drawn without depth */
+    image samples; /* frames and their sums for the pixels at edges, if only these take more than one frame */
     int64_t edge_count, *edges;
     double *edge_sums;
-    double *sum; /* NULL if there is only one frame */
+    double *sum; /* sum of the frames; NULL: there is only one frame */
     session_channels channels;
     deep_image deep;
-    session_decorations *decorations; /* NULL: there are none, and the frame contains its background */
+    session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */
 } canvas;
 
 static void canvas_free(canvas *c, session_writer *writer)
@@ -63,7 +65,7 @@ static bool has_edges_alone(const scene_image *image)
     return image->antialias > 1 && image->volume_count == 0;
 }
 
-/* Warns if a slow disk delays the run. */
+/* Warns if the step has been delayed because pictures are written slowly. */
 static void warn_of_wait(session_report *report, double seconds)
 {
     static const double noticed = 0.1;
@@ -115,7 +117,8 @@ static void canvas_add(canvas *c, int threads)
     }
 }
 
-/* Allocates memory for the pixels of the set and for frames with these. Returns false if there is no memory. */
+/* Allocates memory for the pixels at edges, and for frames that contain only these. Returns false if memory runs
+ * out. */
 static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height, edges = pixel_set_count(pixels, count);
@@ -166,7 +169,7 @@ static void average_frames(canvas *c, int frames, int threads)
     }
 }
 
-/* Converts depths from the rays' t to distances along the camera's axis. Infinity stays. */
+/* Converts depths from the ray parameter t to distances along the camera's axis. Infinity is kept. */
 static void scale_depths(canvas *c, const render_space *space, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height;
@@ -248,8 +251,8 @@ typedef struct frames_basis {
     const session_drawing *drawing;
     session_frame_target target;
     canvas *canvas;
-    int64_t overlaps; /* number of pixels, the maximum over the frames */
-    deep_image *deep; /* filled by the next frame; NULL: there is none, or it has been drawn */
+    int64_t overlaps; /* number of pixels in which cells overlap, the maximum over the frames */
+    deep_image *deep; /* the next frame fills it; NULL: there is no deep picture, or it has been drawn */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
@@ -279,7 +282,7 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Draws frames through the sample positions in the pixels, in turn. If only edges are drawn, the job has their
+/* Draws one frame for each sample position in the pixels. If only edges are drawn, the job contains only their
  * pixels. */
 static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
@@ -317,7 +320,9 @@ static insitu_status draw_all(frames_basis *b, const scene_image *image, render_
 static insitu_status draw_frames(const session_drawing *d, const scene_image *image, const session_view *view,
                                  const session_layers *layers, canvas *canvas, base_error *error)
 {
-    static const float no_background[4] = {0, 0, 0, 0}; /* edges may be drawn between the background and the picture */
+    /* with decorations, edges of the outline may lie between the background and the picture, so that frames are drawn
+     * without the background */
+    static const float no_background[4] = {0, 0, 0, 0};
     const float *background = image->decorations.is_given ? no_background : image->background;
     const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
     _Static_assert((int)SCENE_SCHEDULE_BINARY == (int)COMP_BINARY, "a scene's schedules are those of compositing");
@@ -348,7 +353,7 @@ static scene_moment moment_of(const session_drawing *d, const scene_image *image
     return scene_moment_of(image, d->cycle, d->report->numbers.time);
 }
 
-/* On rank 0: passes the picture to the writer, which becomes the owner of its memory. */
+/* Passes the picture to the writer, which becomes the owner of its memory. Called on rank 0 only. */
 static void give_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
     session_files *files = base_calloc(1, sizeof *files);
@@ -374,9 +379,9 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     session_writer_give(d->writer, files, error);
 }
 
-/* Passes an image to the writer. If nothing is written in the step, the only possible error is rank 0's lack of memory
- * for passing the picture. The next step reports that, as it does errors of the writing thread. ranges: NULL, or the
- * ranges over the run. */
+/* Passes an image to the writer. If nothing is written during the step, the only possible error is that rank 0 lacks
+ * memory for passing the picture; the next step reports it together with the errors of the writing thread. ranges may
+ * be NULL, or the ranges over the run. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
@@ -394,8 +399,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* Warns of texts that cannot be drawn as written, on rank 0. The texts are laid out here, and later again by the
- * writing thread, so that the warnings belong to the step that draws them. */
+/* Warns on rank 0 of texts that cannot be drawn as written. The texts are laid out here, and again later by the writing
+ * thread, so that the warnings belong to the step that draws them. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
@@ -407,8 +412,8 @@ static void warn_of_words(const session_drawing *d, const scene_image *image, co
                          "image \"%s\": %.900s", image->name, texts[i]);
 }
 
-/* Computes the decorations. Collective if the outline is of meshes or ranks; an error of rank 0 alone is left to the
- * next agreement. */
+/* Computes the decorations of an image. Collective if the outline consists of boxes of meshes or ranks. An error that
+ * occurs only on rank 0 is shared in the next phase. */
 static insitu_status decorate(const session_drawing *d, const scene_image *image, const session_view *view,
                               const session_layers *layers, canvas *out, base_error *error)
 {
@@ -427,8 +432,8 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
     return INSITU_OK;
 }
 
-/* Draws an image. An error of one rank alone, such as lack of memory, is passed in *error to the next agreement: that
- * of the layers or of the first frame. */
+/* Draws an image. An error that occurs on one rank alone, such as lack of memory, is passed in *error to the next
+ * phase, which computes the layers or the first frame and shares it. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {
     const session_extent *extent = &d->space->extent;
@@ -459,8 +464,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     return status;
 }
 
-/* Writes the tables of databases on rank 0, with the lines of all pictures of the step, and pictures side by side.
- * Collective. */
+/* Writes on rank 0 the tables of databases, with lines for all pictures of the step, and the montages. Collective. */
 static void write_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};
@@ -486,11 +490,12 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
                                   base_error *error)
 {
     base_error first = plan->refusal;
-    bool has_lines = !d->writes_behind; /* rank 0 may have warnings for all ranks */
+    /* if pictures are written during the step, rank 0 may have warnings for all ranks */
+    bool has_lines = !d->writes_behind;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         has_lines = has_lines || scene_has_words(plan->images[i]);
-        /* with the camera's current position; everything else belongs to the scene */
+        /* a copy of the image with the camera's current position; all lists still belong to the scene */
         scene_image placed = *plan->images[i];
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {

@@ -1,4 +1,4 @@
-/* Draws the plan's images on rank 0. */
+/* Draws the images of the plan, and passes them to the writer of rank 0. */
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
@@ -15,29 +15,29 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* Input of images. */
+/* Input data for drawing images. */
 typedef struct session_drawing {
     const session_team *team;
-    const char *scene_path; /* for messages */
+    const char *scene_path; /* path of the scene file, for messages */
     int64_t cycle;
-    const session_meshes *meshes; /* with their trees */
-    const mmbvh *parent;          /* over these trees (session_trees.h) */
+    const session_meshes *meshes; /* the meshes, with their trees up to date */
+    const mmbvh *parent;          /* tree over the trees of the meshes (session_trees.h) */
     const session_space *space;
     session_run_ranges *run_ranges;
     session_report *report;
     session_kept_pictures *kept;
     const scene *scene;
-    session_cinema *cinema;     /* rank 0's */
-    session_montages *montages; /* rank 0's */
+    session_cinema *cinema;     /* used on rank 0 only */
+    session_montages *montages; /* used on rank 0 only */
     session_overwrites *overwrites;
-    session_writer *writer; /* on rank 0 */
+    session_writer *writer; /* used on rank 0 only */
     const session_catalogue *catalogue;
-    bool writes_behind; /* pictures are written after the step is over */
+    bool writes_behind; /* set if pictures are written by a thread after the step has ended */
 } session_drawing;
 
-/* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the plan's refusal if
- * there is one, else the first failure. *drawn: set to the bits, by number of the image in the file, of the images that
- * were drawn. Collective. */
+/* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the error of the plan
+ * if there is one, and otherwise the first error of an image. *drawn receives one bit for each image of the scene file
+ * that was drawn, at the position of its number. Collective. */
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 

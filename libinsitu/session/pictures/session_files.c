@@ -57,7 +57,7 @@ static void write_output(session_files *files, const scene_output *output)
     base_free(path);
 }
 
-/* Returns milliseconds on a clock. This thread may not call MPI. */
+/* Returns the time in milliseconds. MPI_Wtime() is not used, because the writing thread must not call MPI. */
 static double milliseconds(void)
 {
     struct timespec now;
@@ -65,7 +65,7 @@ static double milliseconds(void)
     return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
 }
 
-/* What is behind a step's pictures. */
+/* Writes the files that follow the pictures of a step: montages and the tables of databases. */
 static void write_tables(session_files *files)
 {
     base_error reason = {0};

@@ -1,4 +1,4 @@
-/* A drawn picture with all data needed to write its files, so that the step that drew it may be over. */
+/* A drawn picture, together with all data that is needed to write its files after the step that drew it has ended. */
 #ifndef SESSION_FILES_H
 #define SESSION_FILES_H
 
@@ -14,33 +14,35 @@
 #include "session_picture.h"
 #include "session_report.h"
 
-/* A picture to write, on rank 0. */
+/* A picture that is to be written, on rank 0. */
 typedef struct session_files {
-    struct session_files *next; /* next in one of the writer's lists (session_writer.h) */
-    const scene *scene;         /* the image's scene; it must exist until this is written */
+    struct session_files *next; /* next element in a list of the writer (session_writer.h) */
+    const scene *scene;         /* the scene of the image; it must exist until the files are written */
     session_cinema *cinema;
     session_montages *montages;
-    bool has_picture; /* else this is news, or else the tables of databases and pictures side by side, which are written
-                         after a step's pictures */
-    char *news;       /* owned: report.json's text (session_news.h); NULL: there are none */
-    scene_image image; /* its camera is that of the step, its lists are the scene's */
+    /* If not set and `news` is not NULL, only report.json is written. If both are not set, the tables of databases and
+     * the montages are written, which follow the pictures of a step. */
+    bool has_picture;
+    char *news;        /* text of report.json, owned by this struct (session_news.h); NULL: it is not written */
+    scene_image image; /* a copy whose camera is that of the step, and whose lists belong to the scene */
     scene_moment moment;
     image frame;
     session_picture memory; /* memory of the frame */
     session_channels channels;
-    deep_image deep;                  /* without counts if there is none */
-    session_decorations *decorations; /* NULL: none, and the frame contains its background */
-    base_error error;                 /* the first reason why a file could not be written */
-    double ms;                        /* duration of writing */
+    deep_image deep;                  /* its counts are NULL if there is no deep picture */
+    session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */
+    base_error error;                 /* the first error of writing a file */
+    double ms;                        /* time that writing has taken, in milliseconds */
 } session_files;
 
 /* Returns the size of the files' data in bytes. */
 int64_t session_files_bytes(const session_files *files);
 
-/* Writes all files, even if some fail. Local; may be called on any thread, for one set of files at a time. */
+/* Writes all files, even if some fail. Local. May be called on any thread, but not twice at the same time for the same
+ * files. */
 void session_write_files(session_files *files);
 
-/* Frees the files, and the frame's memory; NULL is allowed. */
+/* Frees the files and the memory of the frame. files may be NULL. */
 void session_files_free(session_files *files);
 
 #endif

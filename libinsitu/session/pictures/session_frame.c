@@ -1,11 +1,11 @@
-/* A frame, and a second drawing of the pixels in which cells overlap.
+/* Draws a frame, and draws those pixels in which cells overlap a second time.
  *
- * Fragments that overlap cannot be sorted into a picture, and the ranks that computed them no longer have the position
- * of each sample. So these pixels, which compositing finds and sends to all ranks, are traced once more with every
- * sample as a separate fragment (render.h), composited beside the picture, and copied into it. In a mesh with a few
- * overlapping cells that is a few more pixels. Two meshes that fill the same space may make a thousand fragments in
- * each of a million pixels: such pixels are drawn in turns, each with as many pixels as the busiest rank can hold
- * fragments for. Segments of several volumes are drawn this way on all pixels at once. */
+ * Fragments that overlap cannot be sorted by depth, and the ranks that computed them no longer have the position of
+ * each sample. So these pixels, which compositing finds and sends to all ranks, are traced once more with every sample
+ * as a separate fragment (render.h), composited into a second picture, and copied into the first. In a mesh with a few
+ * overlapping cells these are only a few pixels. Two meshes that fill the same space may produce a thousand fragments
+ * in each of a million pixels. Such pixels are drawn in several turns, each with as many pixels as the busiest rank can
+ * store fragments for. Segments of several volumes are drawn in this way on all pixels at once. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -46,8 +46,8 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     return session_agree(t->comm, error);
 }
 
-/* Traces on all ranks; for normals by differences, ranks exchange samples. Other errors of this rank are stored in
- * *error and not returned. */
+/* Traces rays on all ranks. If normals are computed by differences, ranks exchange samples. Other errors of this rank
+ * are stored in *error and not returned. */
 static insitu_status trace(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                            render_statistics *rendered, base_error *error)
 {
@@ -61,7 +61,7 @@ static insitu_status trace(const session_frame_target *t, const render_job *job,
     return session_differ_fragments(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
-/* Lights the fragments. All turns of a frame have the same occluders, as only their pixels differ. */
+/* Computes the lighting of the fragments. All turns of a frame use the same occluders, as only their pixels differ. */
 static insitu_status light(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                            session_frame *frame, render_statistics *rendered, base_error *error)
 {
@@ -93,7 +93,8 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
                                            &composited, error)
                  : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited, error);
     if (status && !composited.has_failed) *error = (base_error){0};
-    if (status) status = session_agree(t->comm, error); /* compositing agrees only on the status */
+    /* compositing returns the same status on all ranks, but not the same message */
+    if (status) status = session_agree(t->comm, error);
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
     frame->sent_bytes += composited.sent_bytes;
@@ -103,8 +104,9 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Estimates the number of pixels that make fragment_limit fragments: for samples from the scene's extent, which is near
- * 1 in scaled units, and at most sqrt(3) times that; for segments from experience. */
+/* Estimates the number of pixels that produce fragment_limit fragments. For samples the estimate is derived from the
+ * length of a ray in the scene, which is about 1 in scaled units, and at most sqrt(3). For segments it is an empirical
+ * value. */
 static int64_t first_turn(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
@@ -116,8 +118,9 @@ static int64_t first_turn(const render_job *job, int64_t fragment_limit)
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* Computes the number of pixels of the next turn from the fragments of the last one on the busiest rank. The growth is
- * bounded, as a few pixels say little about the others. Collective; the same on all ranks. */
+/* Computes the number of pixels of the next turn from the number of fragments of the last one on the busiest rank. The
+ * growth is bounded, as a few pixels are not representative of all others. Collective; the result is the same on all
+ * ranks. */
 static insitu_status next_turn(const session_frame_target *t, int64_t fragments, int64_t *pixels, base_error *error)
 {
     enum { MOST_GROWTH = 8 };
@@ -130,8 +133,9 @@ static insitu_status next_turn(const session_frame_target *t, int64_t fragments,
     return INSITU_OK;
 }
 
-/* Order of a picture's pixels for turns: by squares, so that rays of a packet are neighbours. Consecutive squares are
- * far apart, by the golden ratio of their number, so that each turn has its share of dense regions. */
+/* The order in which a picture's pixels are drawn in turns. Pixels are ordered by squares, so that the rays of a packet
+ * are neighbours. Consecutive squares are far apart (their numbers are multiples of the golden ratio of the number of
+ * squares), so that each turn contains a similar fraction of dense regions. */
 typedef struct turn_order {
     int width, height, across;
     int64_t squares, stride;
@@ -158,7 +162,7 @@ static turn_order turn_order_of(const image *out)
     return order;
 }
 
-/* Returns the k-th pixel of the order, or -1 if it is outside the picture. */
+/* Returns the k-th pixel of the order, or -1 if it is outside of the picture. */
 static int64_t turn_pixel(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
@@ -167,7 +171,8 @@ static int64_t turn_pixel(const turn_order *order, int64_t k)
     return x < order->width && y < order->height ? y * order->width + x : -1;
 }
 
-/* Moves up to `most` pixels of a set into `taken`, from index first on; returns the index at which to continue. */
+/* Moves up to `most` pixels of a set into `taken`, beginning at position `first` of the order. Returns the position at
+ * which to continue. */
 static int64_t take_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
                            unsigned char *taken)
 {
@@ -193,7 +198,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
-/* Removes the pixels' samples from rank 0's deep picture, because they are drawn again. */
+/* Removes these pixels' samples from the deep picture on rank 0, because the pixels are drawn again. */
 static void forget_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;
@@ -201,10 +206,10 @@ static void forget_samples(const unsigned char *pixels, const image *out)
         if (pixel_set_has(pixels, p)) out->deep->counts[p] = 0;
 }
 
-/* A second picture beside the first, on rank 0, for the pixels of a turn. */
+/* A second picture on rank 0, for the pixels of a turn. */
 typedef struct second_picture {
     image picture;
-    unsigned char *turn; /* set of pixels, on every rank */
+    unsigned char *turn; /* the set of pixels of the turn, on every rank */
 } second_picture;
 
 static insitu_status second_create(const session_frame_target *t, const comp_overlaps *overlaps, const image *first,
@@ -272,8 +277,8 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
 }
 
 /* Returns whether all pixels must be drawn with separate fragments. Segments of several volumes overlap on every pixel.
- * Samples of several volumes round differently if one rank mixes them than if compositing does; for reproducible
- * pictures compositing mixes all. */
+ * Samples of several volumes are rounded differently depending on whether a rank or compositing blends them; if
+ * pictures must be reproducible, compositing blends them all. */
 static bool is_mixed_throughout(const render_job *job)
 {
     return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;
@@ -301,8 +306,8 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
-        /* Samples of cells that share a face up to rounding may also have two owners; redraw() counts the true overlaps
-         * from the separate samples. */
+        /* Samples in cells that share a face may also be found in two cells because of rounding. So redraw() counts the
+         * actual overlaps from the separate samples. */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);

@@ -1,13 +1,13 @@
-/* The image library is loaded by its full path, so that no other library of its name is used: from the folder of the
- * object with this code (libinsitu), or from the lib folder next to it, where it is for a program in bin that links
- * libinsitu statically. Only if it is in neither, the loader searches for it, unless LD_LIBRARY_PATH would make it
- * search the working directory. It stays loaded until the process ends: C++ libraries with threads and static objects
- * do not survive being unloaded.
+/* The image library is loaded by its full path, so that no other library of the same name is used. It is searched in
+ * the folder of the object that contains this code (libinsitu), and in the lib folder next to it, where it is if a
+ * program in bin links libinsitu statically. Only if it is in neither, the loader searches for it, unless
+ * LD_LIBRARY_PATH would make it search the working directory. It stays loaded until the process ends: C++ libraries
+ * with threads and static objects cannot be unloaded safely.
  *
- * Some library behind OpenImageIO starts threads when it is loaded. They sleep, but would receive the simulation's
- * signals and run its handlers, so they are started with every signal blocked. Other libraries end the process if their
- * constructors find no memory, so nothing is loaded unless enough memory is available. */
-#define _GNU_SOURCE 1 /* dladdr1 */
+ * Some library that OpenImageIO uses starts threads when it is loaded. These threads sleep, but could receive the
+ * simulation's signals and run its handlers, so they are started with every signal blocked. Other libraries end the
+ * process if their constructors cannot allocate memory, so nothing is loaded unless enough memory is available. */
+#define _GNU_SOURCE 1 /* needed for dladdr1() */
 #include "session_image.h"
 
 #include <dlfcn.h>
@@ -26,8 +26,10 @@
 static const char library[] = "libinsitu_image.so";
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static insitu_image_write_function *loaded_writer;
-static insitu_image_place_function *loaded_placer;        /* NULL: not loaded, or of another version */
-static insitu_image_check_words_function *loaded_checker; /* likewise */
+/* NULL: the library is not loaded, or it is of another version */
+static insitu_image_place_function *loaded_placer;
+/* NULL: the library is not loaded, or it is of another version */
+static insitu_image_check_words_function *loaded_checker;
 
 static void *open_library(const char *path, char *why, size_t size)
 {
@@ -39,19 +41,20 @@ static void *open_library(const char *path, char *why, size_t size)
     if (handle) return handle;
     const char *reason = dlerror();
     const bool is_absent =
-        strncmp(reason, path, strlen(path)) == 0; /* else the file exists, but something that it needs does not */
+        /* otherwise the file exists, but a library on which it depends does not */
+        strncmp(reason, path, strlen(path)) == 0;
     if (!*why || !is_absent) snprintf(why, size, "%s", reason);
     return NULL;
 }
 
-/* Finds the folder of the object with this code, as it was when the object was loaded. */
+/* Determines the folder of the object that contains this code, as it was when the object was loaded. */
 static bool find_own_folder(char folder[PATH_MAX])
 {
     Dl_info object;
     struct link_map *map = NULL;
     if (!dladdr1((const void *)library, &object, (void **)&map, RTLD_DL_LINKMAP) || !map) return false;
     if (*map->l_name) return dlinfo(map, RTLD_DI_ORIGIN, folder) == 0;
-    /* the main program, which has no name in the link map */
+    /* the object is the main program, which has an empty name in the link map */
     const ssize_t length = readlink("/proc/self/exe", folder, PATH_MAX - 1);
     if (length <= 0) return false;
     folder[length] = '\0';
@@ -67,8 +70,8 @@ static void *open_beside(const char *own_folder, const char *between, char *why,
     return length > 0 && (size_t)length < sizeof path ? open_library(path, why, size) : NULL;
 }
 
-/* Returns whether the loader would search the working directory. An empty entry, or a relative one, is the working
- * directory or below it. */
+/* Returns whether the loader would search the working directory. An entry that is empty or relative refers to the
+ * working directory or a folder below it. */
 static bool searches_working_directory(void)
 {
     const char *entries = getenv("LD_LIBRARY_PATH");

@@ -1,11 +1,12 @@
-/* The rank that has a hit lights it. It first tests its own cells, which block most rays of a hit, and then sends
- * requests to the ranks whose cells' box an open ray meets. A request is the hit and the set of its rays, 32 bytes for
- * all of them, as the other rank computes the rays in the same way. The answer has 8 or 16 bytes, a bit per ray.
+/* The rank that has a hit computes its lighting. It first traces the hit's shadow and occlusion rays in its own cells,
+ * which block most of them. Then it sends requests to the ranks whose cells' box an unblocked ray intersects. A request
+ * contains the hit and the set of its unblocked rays, 32 bytes in all, as the other rank computes the rays in the same
+ * way. The answer has 8 or 16 bytes, with one bit per ray.
  *
- *     rank A   hits -> own cells -> open rays -> mail to ranks by their boxes ......... and of all answers -> colours
- *     rank B                                     mail -> own cells -> open rays -> mail
+ *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ............. all answers ->
+ * colours rank B                                          requests -> own cells -> unblocked rays -> answers
  *
- * Hits are processed in rounds, so that no rank holds more than a round's messages. */
+ * Hits are processed in rounds, so that the memory for messages on each rank is bounded by that for one round. */
 #include "session_light.h"
 
 #include <string.h>
@@ -17,33 +18,34 @@
 
 enum { ROUND_HITS = 1 << 16 };
 
-/* Sizes of a request, which is a hit and the set of its rays to test, and of its answer. */
+/* Sizes in words of a request, which is a hit and the set of its rays to trace, and of its answer. */
 enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
 
-/* A round: some of this rank's hits, and the rays that are still open. */
+/* One round: a part of this rank's hits, and their rays that are not blocked yet. */
 typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
     int rank, ranks;
-    render_occluders *occluders; /* this rank's */
+    render_occluders *occluders; /* occluders of this rank */
     int64_t round_hits;
-    render_box *boxes; /* one per rank */
+    render_box *boxes; /* bounding box of each rank's cells */
     int64_t count;
-    int64_t *fragments; /* indices of the hits' fragments */
+    int64_t *fragments; /* for each hit, the index of its fragment */
     render_hit *hits;
     render_hit_rays *rays;
 } lighting;
 
-/* Requests in the order in which they are found, with the rank that each is for; and their order by rank. */
+/* Requests in the order in which they are found, with the rank to which each is sent, and their order sorted by
+ * rank. */
 typedef struct questions {
     int64_t count, capacity;
     int *ranks;
     int64_t *hits;
     render_hit_rays *rays;
-    int64_t at; /* the current hit */
+    int64_t at; /* index of the current hit */
     const lighting *of;
-    int64_t *starts; /* ranks + 1 */
-    int64_t *sent;   /* requests by their position in the message */
+    int64_t *starts; /* ranks + 1 entries: the first request to each rank */
+    int64_t *sent;   /* request at each position in the message */
     bool has_no_memory;
 } questions;
 
@@ -97,7 +99,7 @@ static void take_question(void *state, int rank, const render_hit_rays *rays)
     q->rays[q->count++] = *rays;
 }
 
-/* Sorts the requests by rank. */
+/* Sorts the requests by the rank to which they are sent. */
 static bool sort_questions(questions *q)
 {
     const int ranks = q->of->ranks;
@@ -143,7 +145,7 @@ static insitu_status ask(const lighting *l, questions *q, session_mail *in, base
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* Copies the requests out of the message, whose words are not aligned for them. */
+/* Copies the requests out of the message, whose words are not aligned for these types. */
 static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / ASKED_WORDS;
@@ -158,7 +160,7 @@ static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays
     return true;
 }
 
-/* Replaces the requests in *in by their answers. */
+/* Replaces the requests in *in by the answers to them. */
 static insitu_status answer(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;
@@ -204,8 +206,8 @@ static insitu_status ask_others(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* Collects the hits of the fragments from index first on, and lights those without rays directly. Returns the index at
- * which to continue. */
+/* Collects the hits among the fragments, beginning with fragment `first`. Hits without rays are lit directly. Returns
+ * the index of the fragment at which to continue. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};
@@ -225,7 +227,7 @@ static void shade_hits(const lighting *l, fragment_list *fragments)
         render_light_fragment(l->job, &l->rays[i], &fragments->items[l->fragments[i]]);
 }
 
-/* Determines whether any rank has fragments left. */
+/* Determines whether any rank has fragments left for a further round. */
 static insitu_status agree_to_go_on(const lighting *l, bool has_more, bool *out, base_error *error)
 {
     int own = has_more, all = 0;

@@ -1,4 +1,4 @@
-/* Shadows and ambient occlusion of a frame's hits, over all ranks. */
+/* Computes shadows and ambient occlusion of a frame's hits, over all ranks. */
 #ifndef SESSION_LIGHT_H
 #define SESSION_LIGHT_H
 
@@ -9,9 +9,10 @@
 #include "render.h"
 #include "render_light.h"
 
-/* Lights fragments that were painted RENDER_UNLIT by the light that reaches them past the opaque surfaces of all ranks.
- * *occluders: this rank's; created here if NULL, and valid for jobs that differ only in their pixels; the caller frees
- * them. Adds the time taken to *ms. Collective; agreed. */
+/* Computes the lighting of fragments that have the value RENDER_UNLIT, from the light that is not blocked by opaque
+ * surfaces of any rank. *occluders contains those of this rank. It is created if it is NULL, is valid for jobs that
+ * differ only in their pixels, and must be freed by the caller. The time taken is added to *ms. Collective; all ranks
+ * return the same status. */
 insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, render_occluders **occluders,
                                       fragment_list *fragments, double *ms, base_error *error);
 

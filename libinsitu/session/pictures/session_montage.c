@@ -14,7 +14,7 @@ static int64_t pixel_count(const scene_montage *montage)
     return (int64_t)montage->width * montage->columns * montage->height * montage->rows;
 }
 
-/* Makes room for the whole picture, transparent at first. */
+/* Allocates the whole picture, which is transparent at first. */
 static insitu_status begin(session_montages *montages, const scene *scene, int index, base_error *error)
 {
     if (!montages->items) {

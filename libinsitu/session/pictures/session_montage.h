@@ -1,8 +1,8 @@
-/* Pictures side by side in one: outputs with a grid.
+/* Montages, which are several pictures side by side in one file (outputs with a grid).
  *
- * The writing thread, which has a step's pictures one after the other, decorates each as it comes and copies it into
- * its cell. Behind the last of the step the whole is written. A cell whose picture is not due, or could not be drawn,
- * stays transparent. */
+ * The writing thread receives a step's pictures one after the other. It draws the decorations of each and copies it
+ * into its cell. After the last picture of the step, the whole picture is written. A cell whose picture is not due, or
+ * could not be drawn, remains transparent. */
 #ifndef SESSION_MONTAGE_H
 #define SESSION_MONTAGE_H
 
@@ -11,21 +11,21 @@
 #include "scene.h"
 
 typedef struct session_montage {
-    float *rgba; /* the whole picture, of the scene's width and height; NULL: no cell of this step has come */
+    float *rgba; /* the whole picture, with the size set in the scene; NULL: no cell of this step has been drawn yet */
     char *path;
 } session_montage;
 
-/* Rank 0's, in the hands of the writing thread while pictures wait for it. */
+/* The montages on rank 0. The writing thread owns them while pictures are in its queue. */
 typedef struct session_montages {
     int count;
-    session_montage *items; /* one a montage of the scene; NULL before the first picture */
+    session_montage *items; /* one for each montage of the scene; NULL before the first picture */
 } session_montages;
 
-/* Puts the picture into its cell. path: the file's, which is taken over. Local. */
+/* Draws the picture into its cell. path is the path of the file; the montage takes ownership of it. Local. */
 insitu_status session_add_cell(session_montages *montages, const scene *scene, const scene_image *image,
                                const scene_output *output, const insitu_image *picture, char *path, base_error *error);
 
-/* Write those that cells have come for, though some fail; the first error is kept. Local. */
+/* Writes the montages that have cells of this step, even if some fail. The first error is returned. Local. */
 insitu_status session_write_montages(session_montages *montages, const scene *scene, base_error *error);
 
 void session_montages_free(session_montages *montages);

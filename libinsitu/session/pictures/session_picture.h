@@ -1,4 +1,5 @@
-/* Rank 0's memory of the last picture, reused for the next one: new pages cost as much as filling them. */
+/* The memory of the last picture on rank 0 is used again for the next one, because allocating new pages takes as long
+ * as filling them. */
 #ifndef SESSION_PICTURE_H
 #define SESSION_PICTURE_H
 
@@ -15,20 +16,21 @@ typedef struct session_picture {
     size_t bytes;
 } session_picture;
 
-/* Ensures at least `bytes` bytes, uninitialized, and returns them; NULL if there is no memory. */
+/* Ensures that the picture has at least `bytes` bytes, which are uninitialized, and returns them. Returns NULL if
+ * memory runs out. */
 float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);
 
-/* The pictures of the last step for the caller: copies on rank 0. */
+/* Copies, on rank 0, of the last step's pictures for the caller. */
 typedef struct session_kept_pictures {
-    bool is_on; /* the same on every rank, because all images then have depth */
+    bool is_on; /* set if pictures are kept; the same on every rank, because all images then need depth */
     int count;
-    /* names belong to the scene; pixels and depth of each picture are one block */
+    /* names belong to the scene; pixels and depth of each picture are one block of memory */
     insitu_picture items[SCENE_MAX_PICTURES];
 } session_kept_pictures;
 
-/* Copies a picture that has depth. Local. */
+/* Stores a copy of a picture that has depth. Local. */
 insitu_status session_keep_picture(session_kept_pictures *kept, const scene_image *image, const struct image *picture,
                                    base_error *error);
 

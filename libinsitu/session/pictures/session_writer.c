@@ -1,11 +1,11 @@
-/* The caller's thread loads the image library before the writing thread exists. Loading takes 0.1 s, or 1 s from a cold
- * disk, and holds the loader's lock, which every start of a thread needs: if the writing thread loaded it during the
- * first step, all ranks would be blocked there.
+/* The caller's thread loads the image library before the writing thread is started. Loading takes 0.1 s, or 1 s from a
+ * cold disk, and holds the loader's lock, which every start of a thread needs: if the writing thread loaded it during
+ * the first step, all ranks would be blocked until it is loaded.
  *
- * Some library behind OpenImageIO creates threads and static objects when it is loaded. These are destroyed as the
+ * Some library that OpenImageIO uses creates threads and static objects when it is loaded. These are destroyed when the
  * process exits, in the reverse order of their creation. So the function that waits at exit is registered again after
- * the library is loaded, and after the first pictures are written, which create more such objects; it then runs first,
- * and no picture is written with half-destroyed objects. */
+ * the library is loaded, and after the first pictures are written, which create more such objects. It then runs first,
+ * and no picture is written while these objects are being destroyed. */
 #include "session_writer.h"
 
 #include <mpi.h>
@@ -26,7 +26,7 @@ static const int64_t most_waiting_bytes = (int64_t)128 << 20, most_free_bytes = 
 
 static pthread_mutex_t all_mutex = PTHREAD_MUTEX_INITIALIZER;
 static session_writer *all_writers;
-static pid_t process; /* the process that has the threads; a fork has none */
+static pid_t process; /* id of the process that has the threads; a forked process has none */
 
 static void wait_for_thread(session_writer *w)
 {
@@ -44,7 +44,8 @@ static void wait_for_all(void)
     pthread_mutex_unlock(&all_mutex);
 }
 
-/* Waits for all pictures. MPI_Finalize() begins by deleting the attributes of MPI_COMM_SELF (MPI-3.1, 8.7.1). */
+/* Waits until all pictures are written. MPI_Finalize() begins by deleting the attributes of MPI_COMM_SELF (MPI-3.1,
+ * 8.7.1), which calls this function. */
 static int wait_in_finalize(MPI_Comm comm, int key, void *value, void *state)
 {
     (void)comm, (void)key, (void)value, (void)state;
@@ -84,7 +85,7 @@ static void strike_off(session_writer *w)
 
 /* ---- memory of pictures --------------------------------------------------------------------------------------- */
 
-/* Returns the size of the free memory that is kept. The mutex must be held. */
+/* Returns the size in bytes of the unused memory that is kept for future pictures. The mutex must be held. */
 static int64_t free_bytes(const session_writer *w)
 {
     int64_t bytes = 0;
@@ -92,7 +93,8 @@ static int64_t free_bytes(const session_writer *w)
     return bytes;
 }
 
-/* Keeps or frees memory: some is kept, as new pages cost as much as filling them. The mutex must be held. */
+/* Keeps the memory for future pictures, or frees it. Some is kept, because allocating new pages takes as long as
+ * filling them. The mutex must be held. */
 static void keep_memory(session_writer *w, session_picture *memory)
 {
     for (int i = 0; i < SESSION_FREE_PICTURES; i++)
@@ -103,7 +105,7 @@ static void keep_memory(session_writer *w, session_picture *memory)
     session_drop_picture(memory);
 }
 
-/* Takes kept memory of at least `bytes` bytes. If none is large enough, *memory stays empty, and one block that is too
+/* Takes a kept block of at least `bytes` bytes. If none is large enough, *memory stays empty, and one block that is too
  * small is freed. The mutex must be held. */
 static void take_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
