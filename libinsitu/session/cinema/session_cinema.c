@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* the largest table that is continued: about four million pictures */
+enum { MOST_BYTES = 1 << 28 }; /* maximum size of a table that is continued; about four million pictures */
 
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error)
@@ -31,7 +31,7 @@ char *session_database_file(const scene_database *database, const char *file)
 
 /* ---- lines ----------------------------------------------------------------------------------------------------- */
 
-/* Ensures space for `more` more bytes and a terminating NUL. */
+/* Ensures that there is space for `more` more bytes and a terminating NUL. Returns false if memory runs out. */
 static bool reserve(session_table *t, size_t more)
 {
     if (t->size + more < t->capacity) return true;
@@ -43,7 +43,7 @@ static bool reserve(session_table *t, size_t more)
     return true;
 }
 
-/* A line that is being written. is_well: memory sufficed for all of it. */
+/* A line that is being written. is_well is set as long as memory has sufficed for all of it. */
 typedef struct table_line {
     session_table *table;
     bool is_well;
@@ -65,8 +65,8 @@ static void add_number(table_line *line, double number)
     add_bytes(line, text, (size_t)length);
 }
 
-/* Adds a text. It is quoted if it contains a character that separates fields (RFC 4180), and preceded by the shield if
- * a spreadsheet would take it for a formula. */
+/* Adds a text to the line. It is quoted if it contains a character that separates fields (RFC 4180), and preceded by
+ * `shield` if a spreadsheet would interpret it as a formula. */
 static void add_text(table_line *line, const char *shield, const char *text, char end)
 {
     const bool is_quoted = strpbrk(text, ",\"") != NULL, is_formula = *text && strchr("=+-@", *text);
@@ -77,7 +77,7 @@ static void add_text(table_line *line, const char *shield, const char *text, cha
     add_bytes(line, &end, 1);
 }
 
-/* In Spec D an empty field means that there is no value. */
+/* Adds an empty field, which in Spec D means that there is no value. */
 static void add_nothing(table_line *line)
 {
     add_bytes(line, ",", 1);
@@ -121,7 +121,7 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
-/* Drops the lines of this cycle and later ones. */
+/* Removes the lines of this cycle and of later ones from the table. */
 static void drop_from(session_table *t, int64_t cycle)
 {
     const char *end = t->size ? memchr(t->text, '\n', t->size) : NULL;
@@ -130,7 +130,7 @@ static void drop_from(session_table *t, int64_t cycle)
     t->size = header + text_keep_below(t->text + header, cycle);
 }
 
-/* Copies the lines of the folder's table that belong to cycles before this one. */
+/* Copies those lines of the folder's existing table that belong to cycles before this one. */
 static insitu_status take_over(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
@@ -216,8 +216,8 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-/* Returns whether a byte must be escaped in a script's text. Bytes above 0x7f need not be: the page's scripts are
- * UTF-8. */
+/* Returns whether a byte must be escaped in a string of the script. Bytes above 0x7f need not be, since the page's
+ * scripts are UTF-8. */
 static bool is_escaped(unsigned char byte)
 {
     return byte == '"' || byte == '\\' || byte < 0x20;
@@ -234,7 +234,7 @@ static void write_script_line(FILE *file, const char *line, size_t size)
     }
 }
 
-/* Writes the lines as a list of strings that is passed to a function of the page. */
+/* Writes the lines as a list of strings, which is the argument of a function of the page. */
 static void write_script(FILE *file, const void *what)
 {
     const session_table *t = what;
@@ -260,7 +260,7 @@ static bool put_script(const session_table *t, const char *path, file_failure *f
     return text_file_replace(path, write_script, t, failure);
 }
 
-/* Writes the page if it does not exist or was not written by this session; its content is always the same. */
+/* Writes the page if it does not exist or has not been written by this session. Its content is always the same. */
 static bool put_page(const session_table *t, const char *path, file_failure *failure)
 {
     if (t->has_page && file_exists(path)) return true;

@@ -38,7 +38,7 @@ void session_note_news(session_news *news, const session_report *report, const b
 
 /* ---- text of report.json --------------------------------------------------------------------------------------- */
 
-/* A text that is being written. is_whole: memory sufficed for all of it. */
+/* A text that is being written. is_whole is set as long as memory has sufficed for all of it. */
 typedef struct news_text {
     session_text text;
     bool is_whole;
@@ -59,7 +59,7 @@ __attribute__((format(printf, 2, 3))) static void add(news_text *out, const char
     if (length > 0) add_bytes(out, piece, (size_t)length);
 }
 
-/* Adds a quoted JSON string; null if text is NULL. */
+/* Adds a JSON string in quotes, or null if text is NULL. */
 static void add_quoted(news_text *out, const char *text)
 {
     add_bytes(out, text ? "\"" : "null", text ? 1 : 4);
@@ -74,7 +74,7 @@ static void add_quoted(news_text *out, const char *text)
     if (text) add_bytes(out, "\"", 1);
 }
 
-/* Adds a number; infinity and NaN become null, as JSON has neither. */
+/* Adds a number. Infinity and NaN become null, because JSON cannot represent them. */
 static void add_number(news_text *out, double number)
 {
     if (isfinite(number))

@@ -5,7 +5,8 @@
 #include "memory.h"
 #include "session_hash.h"
 
-/* Hashes a path without "./" and "//", so that paths to the same file have equal hashes. Never 0. */
+/* Computes the hash of a path without "./" and "//", so that different paths to the same file have equal hashes. The
+ * result is never 0. */
 static uint64_t hash_of(const char *path)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -37,8 +38,8 @@ static const scene_image *image_of(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* Returns the output whose last picture was written to this file; -1: none. The same output at the same cycle does not
- * count: the run has repeated the step. */
+/* Returns the output whose last picture was written to this file; -1: there is none. The same output at the same cycle
+ * does not count, because the run has then repeated the step. */
 static int find_written(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
@@ -46,7 +47,7 @@ static int find_written(const session_overwrites *all, uint64_t file, int output
     return -1;
 }
 
-/* Returns the advice that ends the warning. */
+/* Returns the advice that is the last part of the warning. */
 static const char *advice_for(const scene_image *image, const scene_image *before, bool is_same_output)
 {
     if (is_same_output) return "put {cycle} into its path to keep a picture of each step";
@@ -84,7 +85,7 @@ void session_note_written(session_overwrites *all, const scene *scene, int image
     for (int i = 0; i < drawn->output_count; i++) {
         const scene_output *output = &drawn->outputs[i];
         if (output->montage >= 0 && output->first_cell + drawn->variant.view > 0)
-            continue; /* one file has many cells */
+            continue; /* only the first cell of a montage counts, because all its cells are in the same file */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_of(path);

@@ -1,6 +1,7 @@
 /* Finds pictures that overwrite earlier ones of the same run. A scene whose outputs have equal paths is refused when it
- * is read. Equal paths that arise only during the run are found here: a path without {cycle} in several steps, or paths
- * that become equal when they are expanded. Only paths are compared, so the result is the same on all ranks. */
+ * is read. Paths that become equal only during the run are found here: a path without {cycle} in several steps, or
+ * paths that are equal after their placeholders are replaced. Only paths are compared, so that the result is the same
+ * on all ranks. */
 #ifndef SESSION_OVERWRITES_H
 #define SESSION_OVERWRITES_H
 
@@ -9,18 +10,18 @@
 
 /* The last picture that an output has written. */
 typedef struct session_written {
-    uint64_t file; /* hash of its path; 0: none yet */
+    uint64_t file; /* hash of the picture's path; 0: no picture has been written yet */
     long long cycle;
 } session_written;
 
 typedef struct session_overwrites {
-    int count; /* number of the scene's outputs, over all views, isovalues and fields */
+    int count; /* number of outputs of the scene, over all views, isovalues and fields */
     session_written *last;
 } session_overwrites;
 
-/* Records the files that the scene's image with this index has written at this cycle and time. If a path is that of
- * another output's last picture, or of this output's at another cycle, adds a warning, once per image. If memory runs
- * out nothing is recorded. Local. */
+/* Records the files that the image with this index has written at this cycle and time. If a path was already used for
+ * the last picture of another output, or of this output at another cycle, a warning is added, once per image. If memory
+ * runs out, nothing is recorded. Local. */
 void session_note_written(session_overwrites *overwrites, const scene *scene, int image, long long cycle, double time,
                           session_report *report);
 

@@ -1,6 +1,6 @@
 /* The domain's box is convex and contains all data. So an edge between two faces that are seen from inside lies behind
- * everything, and any other edge in front of everything or beside it: edges are drawn correctly without depth, both
- * among surfaces and inside a volume. */
+ * all data, and any other edge lies in front of all data or beside it. Edges can therefore be drawn correctly without
+ * depth, both among surfaces and inside a volume. */
 #include "session_decorations.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@
 
 /* ---- the box ------------------------------------------------------------------------------------------------- */
 
-/* A point in the camera's coordinates: to the right, up and forward, relative to the eye. */
+/* A point in the camera's coordinate system, relative to the eye: x to the right, y up, z forward. */
 typedef struct seen_point {
     double at[3];
 } seen_point;
@@ -35,7 +35,7 @@ static void project(const render_camera *c, const seen_point *p, double pixel[2]
     pixel[1] = 0.5 * c->height - p->at[1] * scale;
 }
 
-/* Clips the edge at the plane of this depth; returns false if all of it is nearer. */
+/* Clips the edge at the plane with depth `near`. Returns false if all of the edge is nearer. */
 static bool cut_near(seen_point *a, seen_point *b, double near)
 {
     if (a->at[2] < near && b->at[2] < near) return false;
@@ -48,7 +48,7 @@ static bool cut_near(seen_point *a, seen_point *b, double near)
     return true;
 }
 
-/* Returns whether the box's face across this axis, at its low or high end, is seen from outside. */
+/* Returns whether the face of the box perpendicular to this axis, at its low or high end, is seen from outside. */
 static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
@@ -82,12 +82,13 @@ int session_box_strokes(const double lower[3], const double upper[3], const rend
 
 /* ---- rulers -------------------------------------------------------------------------------------------------- */
 
-/* An edge of the box along an axis, in the picture. */
+/* An edge of the box parallel to an axis, and its projection into the picture. */
 typedef struct ruled_edge {
-    double from[3], to[3]; /* in the scene */
-    double pixels[2][2];   /* the ends */
-    double away[2];        /* unit vector perpendicular to the edge, out of the box */
-    /* is_there: in front of the eye; is_outer: between a face that is seen from outside and one that is not */
+    double from[3], to[3]; /* the ends in scene coordinates */
+    double pixels[2][2];   /* the ends in pixels */
+    double away[2];        /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
+    /* is_there: the edge is in front of the eye; is_outer: it lies between a face that is seen from outside and one
+     * that is not */
     bool is_there, is_outer;
 } ruled_edge;
 
@@ -132,8 +133,9 @@ static insitu_label label_at(const double at[2], const double away[2], double ga
     return out;
 }
 
-/* Finds where an axis's name stands: in the middle of its edge, or, if the numbers stand beside the edge rather than
- * below it, midway between the two ticks around which that is nearest, so that it meets no number. */
+/* Computes the position of an axis's name. It is the middle of the edge. If the numbers are beside the edge rather than
+ * below it, it is instead the point between two neighbouring ticks that is nearest to the middle, so that the name does
+ * not overlap a number. */
 static void place_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
 {
     double middle[2], least = INFINITY;
@@ -149,7 +151,8 @@ static void place_name(const ruled_edge *e, const insitu_stroke *ticks, int coun
     }
 }
 
-/* Draws as many ticks as there is room for words. */
+/* Draws ticks, numbers and the axis's name along an edge. The number of ticks is limited by the space for their
+ * numbers. */
 static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
                       insitu_stroke *strokes, insitu_label *labels)
 {
@@ -206,7 +209,7 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
 
 /* ---- texts and bars ------------------------------------------------------------------------------------------ */
 
-/* Chooses a light colour on a dark background, and a dark one on a light background or none. */
+/* Chooses a light colour on a dark background, and a dark one on a light or transparent background. */
 static void choose_colour(const scene_image *image, float colour[3])
 {
     const float *b = image->background;
@@ -216,7 +219,7 @@ static void choose_colour(const scene_image *image, float colour[3])
         colour[i] = image->decorations.has_colour ? image->decorations.colour[i] : is_dark ? 0.85F : 0.01F;
 }
 
-/* Adds a text. Returns false if there is no memory. */
+/* Adds a text to the decorations. Returns false if memory runs out. */
 static bool add_words(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at,
                       float size)
 {
@@ -233,8 +236,8 @@ static bool fill_words(session_decorations *d, const scene_decorations *scene, c
     return well;
 }
 
-/* Returns whether the layer shows the magnitude of the field: because the scene says so, or because the field has
- * several components. */
+/* Returns whether the layer shows the magnitude of the field: either the scene requests it, or the field has several
+ * components. */
 static bool is_magnitude(const session_catalogue *catalogue, const scene_field *field)
 {
     int components = 1;
@@ -248,7 +251,7 @@ static bool is_magnitude(const session_catalogue *catalogue, const scene_field *
            (field->component == SCENE_COMPONENT_DEFAULT && components > 1);
 }
 
-/* Writes the field's name: |v|, v x, v 7. */
+/* Writes the name of what a layer shows, such as |v| for the magnitude of a field, v x or v 7 for a component. */
 static void write_name(const session_catalogue *catalogue, const scene_field *field, char *out, size_t size)
 {
     static const char *const axes[] = {"x", "y", "z"};
@@ -274,7 +277,8 @@ static void write_label(const scene_decorations *scene, int bar, const session_c
     if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
-/* Returns whether an earlier bar has the same field, colours and numbers; several layers may show one field. */
+/* Returns whether an earlier colour bar has the same field, colours and numbers, since several layers may show one
+ * field. */
 static bool is_repeated(const session_decorations *d, int bar)
 {
     const insitu_colour_bar *b = &d->bars[bar];
@@ -290,13 +294,13 @@ static bool is_repeated(const session_decorations *d, int bar)
     return is_found;
 }
 
-/* Further input of bars, besides the layers. */
+/* Input for colour bars, in addition to the layers. */
 typedef struct bar_basis {
     const scene_decorations *scene;
     const session_catalogue *catalogue;
 } bar_basis;
 
-/* Adds the bar of a layer, unless an earlier bar is equal. */
+/* Adds the colour bar of a layer, unless an earlier bar is equal. */
 static void add_bar(session_decorations *d, const bar_basis *basis, const scene_field *field,
                     const scene_colour_map *map, const session_transfer *transfer)
 {
@@ -352,7 +356,7 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
-/* Fills in the decorations that show lengths. */
+/* Computes the decorations that show lengths. */
 static void fill_lengths(session_decorations *d, const scene_decorations *scene, const session_extent *extent,
                          const render_camera *camera)
 {

@@ -1,4 +1,5 @@
-/* Computes the texts and lines beside an image's data, in the form of the image library. */
+/* Computes the texts and lines that are drawn in addition to an image's data, in the form that the image library
+ * expects. */
 #ifndef SESSION_DECORATIONS_H
 #define SESSION_DECORATIONS_H
 
@@ -15,18 +16,18 @@ enum { SESSION_MAX_BARS = 20, SESSION_MAX_WORDS = 17, SESSION_BOX_EDGES = 12 };
 enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 * SESSION_MAX_TICKS + 3 };
 
 typedef struct session_decorations {
-    insitu_decorations all;        /* points into this struct and into the layers */
-    insitu_decorations background; /* only the background, for files without decorations */
+    insitu_decorations all;        /* all decorations; its pointers refer to this struct and to the layers */
+    insitu_decorations background; /* decorations that contain only the background, for files without decorations */
     insitu_words words[SESSION_MAX_WORDS];
     insitu_colour_bar bars[SESSION_MAX_BARS];
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];
-    const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the bars show */
-    insitu_stroke *strokes;                      /* buffer for the outline's boxes and the rulers */
+    const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the colour bars show */
+    insitu_stroke *strokes;                      /* buffer for the boxes of the outline and for the rulers */
     insitu_label ruler_labels[SESSION_RULER_LABELS];
 } session_decorations;
 
-/* Input of decorations. */
+/* Input for computing decorations. */
 typedef struct session_decoration_basis {
     const scene_moment *moment;
     const session_extent *extent;
@@ -36,24 +37,24 @@ typedef struct session_decoration_basis {
     const session_catalogue *catalogue;
 } session_decoration_basis;
 
-/* Returns the decorations of an image that has some; NULL if there is no memory. Local. */
+/* Returns the decorations of an image, which must have some. Returns NULL if memory runs out. Local. */
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis);
 
-/* Frees the decorations; NULL is allowed. */
+/* Frees the decorations. decorations may be NULL. */
 void session_free_decorations(session_decorations *decorations);
 
-/* Computes the edges of a box as the camera sees them, clipped at the eye's plane; returns their number. An edge is
+/* Computes the edges of a box as seen by the camera, clipped in front of the eye. Returns their number. An edge lies
  * behind the box's content if both of its faces are seen from inside. Local. */
 int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
                         insitu_stroke strokes[SESSION_BOX_EDGES]);
 
-/* Adds ticks, numbers and names along three edges of the box, one per axis: the lowest in the picture of those on the
- * outline. size: height of texts in pixels. Local. */
+/* Adds ticks, numbers and names along three edges of the box, one per axis: among those on the outline, the lowest in
+ * the picture. size is the height of texts in pixels. Local. */
 void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
                         insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
 
-/* Returns a scale bar: a round length of up to a fifth of the picture's width, at the depth of the point. unit: NULL
- * for none. Local. */
+/* Returns a scale bar. Its length is a round number and at most a fifth of the picture's width, at the depth of the
+ * point. unit may be NULL. Local. */
 insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit);
 
 #endif

@@ -12,7 +12,8 @@ void session_free_outline(session_outline *outline)
     *outline = (session_outline){0};
 }
 
-/* ---- ends: x, y, z of the lower corner, and the negated ones of the upper, so that a minimum unites boxes */
+/* The ends of a box: x, y, z of the lower corner and the negated x, y, z of the upper corner, so that a reduction by
+ * minimum computes the union of boxes. */
 
 enum { ENDS = 6 };
 
@@ -25,7 +26,7 @@ static void widen(const session_mesh *mesh, double ends[ENDS])
     }
 }
 
-/* Adds the boxes that are not empty. */
+/* Adds the boxes that are not empty to the outline. */
 static void take_boxes(const double *ends, int count, session_outline *out)
 {
     for (int i = 0; i < count; i++, ends += ENDS) {
@@ -38,7 +39,7 @@ static void take_boxes(const double *ends, int count, session_outline *out)
     }
 }
 
-/* Finds the bounds of this rank's cells: a row for each mesh of the catalogue, or one row for all meshes. */
+/* Computes the bounds of this rank's cells, either one row for each mesh of the catalogue or one row for all meshes. */
 static void find_ends(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
 {
     for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;
@@ -64,7 +65,7 @@ static insitu_status gather(const session_catalogue *catalogue, const session_me
 
 /* ---- all boxes ------------------------------------------------------------------------------------------------- */
 
-/* Allocates the boxes, on rank 0. */
+/* Allocates the boxes. Called on rank 0 only. */
 static bool reserve(session_outline *out, int count)
 {
     out->boxes = base_alloc((size_t)count * sizeof *out->boxes);

@@ -1,4 +1,4 @@
-/* The boxes that an image's outline shows: around all data, around each mesh, or around each rank's data. */
+/* Determines the boxes that an image's outline shows: around all data, around each mesh, or around each rank's data. */
 #ifndef SESSION_OUTLINE_H
 #define SESSION_OUTLINE_H
 
@@ -10,12 +10,12 @@
 #include "session_team.h"
 
 typedef struct session_outline {
-    int count; /* only on rank 0; 0: there is none */
+    int count; /* number of boxes, on rank 0 only; 0: there is no outline */
     session_box *boxes;
 } session_outline;
 
-/* Finds the outline's boxes. Collective if they are those of meshes or of ranks. On an error nothing is left to
- * free. */
+/* Computes the boxes of the outline. Collective if they are those of meshes or of ranks. After an error there is
+ * nothing to free. */
 insitu_status session_find_outline(const scene_decorations *decorations, const session_catalogue *catalogue,
                                    const session_meshes *meshes, const session_extent *extent, const session_team *team,
                                    session_outline *out, base_error *error);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A step of factor (1, 2 or 5) times 10^exponent. */
+/* A step between ticks of `factor` (1, 2 or 5) times 10^exponent. */
 typedef struct round_step {
     int factor, exponent;
 } round_step;
@@ -21,7 +21,8 @@ static round_step next_step(round_step step)
     return (round_step){step.factor == 1 ? 2 : 5, step.exponent};
 }
 
-/* Computes the first and last multiple of the step in [low, high]. A bound that is a multiple up to rounding counts. */
+/* Computes the first and the last multiple of the step in [low, high]. A bound that is a multiple up to rounding is
+ * included. */
 static void multiples(double low, double high, double step, double *first, double *last)
 {
     const double slack = 1e-9 * (high - low) / step;
@@ -41,18 +42,19 @@ static round_step choose_step(double low, double high, int most)
     return step;
 }
 
-/* Shortens only the exponent, "1.20e+05" to "1.20e5"; "1.2e5" would lose a digit that the neighbouring ticks have. */
+/* Removes leading zeros of the exponent: "1.20e+05" becomes "1.20e5". The mantissa is kept, since "1.2e5" would lack a
+ * digit that the neighbouring ticks have. */
 static void shorten_exponent(char *text)
 {
     char *e = strchr(text, 'e');
     if (!e) return;
     const bool is_negative = e[1] == '-';
     const size_t zeros = strspn(e + 2, "0");
-    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one zero of e+00 stays */
+    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one zero of e+00 is kept */
     memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
 }
 
-/* Writes a number, plain or with an exponent, with `digits` digits behind the point. */
+/* Writes a number with `digits` digits after the decimal point, with an exponent unless is_plain is set. */
 static void write_number(double value, bool is_plain, int digits, char *text, size_t size)
 {
     const int shown = digits < 0 ? 0 : digits > 15 ? 15 : digits;
@@ -65,8 +67,8 @@ static void write_number(double value, bool is_plain, int digits, char *text, si
     if (!is_plain) shorten_exponent(text);
 }
 
-/* Writes the number in the form that the scene requests, or else plain or with an exponent, with `digits` digits behind
- * the point. */
+/* Writes the number in the form that the scene requests. Without such a form it is written with `digits` digits after
+ * the decimal point, and with an exponent unless is_plain is set. */
 static void write_in_form(double value, const scene_number_form *form, bool is_plain, int digits, insitu_tick *tick)
 {
     enum { MOST = sizeof tick->text - 2 };
@@ -108,7 +110,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 
 /* ---- logarithmic --------------------------------------------------------------------------------------------- */
 
-/* The numbers that get a tick: 1, or 1, 2 and 5, times every `every`-th power of ten. */
+/* The numbers that get a tick: 1, or 1, 2 and 5, multiplied by every n-th power of ten, where n is `every`. */
 typedef struct decade_choice {
     bool has_2_and_5;
     int every;
@@ -166,8 +168,8 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_multiples(s, most, ticks) : count;
 }
 
-/* Fills one tick in the middle of each band if the bands match the whole numbers of the range, which ends at them or
- * half a band beyond; else returns 0. */
+/* Adds one tick in the centre of each band if the bands correspond to the integers of the range, that is, if the range
+ * ends at integers or half a band beyond them. Otherwise returns 0. */
 static int fill_ids(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;

@@ -1,20 +1,23 @@
-/* The volume of a cell from its corners, and the first approximation of its cube root, the cell's size. */
+/* Constants of vectorized code for cells: the corners from which a cell's volume is computed, and the first
+ * approximation of its cube root, which is the cell's size. */
 #ifndef SESSION_CORNERS_H
 #define SESSION_CORNERS_H
 
 #include "grid.h"
 
-/* A cell type's corners, each with its three neighbours in right-handed order. The cell's volume is the sum of six
- * times the volume of the tet at each corner, divided by shares: exact if edges are parallel, else a mean. */
+/* The corners of a type of cell, each with its three neighbours in right-handed order. The cell's volume is the sum,
+ * over the corners, of six times the volume of the tet that a corner forms with its neighbours, divided by `shares`. It
+ * is exact if opposite edges are parallel, and otherwise a mean. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
     int count;
-    double shares; /* that sum for a cell of volume 1 */
+    double shares; /* the sum for a cell of volume 1 */
 } cell_corners;
 
-/* Constants of the cube root's first approximation: a third of a double's upper bits plus the offset, with an error of
- * 0.033, since a double's bits are its logarithm to within 0.09. A step of Halley's method cubes the error: after two
- * steps it is 2.1e-5 cubed, below rounding. The offset is two thirds of 1.0's bits, less the mantissa's part. */
+/* Constants of the first approximation of the cube root. It is a third of the upper bits of the double plus an offset,
+ * with a relative error of 0.033, since a double's bits are its logarithm to within 0.09. A step of Halley's method
+ * cubes the error: after two steps it is 2.1e-5 cubed, which is below rounding. The offset is two thirds of the bits of
+ * 1.0, less a correction for the mantissa. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 
 static inline __attribute__((always_inline)) cell_corners corners_of(int type)

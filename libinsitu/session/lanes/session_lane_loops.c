@@ -1,9 +1,11 @@
-/* The loops of one instruction set, SESSION_LANES_TABLE. This file is compiled once per set (CMakeLists.txt).
+/* The loops for one instruction set, in the table SESSION_LANES_TABLE. This file is compiled once per instruction set
+ * (CMakeLists.txt).
  *
- * A block of cells is processed in two passes. First vertices are read and become bounds and volumes, then volumes
- * become sizes. In one pass a tet takes 5.8 ns instead of 4.0, as each root depends on its volume, and a core does not
- * look far enough ahead to overlap other cells. Volumes are kept as sums over corners and sizes as the roots of these,
- * so that one division serves a block. Numbers are loaded one by one: gathers take 1.6 times as long. */
+ * A block of cells is processed in two passes. The first pass reads vertices and computes bounds and volumes, the
+ * second computes sizes from volumes. In a single pass a tet takes 5.8 ns instead of 4.0, as each root depends on its
+ * volume, and a core does not look far enough ahead to overlap other cells. Volumes are kept as sums over corners and
+ * sizes as the cube roots of these, so that one division suffices for a block. Numbers are loaded one by one, since
+ * gather instructions take 1.6 times as long. */
 #include <stdbool.h>
 
 #include "session_corners.h"
@@ -11,29 +13,30 @@
 #include "session_lanes.h"
 
 enum {
-    BLOCK_CELLS = 512, /* their volumes fit into the first-level cache */
+    BLOCK_CELLS = 512, /* cells of a block; their volumes fit into the first-level cache */
     PARTS = LANES / LANE_WIDTH,
     AHEAD = 512 /* prefetch distance in entries of the connectivity; the hardware's own prefetches come too late */
 };
 
-/* Arrays and strides, with the constants of a run. */
+/* Addresses and strides of the mesh's arrays, which are constant during a run. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
-    uintptr_t axes[3]; /* address of index 0's number; if indices count from 1, it is outside the array */
+    uintptr_t axes[3]; /* address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
     int64_t connectivity_stride, ghosts_stride, stride;
-    int64_t base, last; /* bounds of the indices */
-    int type, count;    /* count: the number of vertices */
+    int64_t base, last; /* smallest and largest valid index */
+    int type, count;    /* type of the cells, and their number of vertices */
     int ghosts_bytes;
     bool wide_index, wide_number;
 } lane_source;
 
-/* Positions of the vertices of LANE_WIDTH cells: in narrow if coordinates are float, in wide if they are double. */
+/* Positions of the vertices of LANE_WIDTH cells. They are in `narrow` if coordinates are float, and in `wide` if they
+ * are double. */
 typedef struct lane_points {
     floats narrow[GRID_MAX_CELL_VERTICES][3];
     doubles wide[GRID_MAX_CELL_VERTICES][3];
 } lane_points;
 
-/* Bounds of positions: the float or the double members are used. */
+/* Bounds of positions. Either the float members or the double members are used. */
 typedef struct lane_bounds {
     floats narrow_lower[3], narrow_upper[3];
     doubles lower[3], upper[3];
@@ -93,7 +96,8 @@ static __attribute__((noinline)) void pack_indices(const char *from, int64_t str
     for (int i = 0; i < count; i++) memcpy(out + i * size, from + i * stride, (size_t)size);
 }
 
-/* Returns a pointer to the contiguous indices of LANES cells: in place, or copied to `room`. */
+/* Returns a pointer to the contiguous indices of LANES cells. They are read in place if possible, and otherwise copied
+ * to `room`. */
 LANE_INLINE const char *list_indices(const lane_source *s, int64_t cell, int64_t room[LANES * GRID_MAX_CELL_VERTICES])
 {
     const char *from = s->connectivity + cell * s->count * s->connectivity_stride;
@@ -110,7 +114,7 @@ LANE_INLINE int64_t given_index(const lane_source *s, const char *indices, int i
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Return whether all indices are those of vertices, by the signs of index and last - index. */
+/* Returns whether all indices are valid. An index is if both index and (last - index) have a positive sign. */
 LANE_INLINE bool are_wide_vertices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;
@@ -189,7 +193,7 @@ LANE_INLINE doubles coordinate(const lane_source *s, const lane_points *points, 
     return s->wide_number ? points->wide[vertex][axis] : doubles_of(points->narrow[vertex][axis]);
 }
 
-/* Returns the sum over the corners: shares times the volume. */
+/* Returns the sum over the corners of the cells, which is the volume multiplied by cell_corners.shares. */
 LANE_INLINE doubles sum_of_corners(const lane_source *s, const lane_points *points)
 {
     const cell_corners of = corners_of(s->type);
@@ -222,8 +226,8 @@ LANE_INLINE void grow_bounds(const lane_source *s, const lane_points *points, la
         }
 }
 
-/* Computes the volumes of cells begin .. end - 1. Stops before cells with a ghost or a bad index, or if less than LANES
- * cells are left; returns the cell at which it stopped. */
+/* Computes the volumes of cells begin .. end - 1. Stops before a group of cells that contains a ghost or an invalid
+ * index, or if less than LANES cells are left. Returns the cell at which it stopped. */
 LANE_INLINE int64_t measure(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds, double *volumes)
 {
     lane_bounds b = *bounds;
@@ -257,8 +261,8 @@ LANE_INLINE doubles cube_root(doubles x)
     return y;
 }
 
-/* Adds the sizes of `count` volumes, a multiple of LANES. Returns false, with sums unchanged, if a volume is zero, too
- * small, too large or NaN. */
+/* Computes the sizes from `count` volumes, a multiple of LANES, and adds them to the sums. Returns false, and leaves
+ * the sums unchanged, if a volume is zero, too small, too large or NaN. */
 LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *sizes)
 {
     lane_sizes s = *sizes;
@@ -269,7 +273,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
             const doubles volume = doubles_load(volumes + i + part * LANE_WIDTH), size = doubles_magnitude(volume);
             unusual |= ~((words)(size > 1e-280) & (words)(size < 1e280));
             s.least = doubles_min(size, s.least);
-            s.inverted += (words)(volume < 0); /* -1 if the volume is negative */
+            s.inverted += (words)(volume < 0); /* the comparison results in -1 if the volume is negative */
             s.sums[part] += cube_root(size);
         }
     }

@@ -1,5 +1,6 @@
-/* Vectors of doubles, and of the same number of floats, for the instruction set for which the file is compiled. simd.h
- * has no such vectors. Minima and maxima return a if it is less or greater, else b, so that a NaN in a is ignored. */
+/* Vectors of doubles, and vectors of the same number of floats, for the instruction set for which the file is compiled.
+ * simd.h has no such vectors. Minima and maxima return a if it is less (greater) than b, and otherwise b, so that a NaN
+ * in a is ignored. */
 #ifndef SESSION_LANE_VECTORS_H
 #define SESSION_LANE_VECTORS_H
 
@@ -13,7 +14,7 @@
 #if defined(__AVX512F__)
 #define LANE_WIDTH 8
 #else
-#define LANE_WIDTH 4 /* two registers on SSE2 */
+#define LANE_WIDTH 4 /* a vector consists of two registers on SSE2 */
 #endif
 
 #define LANE_INLINE static inline __attribute__((always_inline))
@@ -119,7 +120,8 @@ LANE_INLINE floats floats_max(floats a, floats b)
 #endif
 }
 
-/* Converts floats to doubles; gcc 12 would convert eight floats in two halves. */
+/* Converts floats to doubles. It is not a built-in conversion, because gcc 12 would convert eight floats in two
+ * halves. */
 LANE_INLINE doubles doubles_of(floats v)
 {
 #if defined(__AVX512F__)
@@ -134,7 +136,7 @@ LANE_INLINE doubles doubles_magnitude(doubles v)
     return (doubles)((words)v & INT64_MAX);
 }
 
-/* Returns whether a bit is set in any lane. */
+/* Returns whether any bit of the vector is set. */
 LANE_INLINE bool words_any(words v)
 {
     int64_t any = 0;

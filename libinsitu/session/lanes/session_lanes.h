@@ -1,8 +1,8 @@
-/* Cells of one type in lanes, eight at once, for the check of a mesh: whether their indices are in range, their bounds,
- * volumes and sizes. It depends only on grids.
+/* Processes cells of one type with vector instructions, eight at once, when a mesh is checked: tests whether their
+ * indices are in range, and computes their bounds, volumes and sizes. It depends only on grids.
  *
  * The loops (session_lane_loops.c) are compiled once per instruction set. Sums have the same bits for all of them: each
- * of eight lanes has its own sum, and no multiply-add is fused. */
+ * of the eight lanes has its own sum, and fused multiply-add instructions are not used. */
 #ifndef SESSION_LANES_H
 #define SESSION_LANES_H
 
@@ -11,28 +11,29 @@
 
 enum { LANES = 8 };
 
-/* Consecutive cells, whose vertices are contiguous in the connectivity. */
+/* A run of consecutive cells whose vertices are contiguous in the connectivity. */
 typedef struct lane_cells {
-    const grid *g; /* coordinates are all floats or all doubles, with one stride */
-    int type;      /* tet, hex, wedge or pyramid */
+    const grid *g; /* the grid; its coordinates are all floats or all doubles, with one stride */
+    int type;      /* type of the cells: tet, hex, wedge or pyramid */
     int64_t first, count;
-    int64_t entry; /* index of the first cell's first vertex in the connectivity */
+    int64_t entry; /* index of the first cell's first entry in the connectivity */
 } lane_cells;
 
 typedef struct lane_sums {
     double lower[3], upper[3];
     double least; /* least absolute volume */
-    double sizes; /* sum of the cube roots of volumes */
+    double sizes; /* sum of the cube roots of the volumes */
     int64_t inverted;
 } lane_sums;
 
-/* Sums up the first cells, a multiple of eight, and returns their number. *alone: number of following cells that must
- * be checked one by one, because one of them is unusual: an index out of range, a ghost, a volume without a usual root
- * (also if a coordinate is not finite, as each is a factor of the volume), or because fewer than eight are left. Bounds
- * may then include vertices of those cells, unless they are ghosts. */
+/* Adds the first cells of the run to the sums; their number, which is returned, is a multiple of eight. *alone is set
+ * to the number of following cells that must be checked one by one, because one of them has an index out of range, is a
+ * ghost, or has a volume whose root cannot be computed in this way (also if a coordinate is not finite, as each is a
+ * factor of the volume), or because fewer than eight cells are left. The bounds may then include vertices of those
+ * cells, unless they are ghosts. */
 typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *alone);
 
-/* Returns the run for the type and the grid's layout; NULL if cells are of another type. */
+/* Returns the function for the type of cells and the grid's layout. Returns NULL if the cells are of another type. */
 lane_run *session_lanes_of(cpu_isa isa, const grid *g, int type);
 
 /* ---- for session_lanes.c ------------------------------------------------------------------------------------- */
@@ -40,7 +41,8 @@ lane_run *session_lanes_of(cpu_isa isa, const grid *g, int type);
 enum { LANE_TETS, LANE_HEXES, LANE_WEDGES, LANE_PYRAMIDS, LANE_TYPES };
 
 typedef struct lane_loops {
-    lane_run *runs[LANE_TYPES][2][2]; /* by whether indices have 8 bytes and whether coordinates have 8 bytes */
+    /* indexed by the type of cells, by whether indices have 8 bytes, and by whether coordinates have 8 bytes */
+    lane_run *runs[LANE_TYPES][2][2];
 } lane_loops;
 
 extern const lane_loops session_lanes_plain, session_lanes_avx2, session_lanes_avx512;

@@ -20,12 +20,14 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
     return false;
 }
 
-/* The statistics computed in a step: first those that are due, then those of images' conditions. */
+/* The statistics that are computed in a step: those that are due, followed by those of images' conditions. */
 typedef struct event_work {
     int count;
     session_statistics_wish *wishes;
     session_statistics *found;
-    int *of; /* index of the statistics; or, for an image, its index plus the number of statistics */
+    /* index of the statistics in the scene; for the condition of an image, the image's index plus the number of
+     * statistics */
+    int *of;
 } event_work;
 
 static void work_free(event_work *w)
@@ -56,7 +58,7 @@ static bool work_create(const scene *scene, int64_t cycle, const session_sound_e
     return true;
 }
 
-/* Returns whether the condition holds; it does not if there are no values. */
+/* Returns whether the condition holds. It does not hold if there are no values. */
 static bool holds(const scene_condition *c, const session_statistics *s)
 {
     const double value = c->of == SCENE_MEAN ? s->mean : c->of == SCENE_MINIMUM ? s->least : s->most;
@@ -95,7 +97,8 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     event_work work;
     if (!work_create(scene, now->cycle, sound, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
     for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
-    insitu_status status = session_agree(team->comm, error); /* fill functions may be collective */
+    /* ranks agree on errors before fill functions are called, because these may be collective */
+    insitu_status status = session_agree(team->comm, error);
     if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_wanted(meshes, team->threads, error);
     status = session_agree(team->comm, error);

@@ -1,6 +1,7 @@
-/* Sums are sums of integers, which are the same in any order: shares of the largest cell's volume, from 0 to 1, times
- * 2^52. For shells, if no cell has a volume, areas take the place of volumes. A sum has two parts, multiples of 2^28
- * and the rest, so that 2^34 cells fit. Each cell errs by at most 2^-53 of the largest. */
+/* Sums are computed with integers, so that they are the same for any order of summation. A term is the volume as a
+ * fraction (0 to 1) of that of the largest cell, times 2^52. For shells, if no cell has a volume, areas are used
+ * instead of volumes. A sum consists of two words, the multiples of 2^28 and the rest, so that 2^34 cells can be added.
+ * The error of each cell is at most 2^-53 of the largest one. */
 #include "session_statistics.h"
 
 #include <math.h>
@@ -54,16 +55,16 @@ static double sum_of(const int64_t sum[2])
     return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
 
-/* Results of earlier passes that a pass uses. */
+/* Results of earlier passes over the cells that a pass uses. */
 typedef struct sum_basis {
     const session_statistics *known;
-    double largest; /* largest volume */
-    double about;   /* second pass: the mean, as a share of the range */
+    double largest; /* volume of the largest cell */
+    double about;   /* mean of the first pass, as a fraction of the range; used by the second pass */
     bool is_second;
-    bool is_of_shells; /* only shells are counted, else only cells with a volume */
+    bool is_of_shells; /* set if only shells are counted; otherwise only cells with a volume are */
 } sum_basis;
 
-/* Returns a value's share of the range, from 0 at low to 1 at high, without overflow. */
+/* Returns a value's position in the range as a fraction, 0 at low and 1 at high. It does not overflow. */
 static double share_of_range(double value, double low, double high)
 {
     const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
@@ -97,7 +98,7 @@ typedef struct statistics_pass {
     const grid *g;
     grid_field field;
     const session_team *team;
-    volume_room *rooms; /* one per thread */
+    volume_room *rooms; /* one buffer per thread */
 } statistics_pass;
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
@@ -114,8 +115,8 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
     }
 }
 
-/* Entries of the reduction by minimum: minimum, -maximum, -largest volume; first of cells with a volume, then of
- * shells. */
+/* Entries of the reduction by minimum: minimum, negated maximum, negated largest volume; first for cells with a volume,
+ * then for shells. */
 enum { ENDS = 3, KINDS = 2 };
 
 static void find_ends(const statistics_pass *p, double ends[KINDS * ENDS])
@@ -143,12 +144,17 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_wish *wishes;
     int count;
-    double *ends;       /* KINDS times ENDS per wish; then one entry: -1 if a rank's memory ran out, else 0 */
-    int64_t *sums;      /* MAX_SUMS per wish, then two */
-    volume_room *rooms; /* one per thread; large enough after the first pass, as a thread's cells stay the same */
+    /* KINDS * ENDS entries for each requested statistics, then one entry that is -1 if memory ran out on a rank, and
+     * otherwise 0 */
+    double *ends;
+    int64_t *sums; /* MAX_SUMS entries for each requested statistics, then two more */
+    /* one buffer per thread; they are large enough after the first pass, since each thread always processes the same
+     * cells */
+    volume_room *rooms;
 } statistics_work;
 
-/* Sets up the pass over the wish's field on a mesh of this rank; returns false if the mesh does not have the field. */
+/* Sets up a pass over the field of the requested statistics on a mesh of this rank. Returns false if the mesh does not
+ * have the field. */
 static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
@@ -156,7 +162,7 @@ static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_p
     return of->is_given && session_find_values(of, w->wishes[wish].field, &pass->field);
 }
 
-/* Fails if a thread's buffer could not be allocated on any rank. */
+/* Stores an error if a thread's buffer could not be allocated on any rank. */
 static insitu_status check_rooms(const statistics_work *w, base_error *error)
 {
     if (w->ends[KINDS * ENDS * w->count] == 0) return INSITU_OK;
@@ -166,7 +172,7 @@ static insitu_status check_rooms(const statistics_work *w, base_error *error)
     return session_agree(w->team->comm, error);
 }
 
-/* Returns whether only shells are counted: if no cell has a volume and there are shells. */
+/* Returns whether only shells are counted, which is the case if there are shells and no cell has a volume. */
 static bool is_of_shells(const statistics_work *w, int wish)
 {
     const double *ends = w->ends + KINDS * ENDS * wish;

@@ -1,4 +1,4 @@
-/* Statistics of fields over all drawn cells. They do not depend on the partition. */
+/* Statistics of fields over all drawn cells. They do not depend on how cells are distributed over ranks. */
 #ifndef SESSION_STATISTICS_H
 #define SESSION_STATISTICS_H
 
@@ -10,25 +10,28 @@ enum { SESSION_MAX_BINS = 256 };
 
 typedef struct session_statistics_wish {
     const scene_field *field;
-    int bin_count;    /* number of the histogram's bins; 0: no histogram */
-    double low, high; /* the range that the bins cover; low > high: the range of the values */
+    int bin_count;    /* number of bins of the histogram; 0: no histogram is computed */
+    double low, high; /* the range that the bins cover; low > high: the range of the values is used */
 } session_statistics_wish;
 
-/* Statistics of a field. A cell's value is its own, or the mean of its vertices' values. Cells whose values are not all
- * finite do not count. If no cell with a volume counts, shells count instead; then areas take the place of volumes. */
+/* Statistics of a field. The value of a cell is its own, or the mean of the values at its vertices. Cells whose values
+ * are not all finite are not counted. If no cell with a volume is counted, shells are, and areas are used instead of
+ * volumes. */
 typedef struct session_statistics {
     int64_t cells;
     bool is_of_shells;
-    double volume;          /* total volume of the cells */
-    double least, most;     /* range of the values, at vertices for a vertex field; least > most: there are no values */
-    double mean, deviation; /* mean and deviation of cells' values, weighted by volume */
+    double volume; /* total volume of the cells */
+    /* range of the values, for a vertex field of those at vertices; least > most: there are no values */
+    double least, most;
+    double mean, deviation; /* mean and standard deviation of the cells' values, weighted by volume */
     int bin_count;
-    double low, high; /* begin of the first bin and end of the last one */
-    /* each bin's share of the volume, by cells' values; values beyond the ends count in the outer bins */
+    double low, high; /* lower bound of the first bin and upper bound of the last one */
+    /* fraction of the volume in each bin, by the cells' values; values outside of the bins count in the first or last
+     * bin */
     double shares[SESSION_MAX_BINS];
 } session_statistics;
 
-/* Computes the statistics of fields over all meshes that have them and to which they are restricted by name, by three
+/* Computes the statistics of fields over all meshes that have them, restricted to a mesh if its name is given, by three
  * reductions. Collective. */
 insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
                                       const session_statistics_wish *wishes, int count, session_statistics *out,

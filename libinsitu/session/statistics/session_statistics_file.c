@@ -7,9 +7,9 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* the largest file that is continued: about two million lines */
+enum { MOST_BYTES = 1 << 28 }; /* maximum size of a file that is continued; about two million lines */
 
-/* Returns the line of column names, without its newline, from base_alloc(); NULL if there is no memory. */
+/* Returns the line of column names without its newline, allocated by base_alloc(); NULL if memory runs out. */
 static char *make_header(int bin_count, bool is_of_shells)
 {
     static const char solids[] = "cycle,time,cells,volume,minimum,maximum,mean,deviation";
@@ -24,18 +24,18 @@ static char *make_header(int bin_count, bool is_of_shells)
     return out;
 }
 
-/* Content of the file to write. */
+/* The new content of the file. */
 typedef struct new_lines {
-    char *old; /* the lines that are kept */
+    char *old; /* the lines of the old file that are kept */
     size_t old_size;
-    const char *header; /* NULL: the file already has one */
+    const char *header; /* line of column names; NULL: the file already has one */
     int64_t cycle;
     double time;
     const session_statistics *values;
 } new_lines;
 
-/* Returns the number of significant digits that resolve nine digits of a range's width, however far it is from 0; at
- * most all digits of a double. */
+/* Returns the number of significant digits with which nine digits of the range's width are resolved, however far it is
+ * from 0. It is at most the number of digits of a double. */
 static int digits_for(double low, double high)
 {
     enum { OF_THE_WIDTH = 9, MOST = 17 };
@@ -62,14 +62,14 @@ static void write_lines(FILE *file, const void *what)
     write_line(file, n);
 }
 
-/* Returns an error for the file. what: "read" or "written". */
+/* Stores an error for the file and returns its status. what is "read" or "written". */
 static insitu_status fail(const char *path, const char *what, const file_failure *failure, base_error *error)
 {
     return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "statistics: %.300s: cannot be %s: %s", path, what, failure->reason);
 }
 
-/* Finds the lines of the file that are kept. */
+/* Determines which lines of the existing file are kept. */
 static insitu_status keep_lines(const char *path, file_content *old, new_lines *lines, base_error *error)
 {
     const size_t header = strlen(lines->header);
@@ -83,7 +83,7 @@ static insitu_status keep_lines(const char *path, file_content *old, new_lines *
     return INSITU_OK;
 }
 
-/* Writes the session's first line, or the first after the file was removed. */
+/* Writes the session's first line, or the first one after the file was removed. */
 static insitu_status begin_file(const char *path, new_lines *lines, base_error *error)
 {
     file_content old;

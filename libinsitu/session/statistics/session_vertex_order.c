@@ -1,7 +1,7 @@
-/* A cell whose vertices are read in another order than they are stored is turned inside out at some corners: the
- * volumes at its corners have both signs, while those of a correct or mirrored cell all have one sign. Their sum may
- * have any sign, or be 0. So cells with both signs are counted, and for each order of vertex_order the cells that would
- * have a single sign if they were read in it. */
+/* If a cell's vertices are read in another order than the one in which they are stored, the cell is inverted at some
+ * corners: the volumes at its corners have both signs, while those of a correct or mirrored cell all have the same
+ * sign. Their sum may have any sign, or be 0. So cells with both signs are counted, and for each value of vertex_order
+ * also the cells that would have a single sign if they were read in that order. */
 #include "session_vertex_order.h"
 
 #include "memory.h"
@@ -10,20 +10,20 @@
 #include "session_tally.h"
 #include "session_topology.h"
 
-enum { ORDERS = 3, SAMPLES = 256 /* number of a mesh's cells that a rank samples, or a few more */ };
+enum { ORDERS = 3, SAMPLES = 256 /* approximate number of a mesh's cells that a rank samples */ };
 
-/* The types in which the orders differ. Each is judged separately: if few cells are hexes, these may be wrong all the
- * same. */
+/* The types of cells for which the orders differ. Each type is judged separately, so that an error in hexes is found
+ * even if few cells are hexes. */
 enum { JUDGED = 4 };
 static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
 
-/* Counts of one type's cells. */
+/* Counts of the cells of one type. */
 enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Returns whether all corners of the cell have one sign if its vertices are stored in `order` instead of the order in
- * which they are read. */
+/* Returns whether all corners of the cell have the same sign if its vertices are assumed to be stored in `order`
+ * instead of the order in which they are read. */
 static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_turn(mesh->given.vertex_order, type);
@@ -38,8 +38,8 @@ static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex
     return !tally_has_both_signs(type, points);
 }
 
-/* Returns the counts of the cell's type; NULL if the cell is not judged: a ghost, or a cell that the caller describes
- * as a polyhedron, whose faces determine the order. */
+/* Returns the counts for the type of the cell. Returns NULL if the cell is not counted: it is a ghost, or the caller
+ * describes it as a polyhedron, whose faces determine the order. */
 static int64_t *sums_of(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
@@ -49,7 +49,8 @@ static int64_t *sums_of(const session_mesh *mesh, int64_t cell, int64_t sums[CEL
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 
-/* share: the number of parts that the samples are of, at least one each. */
+/* Adds the counts of a sample of the mesh's cells. share is the number of blocks among which the samples are divided,
+ * with at least one sample for each. */
 static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
 {
     const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
@@ -72,13 +73,14 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
         if (!part->is_given) continue;
         sums[DRAWN] += part->drawn_count - part->shell_count;
         sums[FLAT] += part->flat_count - part->shell_count;
-        sums[INVERTED] += part->cells.lattice ? 0 : part->inverted_count; /* axes may run either way */
+        /* the axes of a lattice may have either direction, so that left-handed cells are not counted */
+        sums[INVERTED] += part->cells.lattice ? 0 : part->inverted_count;
         sums[SHELLS] += part->shell_count;
         sum_orders(part, parts.count, sums);
     }
 }
 
-/* Returns whether most cells of a type have corners of both signs. */
+/* Returns whether most cells of some type have corners of both signs. */
 static bool is_any_turned(const int64_t sums[CELL_SUMS])
 {
     bool is_any = false;
@@ -87,7 +89,7 @@ static bool is_any_turned(const int64_t sums[CELL_SUMS])
     return is_any;
 }
 
-/* Returns the order that fits most cells, if it fits most cells of each type; else -1. */
+/* Returns the order that fits most cells, if it fits most cells of each type; otherwise -1. */
 static int order_that_fits(const int64_t sums[CELL_SUMS])
 {
     int best = -1;
@@ -106,8 +108,8 @@ static int order_that_fits(const int64_t sums[CELL_SUMS])
     return best;
 }
 
-/* Warns if most cells of a type are turned inside out at some corners, and names the order that fits most cells, if
- * there is one. */
+/* Warns if most cells of a type are inverted at some corners, and names the order that fits most cells, if there is
+ * one. Returns whether it has warned. */
 static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};

@@ -1,4 +1,4 @@
-/* Meshes whose vertices seem to be in another order than VTK's. */
+/* Finds meshes whose vertices seem to be in another order than VTK's. */
 #ifndef SESSION_VERTEX_ORDER_H
 #define SESSION_VERTEX_ORDER_H
 

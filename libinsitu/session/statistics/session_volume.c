@@ -1,14 +1,14 @@
-/* Volumes are computed by closed forms, exact up to rounding.
+/* Volumes are computed by closed formulas, which are exact up to rounding.
  *
- * A cell is the region that its faces enclose, so cells with the same faces have the same volume. A wedge or pyramid is
- * a hex some of whose corners coincide. The integral of a trilinear map's determinant is a sum of three determinants of
- * the corners' differences (Grandy, 1997).
+ * A cell is the region that its faces enclose, so that cells with the same faces have the same volume. A wedge or
+ * pyramid is treated as a hex with coincident corners. The integral of a trilinear map's determinant is a sum of three
+ * determinants of differences of the corners (Grandy, 1997).
  *
- * A polyhedron is the sum of cones from any point over its faces, oriented outward. The two triangulations of a quad
- * enclose a tet, which its bilinear patch halves, so that the cone over a patch is the mean of the cones over both
- * triangulations.
+ * The volume of a polyhedron is the sum of the volumes of cones from any point over its faces, oriented outward. The
+ * two triangulations of a quad enclose a tet, which the quad's bilinear patch divides into halves, so that the volume
+ * of the cone over a patch is the mean of those over both triangulations.
  *
- * A shell's area is the length of its vector area, half the sum of the cross products around it. */
+ * A shell's area is the length of its vector area, which is half the sum of the cross products around it. */
 #include "session_volume.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ static double tet_volume(double (*p)[3])
     return determinant(u, v, w) / 6;
 }
 
-/* Returns which corners of the cell take the place of a hex's. */
+/* Returns, for each corner of a hex, which corner of the cell is used for it. */
 static const signed char *corners_as_hex(int type)
 {
     static const signed char hex[8] = {0, 1, 2, 3, 4, 5, 6, 7}, wedge[8] = {0, 1, 2, 2, 3, 4, 5, 5},
@@ -77,7 +77,7 @@ static bool make_room(volume_room *room, size_t size)
     return room->bytes;
 }
 
-/* Reads positions relative to the first vertex, so that volumes do not cancel far from the origin. */
+/* Reads positions relative to the first vertex, so that digits do not cancel far from the origin. */
 static void take_positions(const grid *g, const closed_faces *c, double (*positions)[3])
 {
     double origin[3];
@@ -88,7 +88,7 @@ static void take_positions(const grid *g, const closed_faces *c, double (*positi
     }
 }
 
-/* Returns six times the volume of the cone from the origin over the patch. */
+/* Returns six times the volume of the cone from the origin over the bilinear patch. */
 static double patch_cone(const double (*p)[3], const int v[4])
 {
     const double *a = p[v[0]], *b = p[v[1]], *c = p[v[2]], *d = p[v[3]];
@@ -123,7 +123,7 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
 
 /* ---- shells ---------------------------------------------------------------------------------------------------- */
 
-/* Lists the shell's vertices in the buffer. */
+/* Lists the vertices of the shell in the buffer. Returns false if memory runs out. */
 static bool take_vertices(const grid *g, int64_t cell, volume_room *room)
 {
     grid_walk walk = grid_walk_cell(g, cell);

@@ -1,12 +1,12 @@
 /* An automatic camera looks along a given direction. Its position is computed so that the sphere around the bounds, or
- * their corners, just fit the part of the frame that decorations leave free.
+ * their corners, just fit into the part of the frame that decorations leave free.
  *
- * A corner at (x, y) across and w towards the eye, seen from a position s to the right and D towards the eye, is within
- * the right border if x - s <= r (D - w), r being the border's tangent, and within the left one, of tangent l, if s - x
- * <= l (D - w). So with a = max(x + r w) and b = max(l w - x), s is between a - r D and l D - b; these meet at D = (a +
- * b) / (r + l). The same holds for up and down; the larger D is used. A sphere of radius R has a = R sqrt(1 + r^2) and
- * b = R sqrt(1 + l^2). A box is placed in the middle of its allowed range, a sphere as near to the middle of the frame
- * as allowed. */
+ * Let a corner be at (x, y) across the view and w towards the eye. Seen from a position s to the right and D towards
+ * the eye, it is within the right border if x - s <= r (D - w), where r is the border's tangent, and within the left
+ * one, of tangent l, if s - x <= l (D - w). So with a = max(x + r w) and b = max(l w - x), s must be between a - r D
+ * and l D - b. These are equal at D = (a + b) / (r + l). The same holds for up and down; the larger D is used. A sphere
+ * of radius R has a = R sqrt(1 + r^2) and b = R sqrt(1 + l^2). A box is positioned in the middle of its allowed range,
+ * a sphere as near to the middle of the frame as allowed. */
 #include "session_camera.h"
 
 #include <math.h>
@@ -14,10 +14,10 @@
 
 #include "vector3.h"
 
-/* Largest share of the half frame that the data fills. */
+/* Largest fraction of the half frame that the data fills. */
 static const double filled = 0.95;
 
-/* Returns up, or an axis that is not parallel to the view if up is. */
+/* Returns `up`, or a coordinate axis if `up` is parallel to the direction of view. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
     double cross[3];
@@ -32,7 +32,7 @@ static void choose_up(const double direction[3], const double up[3], double out[
 
 /* ---- position -------------------------------------------------------------------------------------------------- */
 
-/* Tangents of half the angles of view, horizontal and vertical. */
+/* Tangents of half the horizontal and half the vertical angle of view. */
 typedef struct camera_tangents {
     double across, up;
 } camera_tangents;
@@ -43,27 +43,27 @@ static camera_tangents tangents_of(const scene_image *image)
     return (camera_tangents){up * image->width / image->height, up};
 }
 
-/* Maxima over the corners, as derived at the top of this file. */
+/* Maxima over the corners: the numbers a and b that are derived at the top of this file. */
 typedef struct corner_reach {
     double right, left, up, down, back;
 } corner_reach;
 
-/* Extents from the middle of the frame to the limit of the data on each side, as shares of half the frame or as
- * tangents. */
+/* Distances from the centre of the frame to the limit of the data on each side, either as fractions of half the frame
+ * or as tangents. */
 typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* Extents of the data from the middle of the bounds, for a perspective (near) and an orthographic camera (flat), and
- * the frame into which they must fit. */
+/* Extents of the data from the centre of the bounds, for a perspective camera (near) and an orthographic one (flat),
+ * and the frame into which they must fit. */
 typedef struct camera_fit {
     corner_reach near, flat;
     camera_frame tangents, shares;
-    bool is_centred; /* centred in its part of the frame */
+    bool is_centred; /* set if the data is centred in the free part of the frame */
 } camera_fit;
 
-/* Space that a column of colour bars, a title, a line of text, and rulers' numbers take of the picture, in heights of
- * text; and the shape of a bar, approximately as in adaptors/image/layout.cpp. */
+/* Space that a column of colour bars, a title, a line of text, and the numbers of rulers take from the picture, as
+ * multiples of the height of text; and the shape of a colour bar, approximately as in adaptors/image/layout.cpp. */
 static const double bar_room = 6.5, title_room = 2.4, line_room = 1.5, ruler_room = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
@@ -72,7 +72,7 @@ static double less_room(double most, double words, double pixels)
     return fmax(most - 2 * words / pixels, 0.5);
 }
 
-/* Returns the number of bars; *letters: length of the longest label. */
+/* Returns the number of colour bars. *letters receives the length of the longest label. */
 static int count_bars(const scene_image *image, double *letters)
 {
     const scene_decorations *d = &image->decorations;
@@ -85,7 +85,7 @@ static int count_bars(const scene_image *image, double *letters)
     return count;
 }
 
-/* Returns the width of all columns of bars, in heights of text. */
+/* Returns the width of all columns of colour bars, as a multiple of the height of text. */
 static double room_of_bars(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
@@ -97,8 +97,8 @@ static double room_of_bars(const scene_image *image)
     return d->has_bars ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
-/* Returns the height of the lines at the middle of the top or bottom, or at its corners, whichever is larger, in
- * heights of text. Lines at corners count if they reach far into the picture. */
+/* Returns the height of the lines at the middle of the top or bottom, or of those at its corners, whichever is larger,
+ * as a multiple of the height of text. Lines at corners count only if they extend far into the picture. */
 static double room_of_lines(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
@@ -118,7 +118,8 @@ static double room_of_lines(const scene_image *image, scene_anchor middle, scene
     return line_room * most + (most ? 0.5 : 0);
 }
 
-/* Returns the part of the frame that decorations leave free, at most the share `most` of its half. */
+/* Returns the part of the frame that decorations leave free. It is at most the fraction `most` of its half on each
+ * side. */
 static camera_frame free_frame(const scene_image *image, double most)
 {
     const scene_decorations *d = &image->decorations;
@@ -170,38 +171,41 @@ static camera_fit make_fit(const session_extent *e, const render_camera *axes, c
     return fit;
 }
 
-/* Returns the distance of the eye from the middle of the bounds. */
+/* Returns the distance of the eye from the centre of the bounds. */
 static double back_of(const camera_fit *fit, double half_diagonal)
 {
     const corner_reach *near = &fit->near;
     const camera_frame *f = &fit->tangents;
     const double back =
         fmax((near->right + near->left) / (f->right + f->left), (near->up + near->down) / (f->up + f->down));
-    return fmax(back, near->back + 0.01 * half_diagonal); /* flat bounds, seen edge on */
+    /* the second bound keeps the eye outside of flat bounds that are viewed edge-on */
+    return fmax(back, near->back + 0.01 * half_diagonal);
 }
 
-/* Returns half the height of an orthographic picture in which all data fits; aspect: width over height. */
+/* Returns half the height of an orthographic picture in which all data fits. aspect is its width divided by its
+ * height. */
 static double fitting_height(const camera_fit *fit, double aspect)
 {
     const double across = (fit->flat.right + fit->flat.left) / (fit->shares.right + fit->shares.left) / aspect;
     return fmax((fit->flat.up + fit->flat.down) / (fit->shares.up + fit->shares.down), across);
 }
 
-/* Returns the eye's position between low and high: in the middle, or as near to 0 as allowed. */
+/* Returns a position of the eye between low and high. It is in the middle if is_centred, and otherwise as near to 0 as
+ * allowed. */
 static double place_between(double low, double high, bool is_centred)
 {
     if (is_centred || low > high) return 0.5 * (low + high);
     return fmin(fmax(0, low), high);
 }
 
-/* Returns half the height of an orthographic picture. */
+/* Returns half the height of an orthographic picture, in scene units. */
 static double half_height_of(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
-/* Makes the camera orthographic if the scene says so. The eye keeps its position, with all data in front of it: an
- * orthographic picture is the same from any distance. */
+/* Makes the camera orthographic if the scene requests it. The eye keeps its position, with all data in front of it,
+ * since an orthographic picture is the same from any distance. */
 static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
 {
     if (!image->camera.is_orthographic) return;
@@ -209,8 +213,8 @@ static void set_orthographic(const scene_image *image, double half_height, rende
     camera->half_height = half_height_of(image, half_height);
 }
 
-/* Computes an automatic camera. Positions are relative to the middle of the bounds until the camera is complete, so
- * that bounds far from 0 do not lose digits. */
+/* Computes an automatic camera. Positions are relative to the centre of the bounds until the camera is complete, so
+ * that bounds far from 0 do not lose digits. Returns false if there is no direction of view. */
 static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
 {
     const scene_camera *c = &image->camera;
@@ -253,7 +257,7 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
 
 /* ---- defaults from the data ------------------------------------------------------------------------------------ */
 
-/* Looks at flat data with the first of its axes to the right and the second one up. */
+/* Makes the camera look at flat data with the first of its two axes to the right and the second one up. */
 static void face_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};

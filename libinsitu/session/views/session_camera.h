@@ -6,11 +6,11 @@
 #include "scene.h"
 #include "session_space.h"
 
-/* If the data is flat (session_flat_axis()), an automatic camera looks along that axis, is orthographic and fits the
- * box, unless the scene says otherwise.
+/* Computes the camera. If the data is flat (session_flat_axis()), an automatic camera looks along that axis, is
+ * orthographic and fits the box, unless the scene sets something else.
  *
- * Returns false if the camera's position is its focal point, or the camera looks along its up direction. Local; the
- * same on every rank. */
+ * Returns false if the camera's position is equal to its focal point, or if the camera looks along its up direction.
+ * Local; the result is the same on every rank. */
 bool session_make_camera(const session_extent *extent, const scene_image *image, render_camera *out);
 
 #endif

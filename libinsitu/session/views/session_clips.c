@@ -1,5 +1,5 @@
-/* The part of the bounds that a set of clips leaves is enclosed in a box, which each clip shrinks in turn, repeatedly
- * while other clips have shrunk it. If the box becomes empty, the clips leave nothing. */
+/* The part of the bounds that remains after a set of clips is enclosed in a box. Each clip shrinks the box in turn,
+ * repeatedly as long as other clips have shrunk it. If the box becomes empty, the clips leave nothing. */
 #include "session_clips.h"
 
 #include <math.h>
@@ -8,8 +8,8 @@
 #include "session_distances.h"
 #include "vector3.h"
 
-/* Converts a clip. The kept region is extended by twice the largest shift of a slice's plane (SESSION_BORDER_SHARE), so
- * that a slice on its border is visible. */
+/* Converts a clip to the renderer's form. The kept region is extended by twice the largest shift of a slice's plane
+ * (SESSION_BORDER_SHARE), so that a slice on its border is visible. */
 static render_clip make_clip(const session_extent *e, const scene_clip *clip)
 {
     const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
@@ -62,8 +62,8 @@ static void meet_box(clip_box *box, const double lower[3], const double upper[3]
     }
 }
 
-/* Clips the box to the half space normal . x <= distance: each axis is limited by the distance that remains after the
- * other two axes' least contributions. */
+/* Clips the box to the half space normal . x <= distance. Each axis is limited by the distance that remains after the
+ * least contributions of the other two axes are subtracted. */
 static void meet_plane(clip_box *box, const render_clip *clip)
 {
     double least[3], left = clip->distance;
@@ -80,7 +80,7 @@ static void meet_plane(clip_box *box, const render_clip *clip)
     }
 }
 
-/* Computes the distances from a sphere's centre to the nearest and the farthest point of the box. */
+/* Computes the distances from the centre of a sphere to the nearest and the farthest point of the box. */
 static void find_distances(const clip_box *box, const double centre[3], double *nearest, double *farthest)
 {
     double near[3], far[3];
@@ -146,7 +146,7 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    bool has_nothing; /* all layers together have nothing left */
+    bool has_nothing; /* set if nothing remains of all layers together */
 } clip_basis;
 
 static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)

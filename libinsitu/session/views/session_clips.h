@@ -1,4 +1,4 @@
-/* The clips of an image's layers. */
+/* The clips of an image's layers, which remove a part of them. */
 #ifndef SESSION_CLIPS_H
 #define SESSION_CLIPS_H
 
@@ -7,11 +7,11 @@
 #include "session_report.h"
 #include "session_space.h"
 
-/* Converts the image's clips to the renderer's. Local. */
+/* Converts the image's clips to the renderer's form. Local. */
 void session_make_clips(const session_extent *extent, const scene_image *image, render_clip out[RENDER_MAX_CLIPS]);
 
-/* Warns of layers of which the clips leave nothing: no point within the bounds of all cells. Local; the same on every
- * rank. */
+/* Warns of layers of which the clips leave nothing, that is, no point within the bounds of all cells. Local; the result
+ * is the same on every rank. */
 void session_warn_of_clips(const session_extent *extent, const scene_image *image, const render_clip *clips,
                            session_report *report);
 

@@ -1,4 +1,4 @@
-/* The contour lines of a layer: where their levels are. */
+/* Computes the values of a layer's contour lines. */
 #ifndef SESSION_CONTOURS_H
 #define SESSION_CONTOURS_H
 
@@ -9,13 +9,14 @@
 #include "session_team.h"
 
 typedef struct session_contours {
-    render_lines lines; /* count 0: there are none, as the field has no range */
+    render_lines lines; /* count is 0 if there are no lines, because the field has no range */
     double values[RENDER_MAX_LINES];
     float colours[3 * RENDER_MAX_LINES];
 } session_contours;
 
-/* Makes all but the fields. colours: the transfer function of the layer's colours, whose range lines without values
- * cut; NULL: that of the field does. Collective, the same on all ranks. */
+/* Computes the contour lines except for their fields. If the scene gives no values, the lines divide a range into equal
+ * parts: that of `colours`, the transfer function of the layer's colours, or, if colours is NULL, that of the lines'
+ * own field. Collective; the result is the same on all ranks. */
 insitu_status session_make_contours(const session_meshes *meshes, const session_team *team, const scene_lines *in,
                                     const render_transfer *colours, session_contours *out, base_error *error);
 

@@ -1,6 +1,6 @@
 /* A part is a mesh of this rank that has a tree with cells in it. A layer has a field for each part. If a part does not
  * have the field, its ranges are NULL, and the renderer skips the part. If a part has the surface but not the field
- * that colours it, its values are NaN. */
+ * that colours it, the values of that field are NaN. */
 #include "session_layers.h"
 
 #include <math.h>
@@ -89,7 +89,7 @@ static grid_field absent_field(void)
                         .component_count = 1};
 }
 
-/* Sets a part's field. scalar: NULL if the part has none. */
+/* Sets the field and the ranges of a part. scalar is NULL if the part does not have the field. */
 static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mesh *mesh, const session_scalar *scalar,
                          bool wants_ranges)
 {
@@ -97,8 +97,8 @@ static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mes
     if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
-/* Fills the slot-th run of part_count fields, on the meshes that have the field. plane: NULL for the field's values,
- * else the values are the distances from it. */
+/* Sets a layer's field, which consists of the fields of all parts and is stored as the slot-th section of part_count
+ * fields. If plane is not NULL, the values are the distances from it instead of the field's values. */
 static render_field place_field(const session_meshes *meshes, session_layers *layers, int slot,
                                 const scene_field *field, const scene_plane *plane, bool wants_ranges)
 {
@@ -115,7 +115,7 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     return out;
 }
 
-/* Sets gradients at the vertices of the meshes that have the field. */
+/* Sets the gradients at the vertices of the meshes that have the field. */
 static const render_vertex_gradients *place_gradients(const session_meshes *meshes, session_layers *layers, int index,
                                                       const scene_field *field)
 {
@@ -150,7 +150,7 @@ static void warn_of_width(const session_layer_basis *basis, const scene_field *f
         basis->image->name, field->name, low, high);
 }
 
-/* Computes a transfer function, whose range may include that of the run so far. Collective. */
+/* Computes a transfer function, whose range may include the range of the run so far. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
@@ -165,16 +165,17 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return INSITU_OK; /* lack of memory is reported by the next agreement */
+    return INSITU_OK; /* a lack of memory is stored in *error and shared in the next phase */
 }
 
-/* Returns the slot of the fields of a surface's lines. */
+/* Returns the slot of the field of a surface's contour lines. */
 static int lines_slot(const session_layers *layers, const scene_image *image, int surface)
 {
     return 2 * layers->surface_count + image->volume_count + surface;
 }
 
-/* Makes the lines of a surface, whose colours' transfer function is there. Collective. */
+/* Computes the contour lines of a surface. The transfer function of its colours must have been computed before.
+ * Collective. */
 static insitu_status make_lines(const session_layer_basis *basis, const scene_lines *in, render_field field,
                                 int surface, session_layers *layers, base_error *error)
 {
@@ -188,7 +189,8 @@ static insitu_status make_lines(const session_layer_basis *basis, const scene_li
     return status;
 }
 
-/* As above, of a surface in the meshes' own cells. */
+/* Sets the field of the contour lines of a surface that lies in the meshes' own cells, and computes the lines.
+ * Collective. */
 static insitu_status place_lines(const session_layer_basis *basis, const scene_lines *in, int surface,
                                  session_layers *layers, base_error *error)
 {
@@ -198,10 +200,10 @@ static insitu_status place_lines(const session_layer_basis *basis, const scene_l
     return make_lines(basis, in, field, surface, layers, error);
 }
 
-/* An isosurface is as rough as its cells are: within one it bends, between two it breaks, and in polyhedra it juts out
- * at faces. Hits nearer than this share of a cell count as the surface itself, which does not shade itself: no less
- * than keeps polyhedra's facets from specks, as more takes the shade from hollows
- * (docs/development/decisions/surface.md). */
+/* An isosurface is as rough as its cells: it is curved within a cell, has an edge between two cells, and extends
+ * outward at the faces of polyhedra. Hits of occlusion rays that are nearer than this fraction of a cell count as the
+ * surface itself and do not darken it. A smaller fraction would leave dark spots on the facets of polyhedra, a larger
+ * one would remove the shade of hollows (docs/development/decisions/surface.md). */
 #define CONTACT 0.2F
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
@@ -233,7 +235,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the outer faces of which the part consists. */
+/* Returns whether the layer shows the outer faces that the part consists of. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_surface_is_on(layer, walk->whole) &&
@@ -270,7 +272,8 @@ static bool gather(const session_mesh *whole, const session_outer *outer, const 
     return *values != NULL;
 }
 
-/* Gathers a field at the outer faces from the cells'. */
+/* Sets a layer's field to the values at the outer faces, which are gathered from those of the cells. Returns false if
+ * memory runs out. */
 static bool place_gathered(const session_meshes *meshes, session_layers *layers, int slot, const scene_surface *layer,
                            const scene_field *field, render_field *out)
 {
@@ -287,7 +290,7 @@ static bool place_gathered(const session_meshes *meshes, session_layers *layers,
 }
 
 /* Returns the material of a layer. A picture of flat data is a map: if the scene sets no light and no material, its
- * colours are exactly those of the bar. */
+ * colours are exactly those of the colour bar. */
 static const scene_material *material_of_faces(const session_layer_basis *basis, const scene_surface *layer)
 {
     static const scene_material bare = {.ambient = 1};
@@ -338,7 +341,7 @@ static void warn_of_plane(const session_layer_basis *basis, const scene_image *i
                  image->name, low, high);
 }
 
-/* Fills the surface of a plane. surface: the plane's index among the surfaces. */
+/* Sets up the surface of a slice's plane. surface is the plane's index among the surfaces. */
 static insitu_status fill_plane(const session_layer_basis *basis, const scene_image *image, const scene_slice *layer,
                                 const scene_plane *plane, int surface, session_layers *layers, base_error *error)
 {
@@ -386,8 +389,8 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
-/* Warns that several volumes are sampled. A single volume has an error bound by default; with several that takes
- * longer, as their segments are mixed. */
+/* Warns that several volumes are sampled without an error bound. A single volume has an error bound by default; with
+ * several volumes that takes longer, since their segments must be mixed. */
 static void warn_of_samples(const session_layer_basis *basis, const scene_image *image)
 {
     const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};
@@ -404,7 +407,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     session_layers layers = {0};
     if (!error->status && !allocate_layers(basis, image, &layers))
         session_no_memory(error, 1 << 10, "an image's layers");
-    /* If the scene exceeds a limit, the error belongs to no rank. */
+    /* If the scene exceeds a limit, the error is the same on all ranks and does not belong to one of them. */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
     warn_of_samples(basis, image);

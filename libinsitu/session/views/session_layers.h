@@ -1,4 +1,4 @@
-/* An image's layers on this rank's meshes, in the renderer's form. */
+/* The layers of an image on this rank's meshes, in the renderer's form. */
 #ifndef SESSION_LAYERS_H
 #define SESSION_LAYERS_H
 
@@ -15,34 +15,38 @@ typedef struct session_layers {
     int part_count, transfer_count;
     render_part *parts;
     int surface_count;
-    int first_outer;                /* the place of the first outer surface */
-    render_surface_layer *surfaces; /* isosurfaces, their lines on shells if there are any, outer surfaces, planes */
+    int first_outer; /* index of the first outer surface in `surfaces` */
+    /* isosurfaces, their contour lines on shells if there are any, outer surfaces, planes */
+    render_surface_layer *surfaces;
     render_volume_layer *volumes;
-    session_transfer *transfers; /* those of surfaces, then those of volumes */
-    double *distances;           /* one for each surface: the isovalues of planes; 0 */
-    session_contours *contours;  /* one for each surface */
-    grid_field *fields;          /* part_count a surface and its colour, in turns, a volume, and a surface's lines */
+    session_transfer *transfers; /* transfer functions of the surfaces, followed by those of the volumes */
+    double *distances;           /* isovalue of each surface that is a plane; 0 for the others */
+    session_contours *contours;  /* contour lines of each surface */
+    /* sections of part_count fields: for each surface its field and its colour field, then one for each volume, then
+     * one for the lines of each surface */
+    grid_field *fields;
     int64_t field_count;
     render_vertex_gradients *gradients; /* part_count entries per isosurface */
-    double **gathered;                  /* same order as fields: values gathered at outer faces; else NULL */
-    mmbvh_ranges *ranges;               /* same order as fields */
+    /* values gathered at outer faces, in the same order as fields; NULL for other fields */
+    double **gathered;
+    mmbvh_ranges *ranges; /* ranges of the fields, in the same order */
 } session_layers;
 
-/* Input of layers. */
+/* Input for computing layers. */
 typedef struct session_layer_basis {
     const session_meshes *meshes;
     const session_team *team;
     double half_diagonal; /* half the diagonal of the global bounds */
-    bool is_flat;         /* session_flat_axis() found an axis */
-    bool has_shells;      /* session_has_shells() */
+    bool is_flat;         /* set if session_flat_axis() has found an axis */
+    bool has_shells;      /* result of session_has_shells() */
     session_report *report;
-    session_image_ranges *run_ranges; /* NULL: no layer has a range over the run */
+    session_image_ranges *run_ranges; /* ranges over the run; NULL: no layer has one */
     const scene_image *image;
 } session_layer_basis;
 
-/* Computes an image's layers. Collective, as ranges from the data are over all ranks. All ranks first agree on the
- * error in each one's *error; on an error nothing is left to free. If only this rank lacks memory for colours, *error
- * is set for the next agreement. */
+/* Computes an image's layers. Collective, as ranges of the data are computed over all ranks. *error may hold an error
+ * of this rank, on which all ranks agree first; after an error there is nothing to free. If only this rank lacks memory
+ * for colours, *error is set and is shared in the next phase. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

@@ -1,4 +1,5 @@
-/* Computes the renderer's numbers from the scene's view. All ranks have the same input, so nothing is exchanged. */
+/* Computes the renderer's parameters from the view of a scene. All ranks have the same input, so that no communication
+ * is needed. */
 #include "session_view.h"
 
 #include <math.h>
@@ -31,12 +32,12 @@ static void make_lights(const scene_image *image, const render_camera *camera, r
     }
 }
 
-/* Smallest default step, as a share of the half diagonal: some 500,000 samples across the scene. Cells of extreme
- * aspect ratio may be smaller. */
+/* Smallest default sampling distance, as a fraction of the half diagonal. It results in about 500,000 samples across
+ * the scene. Cells with an extreme aspect ratio may be smaller. */
 static const double finest_step = 4e-6;
 
-/* Returns the distance between samples. If no cell has a volume, a hundredth of the diagonal takes the place of the
- * cells' size. */
+/* Returns the distance between samples in scene units. If no cell has a volume, a hundredth of the diagonal is used
+ * instead of the size of cells. */
 static double sample_distance(const session_extent *extent, const scene_image *image)
 {
     if (image->step > 0) return image->step;
@@ -45,8 +46,8 @@ static double sample_distance(const session_extent *extent, const scene_image *i
     return image->step_cells < SCENE_STEP_CELLS ? step : fmax(step, finest_step * extent->half_diagonal);
 }
 
-/* Returns the radius of occlusion, by default a tenth of the diagonal. If that is 0, the radius does not matter, as
- * nothing is near. */
+/* Returns the radius of ambient occlusion, which by default is a tenth of the diagonal. If the diagonal is 0, the
+ * radius has no effect. */
 static double occlusion_radius(const session_extent *extent, const scene_image *image)
 {
     if (image->occlusion_radius > 0) return image->occlusion_radius;
@@ -69,11 +70,11 @@ static void fill_view(const session_space *space, const scene_image *image, sess
 
 /* ---- time ---------------------------------------------------------------------------------------------------- */
 
-/* Duration of a sample on one thread: 27 to 240 ns were measured, on all types of cells, with many rays and with
- * few. */
+/* Time in seconds that a sample takes on one thread. Between 27 and 240 ns were measured, for all types of cells and
+ * for many and few rays. */
 static const double sample_seconds = 1e-7;
 
-/* Returns the length of the pixel's ray within the bounds. */
+/* Returns the length of the intersection of the pixel's ray with the bounds. */
 static double chord_of_bounds(const session_extent *e, const render_camera *camera, int x, int y)
 {
     double base[3], direction[3], begin = 0, end = INFINITY;
@@ -81,14 +82,16 @@ static double chord_of_bounds(const session_extent *e, const render_camera *came
     for (int axis = 0; axis < 3; axis++) {
         const double a = (e->lower[axis] - base[axis]) / direction[axis];
         const double b = (e->upper[axis] - base[axis]) / direction[axis];
-        /* for a ray parallel to the faces a and b are infinities with the right signs, or NaN, which fmin() ignores */
+        /* for a ray parallel to the faces, a and b are infinite with the right signs, or are NaN, which fmin()
+         * ignores */
         begin = fmax(begin, fmin(a, b));
         end = fmin(end, fmax(a, b));
     }
     return end > begin ? (end - begin) * vector3_length(direction) : 0;
 }
 
-/* Returns the number of samples of all rays on all ranks if the bounds were full of cells and nothing hid a sample. */
+/* Returns the number of samples that all ranks would compute if the bounds were filled with cells and no sample was
+ * hidden. */
 static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
 {
     enum { PROBES = 16 };
@@ -120,12 +123,13 @@ static insitu_status check_time(const session_extent *e, const char *scene_path,
 
 /* ---- views without data -------------------------------------------------------------------------------------- */
 
-/* Positions of the bounds' corners in the picture. */
+/* Positions in the picture of the corners of the bounds. */
 typedef struct corner_bounds {
-    /* bounds of the corners in front of the eye, in the picture, whose borders are at -1 and 1 */
+    /* bounds of those corners that are in front of the eye, in coordinates in which the borders of the picture are at
+     * -1 and 1 */
     double low[2], high[2];
     int behind;     /* number of corners behind the eye */
-    bool is_beside; /* all corners are beyond one border */
+    bool is_beside; /* set if all corners are beyond one border */
 } corner_bounds;
 
 static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
@@ -151,7 +155,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
     return b;
 }
 
-/* Returns the reason why no data is in view, or NULL if some may be. */
+/* Returns the reason why no data is in view; NULL if some data may be. */
 static const char *why_unseen(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);
