@@ -1,4 +1,4 @@
-/* Results that depend on a scalar's values are stale only if the values have changed. */
+/* Data that depends on a scalar's values must be computed again only if the values have changed. */
 #include "session_checksums.h"
 
 #include <string.h>
@@ -54,7 +54,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
             const char *data = a->data + first * a->stride;
             const uint64_t own =
                 a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
-            sum += mix(own, (uint64_t)block); /* the order of the blocks does not affect a sum */
+            sum += mix(own, (uint64_t)block); /* the order in which blocks are added does not affect the sum */
         }
         region_leave();
     }
@@ -73,8 +73,8 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     return sum;
 }
 
-/* Returns the checksum of a scalar. It includes the cells' own values: if these become NaN, the means at their vertices
- * may stay the same. */
+/* Returns the checksum of a scalar. It includes the cells' own values, because if some of these become NaN, the means
+ * at their vertices may remain the same. */
 static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_scalar_field(mesh, scalar);
@@ -103,7 +103,8 @@ static uint64_t sample_of(const session_mesh *mesh, const session_scalar *scalar
     return field.own ? sample_field(sum, mesh, field.own) : sum;
 }
 
-/* Warns if values have changed in place: trees have the ranges of the old values while rays read the new ones. */
+/* Warns if values have changed in place although the caller declared them unchanged: trees then contain ranges of the
+ * old values while rays read the new ones. */
 static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, session_report *report)
 {
     if (session_is_distance(scalar)) return;
@@ -118,7 +119,8 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
     scalar->is_suspect = scalar->is_suspect || has_changed;
 }
 
-/* Returns whether the values are those of the last picture. */
+/* Computes the checksum of the values and compares it with that of the last picture. Returns whether they are equal;
+ * otherwise the data that depends on the values is marked as stale. */
 static bool compare(const session_mesh *mesh, session_scalar *scalar, int threads)
 {
     const uint64_t checksum = checksum_of(mesh, scalar, threads);
@@ -133,7 +135,7 @@ static bool compare(const session_mesh *mesh, session_scalar *scalar, int thread
     return false;
 }
 
-/* Blocks are told of by their number alone. */
+/* Reports that a field has the values of the last picture. Fields of blocks are only counted, in *blocks. */
 static void tell_same(const session_mesh *mesh, const session_scalar *scalar, int64_t *blocks, session_report *report)
 {
     if (mesh->block != SESSION_WHOLE)

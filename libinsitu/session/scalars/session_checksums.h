@@ -5,10 +5,11 @@
 #include "session_mesh.h"
 #include "session_report.h"
 
-/* For every scalar that an image of this step uses and that was set anew: compares a checksum of its values with that
- * of the last picture, and if they differ marks everything that depends on them as stale. A checksum has 64 bits and
- * costs one read of the values, at the speed of memory. For other scalars a few values are sampled: if these have
- * changed all the same, the scalar is treated as set anew, with a warning. Parallel. Local. */
+/* Compares a checksum of the values with that of the last picture, for every scalar that an image of this step uses and
+ * that was set anew. If they differ, everything that depends on the values is marked as stale. A checksum has 64 bits
+ * and requires reading the values once, at the speed of memory. For other scalars a few values are sampled: if these
+ * have changed although the caller declared them unchanged, the scalar is treated as if it was set anew, and a warning
+ * is added. Parallel. Local. */
 void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report);
 
 #endif

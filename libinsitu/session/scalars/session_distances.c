@@ -17,7 +17,7 @@ static void move_along(const double from[3], const double normal[3], double offs
 
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3])
 {
-    double middle[3], half = 0; /* half the extent of the bounds along the normal */
+    double middle[3], half = 0; /* centre of the bounds, and half of their extent along the normal */
     for (int axis = 0; axis < 3; axis++) {
         middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
         half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);
@@ -64,7 +64,7 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
     return scalar;
 }
 
-/* Moves a plane through the middle of the data if the bounds have changed. */
+/* Moves a plane that passes through the centre of the data, if the bounds have changed. */
 static void follow_data(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
 {
     double point[3];
@@ -130,9 +130,9 @@ void session_update_distances(const session_meshes *meshes, const session_team *
     }
 }
 
-/* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so the minimum
- * of all distances has no crossing. A tenth of the tolerance above it is distinguishable from it in float32, but
- * invisible in the scene. */
+/* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so that the
+ * minimum of all distances has no crossing. So a value of a tenth of the tolerance above the minimum is used: it
+ * differs from it in float32, but the difference is invisible. */
 double session_slice_distance(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;

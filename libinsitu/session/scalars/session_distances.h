@@ -1,5 +1,6 @@
-/* Signed distances of vertices from planes. A slice is the isosurface of distance 0: in every cell the interpolant of
- * the distances at its vertices is the distance itself, because positions are interpolated in the same way. */
+/* Computes signed distances of vertices from planes. A slice is the isosurface of distance 0: in every cell the
+ * interpolant of the distances at its vertices is the distance itself, because positions are interpolated in the same
+ * way. */
 #ifndef SESSION_DISTANCES_H
 #define SESSION_DISTANCES_H
 
@@ -8,26 +9,28 @@
 #include "session_space.h"
 #include "session_team.h"
 
-/* Largest shift of a slice that lies on the border of the data, as a share of half the diagonal of the global bounds.
- * It is shifted inside. */
+/* Largest shift of a slice that lies on the border of the data, as a fraction of half the diagonal of the global
+ * bounds. The slice is shifted to the inside. */
 #define SESSION_BORDER_SHARE 1e-6
 
-/* Computes a point of the plane in this step. */
+/* Computes a point of the plane for the current step. */
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3]);
 
-/* Records that an image of this step shows the plane on the mesh. Returns false if memory ran out. Local. */
+/* Marks the distances from the plane on the mesh as used by an image of this step. Returns false if memory runs out.
+ * Local. */
 bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const session_extent *extent,
                            session_scalar **marked);
 
 /* Returns the distances from the plane; NULL if the mesh has none. */
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
 
-/* Computes the distances in use that are stale, from each vertex's own coordinates alone, so that all ranks have the
- * same. Local. */
+/* Computes those distances that are used and stale. Each is computed from the vertex's own coordinates alone, so that
+ * all ranks obtain the same. Local. */
 void session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Returns the distance at which the plane is drawn if the data's distances, over all ranks, range from low to high: 0,
- * or, if the plane lies on their border, a distance just far enough inside to be visible. */
+/* Returns the distance at which the plane is drawn. low and high are the minimum and maximum of the data's distances
+ * from it, over all ranks. The result is 0 or, if the plane lies on the border of the data, a distance just far enough
+ * inside for the slice to be visible. */
 double session_slice_distance(double low, double high, double half_diagonal);
 
 #endif

@@ -1,5 +1,5 @@
-/* MPI counts are ints. Words have 8 bytes, so that a rank can send another up to 16 GiB at once; more is an error on
- * all ranks instead of an overflow. */
+/* Counts in MPI are of type int. Words have 8 bytes, so that a rank can send up to 16 GiB to another at once. A larger
+ * message is an error on all ranks, instead of an overflow. */
 #include "session_exchange.h"
 
 #include <string.h>
@@ -16,9 +16,9 @@ void session_mail_free(session_mail *mail)
 
 /* ---- messages -------------------------------------------------------------------------------------------------- */
 
-/* A received message. Ranks do not know in advance who sends to them (Hoefler et al. 2010): sends are synchronous, so
- * that a rank whose sends are complete knows that they have been received, and joins a non-blocking reduction; when
- * that is complete all messages have been received. */
+/* A received message. Ranks do not know in advance which ranks send to them, so the algorithm of Hoefler et al. (2010)
+ * is used: sends are synchronous, so that a rank whose sends are complete knows that they have been received. It then
+ * joins a non-blocking reduction; when that is complete, all messages have been received. */
 typedef struct letter {
     struct letter *next;
     int from;
@@ -70,8 +70,8 @@ static letter *letter_create(delivery *d, int from, int64_t count)
     return d->letters = l;
 }
 
-/* Receives a message. If there is no memory, it is received with length 0, so that the sender can complete, and its
- * data is dropped. */
+/* Receives a message. If memory runs out, it is received with length 0 and its data is lost, so that the sender's call
+ * can complete. */
 static void receive(delivery *d, const MPI_Status *found, base_error *error)
 {
     int count = 0;
@@ -85,12 +85,12 @@ static void receive(delivery *d, const MPI_Status *found, base_error *error)
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks", (long long)count * 8);
 }
 
-/* Receives until all ranks' messages have been received. *failed: the lowest rank that had failed before; `ranks` if
- * none had. */
+/* Receives messages until those of all ranks have been received. *failed is the lowest rank that had an error before,
+ * or `ranks` if none had. */
 static insitu_status receive_all(delivery *d, int *failed, base_error *error)
 {
     int own = error->status ? d->rank : d->ranks, has_joined = 0, is_over = 0;
-    base_error lost = {0}; /* error in receiving */
+    base_error lost = {0}; /* an error in receiving */
     MPI_Request all = MPI_REQUEST_NULL;
     insitu_status status = INSITU_OK;
     while (!status && !is_over) {
@@ -113,7 +113,7 @@ static insitu_status receive_all(delivery *d, int *failed, base_error *error)
     return status;
 }
 
-/* Adds this rank's words for itself as a message, too. */
+/* Adds the words that this rank sends to itself, as if they were a received message. */
 static void keep_own(delivery *d, const session_mail *out, base_error *error)
 {
     const uint64_t *words = out->words;
@@ -127,7 +127,7 @@ static void keep_own(delivery *d, const session_mail *out, base_error *error)
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data", (long long)count * 8);
 }
 
-/* Concatenates the messages in the order of ranks. */
+/* Concatenates the messages in the order of the ranks that sent them. */
 static void open_letters(const delivery *d, session_mail *in, base_error *error)
 {
     int64_t *starts = base_calloc((size_t)d->ranks + 1, sizeof *starts);

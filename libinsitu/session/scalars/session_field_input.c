@@ -1,6 +1,6 @@
-/* insitu_set_field() fills in the table of fields. Only descriptions are checked here; a step reads the values. An
- * error is returned at once, and stays with the field until it is set again, so that the next step returns it on every
- * rank. */
+/* insitu_set_field() stores fields in the table of fields. Only descriptions are checked here; the values are read by a
+ * step. An error is returned immediately, and is also kept with the field until it is set again, so that the next step
+ * returns it on every rank. */
 #include "session_field_input.h"
 
 #include <string.h>
@@ -16,7 +16,7 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
     return field;
 }
 
-/* Returns the number of entries of connectivity that are vertices of cells. */
+/* Returns the number of those entries of the connectivity that are vertices of cells. */
 int64_t session_corner_count(const insitu_mesh *mesh)
 {
     if (mesh->cell_count == 0) return 0;
@@ -24,8 +24,8 @@ int64_t session_corner_count(const insitu_mesh *mesh)
     return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
 }
 
-/* Returns the number of the mesh's vertices, cells or corners; for corners in rows, of all entries from the first to
- * the last corner. */
+/* Returns the number of the mesh's vertices, cells or corners, depending on the field's centring. For corners in rows,
+ * it is the number of all entries from the first to the last corner. */
 int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
@@ -39,13 +39,14 @@ static const char *place_words(insitu_centring centring)
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
-/* Returns whether the field has an index. An array without elements may have no address: then its type decides. */
+/* Returns whether the field has an index. An array without elements may have the address NULL; then its type determines
+ * whether it is given. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
 }
 
-/* Checks components that are arrays of their own. */
+/* Checks a field each of whose components is given as a separate array. */
 static insitu_status check_apart(const insitu_field *field, int64_t count, base_error *error)
 {
     if (field->values.data)
@@ -77,7 +78,8 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
                                     "components of values", error);
 }
 
-/* Checks a field at corners. Mixed cells are checked when they are torn. */
+/* Checks a field that has values at the corners of cells. For meshes of mixed cells, the cells' types are checked
+ * later, when the mesh is torn. */
 static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const long long row = field->corner_row, vertices = grid_type_vertices((int)mesh->cell_type);
@@ -125,7 +127,7 @@ static insitu_status check_patch_arrays(const insitu_patch *patch, int component
                                     "components of values", error);
 }
 
-/* Checks how the patch identifies its faces, and its values. */
+/* Checks how the patch identifies its faces, and checks its values. */
 static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, int components, base_error *error)
 {
     const bool has_vertices = patch->connectivity.data != NULL;
@@ -171,7 +173,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     return INSITU_OK;
 }
 
-/* Checks a field with a fill function, before it is called. */
+/* Checks the description of a field that has a fill function, before the function is called. */
 static insitu_status check_fill(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
@@ -230,7 +232,7 @@ static bool are_same_components(const insitu_field *a, const insitu_field *b)
     return is_same;
 }
 
-/* Tells whether the values are read from the same place as before. */
+/* Returns whether the values have the same addresses and layout as before. */
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
     return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
@@ -238,8 +240,8 @@ static bool is_same_place(const insitu_field *a, const insitu_field *b)
            a->component_count == b->component_count && are_same_components(a, b) && are_same_patches(a, b);
 }
 
-/* The tables of patches and components become the field's, which may hold the given ones. False where memory runs out.
- */
+/* Replaces the field's tables of patches and components by copies of the given ones, which may be the field's own.
+ * Returns false if memory runs out. */
 static bool copy_tables(session_field *field, const insitu_field *given, base_error *error)
 {
     const size_t components = given->components ? (size_t)given->component_count : 0;
@@ -266,7 +268,7 @@ static bool copy_tables(session_field *field, const insitu_field *given, base_er
     return true;
 }
 
-/* The values as they are read, from tuple to tuple of their first component. */
+/* Sets the array from which the values are read. Its elements are the first components of all tuples. */
 static void read_array(session_field *field, const insitu_field *given)
 {
     const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
@@ -275,13 +277,15 @@ static void read_array(session_field *field, const insitu_field *given)
     if (!values.stride_bytes) values.stride_bytes = size * given->component_count;
     field->values = field->apart ? field->apart[0] : session_grid_array(&values);
     if (!values.data || field->apart || field->component_stride % size == 0) return;
-    values.stride_bytes = field->component_stride; /* the other components are not aligned */
+    /* the other components are not aligned, so that the values must be read as unaligned ones */
+    values.stride_bytes = field->component_stride;
     const grid_array other = session_grid_array(&values);
     field->values.odd = other.odd;
     field->values.is_integer = other.is_integer;
 }
 
-/* Takes the arrays, and notes whether their copy must be made again. Tables have been copied. */
+/* Sets the arrays of values, and stores whether their copy must be computed again. The tables must have been copied
+ * before. */
 static void read_values(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                         bool is_stale)
 {
@@ -299,7 +303,8 @@ static void read_values(const session_mesh *mesh, session_field *field, const in
     read_array(field, given);
 }
 
-/* Tables have been copied, unless all is read from where it was (is_same). */
+/* Stores a field's description. The tables must have been copied before, unless all values are read from the same
+ * addresses as before (is_same). */
 static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
@@ -307,7 +312,7 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
                           field->given.component_count != given->component_count || field->problem.status;
     const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same;
     if (is_other) {
-        /* The scalars' components may mean something else now. */
+        /* The components of the scalars may no longer have the same meaning. */
         session_drop_scalars(mesh);
         field->version++;
         meshes->are_names_changed = true;
@@ -329,7 +334,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     base_error what = {0};
     session_field *field = &mesh->fields[index];
     if (field->is_derived) {
-        /* The caller uses the name of a derived field; session_name_derived() reports that. */
+        /* The caller uses the name of a derived field; session_name_derived() reports this error. */
         session_drop_copy(field);
         *field = (session_field){.given = {.name = field->given.name}};
     }
@@ -358,7 +363,8 @@ static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, co
     return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->label);
 }
 
-/* The mesh or the block is not there; it may be there in the other way. */
+/* Reports that the mesh or block does not exist. The message depends on whether the name belongs to a mesh of the other
+ * kind. */
 static void refuse_missing(const session_meshes *meshes, const char *name, int64_t block, const char *field,
                            base_error *error)
 {
@@ -395,7 +401,7 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
     return error->status;
 }
 
-/* Checks that the filled field has the centring and components that were declared. */
+/* Checks that the filled field has the centring and the number of components that were declared. */
 static insitu_status check_filled(const session_mesh *mesh, const insitu_field *promised, const insitu_field *filled,
                                   base_error *error)
 {
@@ -418,7 +424,7 @@ insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_fi
     read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
-    /* Scalars may hold the last table of components. */
+    /* Scalars may refer to the previous table of components. */
     if (filled->changed & INSITU_CHANGED_VALUES || filled->components) session_spoil_scalars(mesh, index);
     return INSITU_OK;
 }

@@ -4,22 +4,23 @@
 
 #include "session_mesh.h"
 
-/* Implements insitu_set_field(), if block is SESSION_WHOLE, or insitu_set_block_field(). *error is cleared first.
- * Local. */
+/* Implements insitu_set_field(), if block is SESSION_WHOLE, and otherwise insitu_set_block_field(). *error is cleared
+ * first. Local. */
 insitu_status session_set_field(session_meshes *meshes, const char *name, int64_t block, const insitu_field *field,
                                 base_error *error);
 
-/* Checks and stores a field's description after its fill function has set its values. The error names the mesh and the
- * field. Local. */
+/* Checks and stores a field's description after its fill function has set its values. The error message names the mesh
+ * and the field. Local. */
 insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
 
 /* Marks the field's scalars as stale, because its values have changed. */
 void session_spoil_scalars(session_mesh *mesh, int field);
 
-/* Returns the number of entries of connectivity that are vertices of cells. The cells must not be polyhedra. */
+/* Returns the number of those entries of the connectivity that are vertices of cells. The mesh must not have
+ * polyhedra. */
 int64_t session_corner_count(const insitu_mesh *mesh);
-/* Returns the number of the field's values, or, if it has an index, of the index's entries. For corners in rows it is
- * the minimum. */
+/* Returns the number of the field's values or, if it has an index, of the index's entries. For corners in rows it is
+ * the smallest allowed number. */
 int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field);
 
 #endif

@@ -28,7 +28,8 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* Calls the field's fill function once per step. If it has failed, its error is returned to all users of the field. */
+/* Calls the field's fill function, unless it was called in this step. If it has failed, its error is returned every
+ * time the field is needed. */
 static insitu_status fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];
@@ -80,7 +81,8 @@ void session_forget_filled(const session_meshes *meshes)
             field->given.values.data = field->given.index.data = NULL;
             field->values.data = NULL;
             field->given.patch_count = 0;
-            field->given.patches = NULL; /* the last step's tables are the field's own */
+            /* the tables of the last step are owned by the field, and must not be passed as the caller's */
+            field->given.patches = NULL;
             field->given.components = NULL;
         }
 }

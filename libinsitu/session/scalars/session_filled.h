@@ -1,17 +1,17 @@
-/* Fields whose values are computed by a fill function of the caller, in the steps that need them. */
+/* Fields whose values are computed by a fill function of the caller, in those steps that need them. */
 #ifndef SESSION_FILLED_H
 #define SESSION_FILLED_H
 
 #include "session_catalogue.h"
 #include "session_mesh.h"
 
-/* Calls the fill functions of the fields that are wanted, or, if of_images, of those whose scalars are in use, unless
- * they were called in this step. All are called, even if some fail, in the same order on all ranks; the first error is
+/* Calls the fill functions of the fields that statistics need or, if of_images, of those whose scalars are used, unless
+ * they were called in this step. All are called, even if some fail, in the same order on all ranks. The first error is
  * returned. Local, but fill functions may communicate. */
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 
-/* Ends the step: the session no longer reads the filled arrays. */
+/* Ends the step. Afterwards the session does not read the filled arrays any more. */
 void session_forget_filled(const session_meshes *meshes);
 
 #endif

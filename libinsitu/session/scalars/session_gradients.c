@@ -1,23 +1,24 @@
-/* Every corner of a cell contributes the gradient of the linear function through the value at the corner and those at
- * the other ends of its three edges. A pyramid's apex has four edges, and contributes a gradient for each three of
- * them. A corner of a polyhedron's face contributes one by its two edges there and the line to the cell's centre, which
- * has the mean of the vertices' positions and values. At a corner of a shell the gradient is computed from its two
- * edges and the normal, along which the field is taken as constant. So a linear field has its own gradient everywhere,
- * and vertices on a boundary get theirs from the cells on one side.
+/* Every corner of a cell contributes the gradient of the linear function that interpolates the value at the corner and
+ * the values at the other ends of its three edges. The apex of a pyramid has four edges, and contributes one gradient
+ * for each three of them. A corner of a polyhedron's face contributes one, which is computed from its two edges there
+ * and the line to the cell's centre, where the mean of the vertices' values is assumed. At a corner of a shell the
+ * gradient is computed from its two edges and the normal, along which the field is assumed to be constant. So a linear
+ * field has its exact gradient everywhere, and vertices on a boundary obtain theirs from the cells on one side.
  *
- * A corner's weight is its determinant over the fourth power of its edges' length l = sqrt(|a|² + |b|² + |c|²). The
- * ratio of the determinant to l³ distinguishes a good shape from a sliver, whose weight is almost 0; the factor 1 / l
- * gives small cells more weight, whose gradients belong to nearer positions. In a mesh whose cells double their size at
- * a vertex the errors of first order cancel. Weight times gradient is a sum of cross products: there is no division by
- * a determinant.
+ * The weight of a corner is its determinant divided by the fourth power of the length l = sqrt(|a|² + |b|² + |c|²) of
+ * its edges. The ratio of the determinant to l³ distinguishes a well-shaped corner from a sliver, whose weight is
+ * almost 0. The factor 1 / l gives small cells more weight, since their gradients belong to nearer positions: in a mesh
+ * whose cells double their size at a vertex, the errors of first order cancel. The product of weight and gradient is a
+ * sum of cross products, so that no division by a determinant is needed.
  *
  * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed. So the
- * result does not depend on the order of cells, of their vertices, or of ranks. The unit follows from bounds that all
- * ranks share: with R the largest rise along an edge and l the least length of a corner, no weight exceeds 3^-1.5 / l,
- * and no weighted gradient exceeds R / l²: a cross product of two edges is at most half of the sum of their squares, so
- * that three, times rises of at most R, sum to R l². The last bit is 2^-86 of the bound, so that fields that change
- * little from vertex to vertex keep the precision of doubles. Corners shorter than 2^-32 of the scene do not count,
- * since a unit for them would be too coarse for all others. A sum can hold 2^19 corners at one vertex. */
+ * result does not depend on the order of cells, of their vertices, or of ranks. The unit of the integers follows from
+ * bounds that are the same on all ranks. Let R be the largest difference of values along an edge and l the least length
+ * of a corner. Then no weight exceeds 3^-1.5 / l, and no weighted gradient exceeds R / l²: a cross product of two edges
+ * is at most half of the sum of their squares, so that three of them, times differences of at most R, sum to at most R
+ * l². The last bit is 2^-86 of the bound, so that fields that change little from vertex to vertex keep the precision of
+ * doubles. Corners shorter than 2^-32 of the scene are ignored, since a unit for them would be too coarse for all
+ * others. A sum can contain 2^19 corners at one vertex. */
 #include "session_gradients.h"
 
 #include <omp.h>
@@ -29,11 +30,10 @@
 #include "vector3.h"
 
 enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
-#define LOW_UNIT 0x1p44      /* units of a low word in the last bit of a high word */
-#define LEAST_SQUARE 0x1p-64 /* least sum of the squares of a corner's edges, in units of length */
+#define LOW_UNIT 0x1p44      /* number of units of a low word that make one unit of a high word */
+#define LEAST_SQUARE 0x1p-64 /* least sum of the squares of a corner's edges, in units of length squared */
 #define ROUNDING_SHIFT                                                                                                 \
-    0x1.8p52 /* added to a number below 2^51, it leaves the nearest whole number in the last bits                      \
-              */
+    0x1.8p52 /* when this is added to a number below 2^51, the last bits of the result contain the nearest integer */
 
 typedef struct node {
     double at[3], values[SESSION_GRADIENTS];
@@ -44,21 +44,21 @@ typedef struct node {
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* The receiver of corners: it sums them, or, if sums is NULL, computes their bounds. */
+/* Where the contributions of corners are added: to sums or, if sums is NULL, to their bounds. */
 typedef struct target {
     const session_gradient_basis *basis;
     int64_t *sums;
-    unsigned char *owners; /* the thread that adds to each sum; NULL: there is one thread */
-    unsigned char owner;   /* this thread's */
-    double scale;          /* factor for coordinates, a power of two */
+    unsigned char *owners; /* the thread that adds to each sum; NULL: there is only one thread */
+    unsigned char owner;   /* number of this thread in `owners` */
+    double scale;          /* factor by which coordinates are multiplied, a power of two */
     number_pair units[MOST_NUMBERS / 2];
     session_gradient_bounds bounds;
 } target;
 
 /* ---- integers ------------------------------------------------------------------------------------------------ */
 
-/* Returns the power of two that scales numbers up to largest to HIGH_BITS bits; 0, which makes all of them 0, if there
- * is none. */
+/* Returns the power of two with which numbers up to `largest` are scaled to HIGH_BITS bits. If there is none it returns
+ * 0, so that all scaled numbers are 0. */
 static double unit_of(double largest)
 {
     int exponent = 0;
@@ -90,7 +90,7 @@ static void add_shared(int64_t *to, word_pair words)
     }
 }
 
-/* Adds numbers, two at a time, to a sum's words. */
+/* Adds numbers to the words of a sum, two numbers at a time. */
 static inline __attribute__((always_inline)) void add_numbers(const target *to, int32_t entry,
                                                               const number_pair *numbers, int pairs)
 {
@@ -147,8 +147,9 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
     if (1 / squares > to->bounds.sharpness) to->bounds.sharpness = 1 / squares;
 }
 
-/* Adds a corner, from its three sorted edges and the rises of the fields along them. A mirrored order of the edges'
- * ends changes the signs of both the sum and the determinant. */
+/* Adds the contribution of a corner, given by its three sorted edges and the differences of the fields along them. If
+ * the order of the edges is mirrored, the signs of both the sum and the determinant change, so that the gradient
+ * remains the same. */
 static inline __attribute__((always_inline)) void give_edges(target *to, int64_t vertex, const double edge[3][3],
                                                              const double rise[3][SESSION_GRADIENTS], int field_count)
 {
@@ -192,7 +193,8 @@ static inline __attribute__((always_inline)) void give_corner(target *to, const 
     give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
 }
 
-/* Adds a corner of a shell: the third edge is the normal, of the others' length and either sign. */
+/* Adds the contribution of a corner of a shell. The third edge is the normal, with the length of the other edges and
+ * with either sign. */
 static void give_shell_corner(target *to, const node *corner, const node *p, const node *q)
 {
     const int field_count = to->basis->field_count;
@@ -209,7 +211,7 @@ static void give_shell_corner(target *to, const node *corner, const node *p, con
     give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
 }
 
-/* Reads a vertex, with its position in units of `length`; returns false if a value is not finite. */
+/* Reads a vertex's position, multiplied by `scale`, and its values. Returns false if a value is not finite. */
 static inline __attribute__((always_inline)) bool take_node(const session_gradient_basis *basis, int64_t vertex,
                                                             double scale, int field_count, node *out)
 {
@@ -220,7 +222,8 @@ static inline __attribute__((always_inline)) bool take_node(const session_gradie
     return isfinite(sum);
 }
 
-/* Corners of cells with a fixed number of vertices: the corner, and the ends of its three edges. */
+/* Corners of cells with a fixed number of vertices: the vertex of the corner, followed by the other ends of its three
+ * edges. */
 static const signed char tet_corners[][4] = {{0, 1, 2, 3}, {1, 0, 2, 3}, {2, 0, 1, 3}, {3, 0, 1, 2}};
 static const signed char hex_corners[][4] = {{0, 1, 3, 4}, {1, 0, 2, 5}, {2, 1, 3, 6}, {3, 0, 2, 7},
                                              {4, 5, 7, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 4, 6, 3}};
@@ -257,7 +260,7 @@ static inline __attribute__((always_inline)) void give_typed(target *to, int64_t
     }
 }
 
-/* Adds the corners of a cell of a type with a fixed number of vertices. */
+/* Adds the contributions of all corners of a cell that has a fixed number of vertices. */
 static void give_solid(target *to, int64_t cell, int type)
 {
     switch (to->basis->field_count) {
@@ -299,7 +302,8 @@ static bool add_node(node_list *list, target *to, int64_t vertex)
     return take_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
 }
 
-/* Lists the vertices of the cell in its own order. Returns false if a value is not finite, or memory ran out. */
+/* Lists the vertices of the cell in the order in which the cell has them. Returns false if a value is not finite, or if
+ * memory runs out. */
 static bool list_nodes(node_list *list, target *to, int64_t cell)
 {
     grid_walk walk = grid_walk_cell(to->basis->cells, cell);
@@ -310,7 +314,7 @@ static bool list_nodes(node_list *list, target *to, int64_t cell)
     return list->count > 0;
 }
 
-/* Returns the mean of the vertices, each counted once, summed in the order of coordinates. */
+/* Returns the mean of the vertices, each counted once. They are summed in the order of their coordinates. */
 static node centre_of(node_list *list, int field_count)
 {
     node centre = {.vertex = -1};
@@ -338,7 +342,7 @@ static void give_polyhedron(target *to, int64_t cell, node_list *list)
         grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &until);
         const int64_t count = until - from;
         for (int64_t n = 0; n < count; n++) {
-            node nodes[3]; /* the vertex before the corner, the corner, and the vertex behind it */
+            node nodes[3]; /* the vertex before the corner, the corner itself, and the vertex after it */
             for (int k = 0; k < 3; k++)
                 take_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
                           basis->field_count, &nodes[k]);
@@ -376,8 +380,8 @@ static bool has_entry(const session_gradient_basis *basis, int64_t cell)
     return false;
 }
 
-/* Lists the cells that have a vertex with a sum. Cells are counted first, so that no list grows while threads fill
- * it. */
+/* Lists the cells that have a vertex with a sum. Cells are counted first, so that the list does not grow while threads
+ * fill it. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };
@@ -435,8 +439,8 @@ static void give_any(target *to, int64_t cell, node_list *room)
 
 enum { NO_OWNER = 254, SHARED = 255 };
 
-/* Records that the thread adds to the sums of the cell's vertices. If no other thread does, the additions need not be
- * atomic. */
+/* Records that this thread adds to the sums of the cell's vertices. If no other thread adds to a sum, the additions
+ * need not be atomic. */
 static void own_sums(const target *to, int64_t cell)
 {
     const session_gradient_basis *basis = to->basis;
@@ -453,7 +457,7 @@ static void own_sums(const target *to, int64_t cell)
     }
 }
 
-/* Adds the corners of all cells. Both loops distribute the cells among the threads in the same way. */
+/* Adds the contributions of all cells. Both loops distribute the cells among the threads in the same way. */
 static bool give_all(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
     const int threads = session_region_threads(like->basis->threads, list->count);
@@ -492,7 +496,7 @@ unsigned char *session_sum_owners(int64_t sum_count, int threads)
 {
     const size_t count = threads > 1 ? (size_t)sum_count : 0;
     unsigned char *owners = base_alloc(count + 1);
-    /* More threads than an owner's byte can tell apart share all sums. */
+    /* If there are more threads than a byte can distinguish, all sums are treated as shared. */
     if (owners) memset(owners, threads < NO_OWNER ? NO_OWNER : SHARED, count);
     return owners;
 }

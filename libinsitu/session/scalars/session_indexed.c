@@ -1,6 +1,6 @@
-/* Values with an index are copied once into the order of the vertices, cells or corners; values at the vertices of a
- * torn mesh are copied into the order of its corners. Otherwise every tree and layer would follow the index at each
- * vertex of a cell, and kernels that process many cells at once could not be used. */
+/* Values that have an index are copied once into the order of the vertices, cells or corners, and values at the
+ * vertices of a torn mesh into the order of its corners. Otherwise every tree and layer would have to read the index at
+ * each vertex of a cell, and vectorized code could not be used. */
 #include "session_indexed.h"
 
 #include <string.h>
@@ -22,12 +22,14 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 }
 
 typedef struct indexed_values {
-    const session_torn *torn; /* where the places are its corners, and values are at vertices */
-    grid_array index;         /* no index: places have the tuples of their numbers */
+    /* set if the positions are the corners of a torn mesh, and the values are at vertices; otherwise NULL */
+    const session_torn *torn;
+    /* without data if there is no index; each position then has the tuple with its own number */
+    grid_array index;
     grid_field values;
-    int64_t row, used;     /* places in a row, and how many of them are read */
-    int64_t count, places; /* tuples, and those that have them */
-    bool is_plain;         /* values are copied as they are, else as doubles */
+    int64_t row, used;     /* number of positions in a row, and how many of them are read */
+    int64_t count, places; /* number of tuples, and number of positions that have a tuple */
+    bool is_plain;         /* set if values are copied in their own type; otherwise they are converted to double */
 } indexed_values;
 
 static indexed_values values_of(const session_mesh *mesh, const session_field *field)
@@ -53,14 +55,15 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
     return out;
 }
 
-/* Returns the entry in the caller's arrays for a place: the number of the vertex, the cell, or the corner. */
+/* Returns the index in the caller's arrays of the value at a position: the number of the vertex, the cell, or the
+ * corner. */
 static int64_t entry_of(const indexed_values *v, int64_t place)
 {
     if (v->torn) return session_torn_origin(v->torn, place);
     return v->row == v->used ? place : place / v->used * v->row + place % v->used;
 }
 
-/* Copies one tuple; returns false if the index is out of range. */
+/* Copies one tuple. Returns false if the index is out of range. */
 static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
 {
     const int64_t entry = entry_of(v, place);
@@ -117,7 +120,8 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     return INSITU_OK;
 }
 
-/* Updates the copy if it is stale. Scalars with values averaged from cells use the cells' values too. */
+/* Updates the copy of a field's values if it is stale. If it is used for recentred scalars, the cells' own values are
+ * updated too. */
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];

@@ -1,13 +1,15 @@
-/* Keys by which equal vertices are recognized. */
+/* Computes keys by which equal vertices are recognized. */
 #ifndef SESSION_NEIGHBOURS_H
 #define SESSION_NEIGHBOURS_H
 
 #include "session_exchange.h"
 #include "session_mesh.h"
 
-/* Returns a vertex's global id, or the bits of its coordinates, with -0 as +0. */
+/* Returns a vertex's key: its global id if by_id, and otherwise the bits of its coordinates, where -0 is replaced by
+ * +0. */
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
-/* As above, for a vertex by the caller's number; a torn mesh has it at several corners. */
+/* Returns the key of a vertex that is given by the caller's number. In a torn mesh several corners have the same
+ * vertex, so that this number differs from the mesh's own. */
 session_key session_given_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
 
 #endif

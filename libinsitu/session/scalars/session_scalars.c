@@ -27,7 +27,8 @@ static uint64_t joined_on(const session_mesh *mesh, const scene_field *field)
     return mesh->apart ? mesh->apart : field->joined;
 }
 
-/* Finds a scalar of the mesh. joined: hash of the meshes, for recentred scalars. */
+/* Returns the scalar of the mesh with these properties; NULL if there is none. joined is the hash of the meshes over
+ * which a recentred scalar is computed. */
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
                                    uint64_t joined)
 {
@@ -46,7 +47,7 @@ session_scalar *session_find_recentred(const session_mesh *mesh, const char *fie
     return index < 0 ? NULL : find_scalar(mesh, index, component, true, joined);
 }
 
-/* Returns the field's index on the mesh; -1 if the layer does not show it there. */
+/* Returns the field's index on the mesh; -1 if the layer is not drawn on the mesh or the mesh lacks the field. */
 static int find_field(const session_mesh *mesh, const scene_field *field)
 {
     return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
@@ -92,7 +93,7 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
                       .is_cell_centred = field->given.centring == INSITU_CELL};
     if (!session_is_copied(mesh, field)) {
         if (!field->apart) return out;
-        out.component_stride = 0; /* the component has been chosen */
+        out.component_stride = 0; /* the array contains only the chosen component */
         if (component >= 0)
             out.values = field->apart[component];
         else
@@ -169,7 +170,8 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-/* Returns whether the extent includes shells; for distances from planes it does not, as planes do not cut shells. */
+/* Returns whether the extent includes shells. For distances from planes it does not, because planes do not cut
+ * shells. */
 static bool has_shells(const session_scalar *scalar, session_extent_kind kind)
 {
     return kind != SESSION_SOLID && !scalar->distances;

@@ -14,7 +14,8 @@ void session_curl(const double g[3][3], double out[3])
     out[2] = g[1][0] - g[0][1];
 }
 
-/* Uses that the difference of the squares is minus half of the trace of the gradient's square. */
+/* The difference between the squares of the rotation rate and the strain rate equals minus the trace of the square of
+ * the gradient, so that only its products of entries are summed. */
 double session_q_criterion(const double g[3][3])
 {
     const double squares = (g[0][0] * g[0][0] + g[1][1] * g[1][1]) + g[2][2] * g[2][2];
@@ -28,8 +29,8 @@ double session_strain_rate(const double g[3][3])
     return sqrt(2 * squares + ((xy * xy + xz * xz) + yz * yz));
 }
 
-/* Returns the middle eigenvalue of a symmetric matrix by its characteristic polynomial (Smith 1961), with entries xx,
- * yy, zz, xy, xz, yz. */
+/* Returns the middle eigenvalue of a symmetric matrix with the entries xx, yy, zz, xy, xz, yz. It is computed from the
+ * characteristic polynomial (Smith 1961). */
 static double middle_eigenvalue(const double m[6])
 {
     const double mean = ((m[0] + m[1]) + m[2]) / 3, x = m[0] - mean, y = m[1] - mean, z = m[2] - mean;
@@ -39,14 +40,15 @@ static double middle_eigenvalue(const double m[6])
     const double a = x / size, b = y / size, c = z / size, d = m[3] / size, e = m[4] / size, f = m[5] / size;
     const double half = 0.5 * ((a * (b * c - f * f) - d * (d * c - f * e)) + e * (d * f - b * e));
     const double third = 2 * acos(-1.0) / 3;
-    const double angle = acos(fmin(fmax(half, -1), 1)) / 3; /* 0 .. 60 degrees: the angle of the largest eigenvalue */
+    /* the angle that belongs to the largest eigenvalue, between 0 and 60 degrees */
+    const double angle = acos(fmin(fmax(half, -1), 1)) / 3;
     return mean + 2 * size * cos(angle - third);
 }
 
 double session_lambda2(const double g[3][3])
 {
-    /* S² + W², with S and W the halves of the sum and the difference of G and its transpose, is half of the sum of G²
-     * and its transpose. */
+    /* S² + W², where S and W are the symmetric and the antisymmetric part of G, is half of the sum of G² and its
+     * transpose. */
     double square[3][3], m[6];
     static const int entries[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
     for (int i = 0; i < 3; i++)

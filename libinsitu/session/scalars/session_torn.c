@@ -56,8 +56,8 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-/* Copies coordinates, packed, in their own type. Entries of connectivity that no cell uses may not be vertices; they
- * get the first one's position. */
+/* Copies the coordinates of the corners without gaps, in their own type. Entries of the connectivity that no cell uses
+ * may not be valid vertices; they get the position of the first entry. */
 static bool copy_coordinates(const grid *shared, int threads, session_torn *torn)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -104,7 +104,7 @@ static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
     return INSITU_OK;
 }
 
-/* Drops arrays that were computed for other vertices. */
+/* Frees arrays that were computed for other vertices. */
 static void forget_vertices(session_meshes *meshes, session_mesh *mesh)
 {
     mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;

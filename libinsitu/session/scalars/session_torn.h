@@ -1,10 +1,11 @@
-/* Torn meshes, in which every cell has its own vertices, for fields with a value at each corner of each cell.
+/* Torn meshes, in which every cell has its own vertices. They are used for fields with a value at each corner of each
+ * cell.
  *
  * All other code finds values by the number of a vertex. So a mesh with a field at corners is read as one in which
- * every corner is a vertex: its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, ....
- * Everything of the mesh is drawn in this form, so that layers of fields at corners, vertices and cells fit together.
- * Code that must know which vertices are the same (means at vertices, outer faces) compares ids or coordinates anyway,
- * across ranks, and so works across corners too. */
+ * every corner is a vertex: its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, .... All
+ * layers of the mesh are drawn in this form, so that fields at corners, vertices and cells can be combined. Code that
+ * must find equal vertices (for means at vertices, or for outer faces) compares ids or coordinates across ranks anyway,
+ * and so works for corners too. */
 #ifndef SESSION_TORN_H
 #define SESSION_TORN_H
 
@@ -13,12 +14,12 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Tears the meshes with a corner field that the scene uses, unless they are already torn with the current coordinates;
- * restores the others. Cells must have been checked. Collective. */
+/* Tears the meshes that have a corner field used by the scene, unless they are already torn with the current
+ * coordinates, and restores the others. Cells must have been checked. Collective. */
 insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                   const session_team *team, base_error *error);
 
-/* Returns the caller's vertex at a corner of a torn mesh. */
+/* Returns the caller's number of the vertex at a corner of a torn mesh. */
 int64_t session_torn_origin(const session_torn *torn, int64_t corner);
 
 #endif
