@@ -73,7 +73,7 @@ struct render_occluders {
     const kernel_table *kernels;
     render_job job; /* the job that the caller gave */
     render_job surfaces;
-    kernel_frame frame; /* constants of a frame with the job's surfaces only */
+    kernel_frame frame; /* constants of a frame whose job contains only the surfaces of the given job */
     kernel_occluders trees;
     int threads;
 };

@@ -103,7 +103,7 @@ SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertic
     return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
 }
 
-/* Stores the vertex indices of a lattice's cell in out[0], out[room], out[2 * room] and so on. */
+/* Stores the vertex indices of a lattice's cell. Vertex i of the cell is stored in out[i * room]. */
 static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const int64_t first = grid_lattice_first(l, cell);
@@ -141,8 +141,8 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
             for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex[i][n] * p->asked[k].stride);
 }
 
-/* Stores a cell's vertex indices in out[0], out[room], out[2 * room] and so on, and prefetches the coordinates and
- * values of these vertices. */
+/* Stores a cell's vertex indices, that of vertex i in out[i * room], and prefetches the coordinates and values of these
+ * vertices. */
 SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const grid_array c = p->cells->connectivity;
@@ -186,8 +186,8 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* ---- numbers ---- */
 
-/* Computes the vertices' coordinates along one axis of a rectilinear lattice, by the position of each vertex on that
- * axis (the version in lanes of grid_index_along()). */
+/* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
+ * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
 static void kernel_axis_take(const grid_axis *axis, vi vertex, kernel_whole *out)
 {
     const grid_numbering *of = axis->vertices;
@@ -319,14 +319,14 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
     return (kernel_level){value, middle, (float)(value - (double)middle), kernel_not_below(value)};
 }
 
-/* Returns the lanes in which v is below the level; the comparison is exact. */
+/* Returns the lanes in which the number v is below the level. The comparison is exact. */
 SIMD_INLINE vm kernel_taken_below(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
 {
     const kernel_whole value = kernel_whole_set(level->value);
     return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : kernel_whole_lt(&v->wide, &value);
 }
 
-/* Returns v minus the level, rounded to float32. */
+/* Returns the number v minus the level, rounded to float32. */
 SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
 {
     vf out;

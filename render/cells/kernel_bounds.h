@@ -27,7 +27,8 @@
  * coordinates. */
 typedef struct kernel_contractions {
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
-    /* K / (1 - K), where K is the contraction's constant; infinite if the iteration is not a contraction */
+    /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
+     * iteration is not a contraction */
     float grow[SIMD_WIDTH];
     float blur[SIMD_WIDTH], rim[SIMD_WIDTH];
 } kernel_contractions;
@@ -37,17 +38,18 @@ typedef struct kernel_bounds {
     /* Upper bound of the difference between a face's value and the field on the ray next to it. It is negative if the
      * field is not known to be monotone along the rays. */
     float jump[SIMD_WIDTH];
-    /* L at vertex 0, its gradient in tile space, and the bound of |E| including rounding; the bound is infinite if
-     * nothing is proved about the cell. */
+    /* The linear function L that approximates the field: its value at vertex 0, its gradient in tile space, and the
+     * bound of |E| = |field - L| including rounding. The bound is infinite if nothing is proved about the cell. */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
-    /* J0^-1, the inverse Jacobian at the centre. The cell lies between pairs of planes: low <= normal . (X - vertex 0)
-     * <= high. */
+    /* Inverse of the map's Jacobian at the cell's centre. The cell lies between pairs of planes: low <= normal . (X -
+     * vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    float bent[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the map's nonlinear part N */
-    /* bounds L and G of kernel_roots.h: of the stretch of reference coordinates, and of the field's gradient */
+    float bent[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
+    /* upper bounds from kernel_roots.h: L, by which reference coordinates are stretched, and G, of the field's
+     * gradient */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
-    /* bounds H and K of kernel_roots.h, of second derivatives of the field and the map; for a pyramid they are
-     * multiplied by its coordinate k */
+    /* upper bounds H and K from kernel_roots.h, of the second derivatives of the field and the map; for a pyramid they
+     * are multiplied by its coordinate k */
     float curve[SIMD_WIDTH], twist[SIMD_WIDTH];
     kernel_contractions contractions;
 } kernel_bounds;
@@ -60,8 +62,8 @@ typedef struct kernel_bounds_lanes {
     kernel_half_mask is_solid;
 } kernel_bounds_lanes;
 
-/* Tells which different derivatives there are at the corners of a reference domain (kernel_domain_of()), for each of
- * the three axes: their number (slope_count), the corner at which each is first met, and which one each corner has. For
+/* Lists which derivatives of a map are different at the corners of a reference domain (kernel_domain_of()), for each of
+ * the three axes: their number (slope_count), the corner at which each occurs first, and which one each corner has. For
  * a hex a derivative depends on the two other coordinates. For a wedge it depends on the last coordinate alone, or
  * along the last axis on the two others. For a pyramid it depends on the same coordinate alone. */
 typedef struct kernel_slope_table {
@@ -112,8 +114,8 @@ SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int 
     return kernel_is_box(type) ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
 }
 
-/* Returns the difference between the derivatives along axis a at r and at the domain's centre, of a polynomial whose
- * coefficients 4 to 7 are `bent`. */
+/* Returns the difference between the derivative along axis a at the reference coordinates r and that at the domain's
+ * centre, for a polynomial whose coefficients 4 to 7 are `bent`. */
 SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -146,8 +148,8 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
     }
 }
 
-/* Multiplies the map's nonlinear coefficients by the inverse of its Jacobian at the centre, which gives the
- * coefficients of N (kernel_roots.h). */
+/* Multiplies the map's nonlinear coefficients by the inverse of its Jacobian at the centre. The result is the
+ * coefficients of the map's nonlinear part N in reference coordinates (kernel_roots.h). */
 SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -180,8 +182,8 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
     }
 }
 
-/* Computes L's gradient, rounded to float32, and the coefficients of E. *size is a scale for the rounding of L at
- * positions in the cell. */
+/* Computes the gradient of the linear function L that approximates the field, rounded to float32, and the coefficients
+ * of the difference E = field - L. *size is a scale for the rounding of L at positions in the cell. */
 SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_half gradient[3],
                                             kernel_half e[8], kernel_half *size)
 {
@@ -218,8 +220,8 @@ SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
     return kernel_half_sqrt(most);
 }
 
-/* Computes the gradients of the field and of E, and the deviation of N's derivative from that at the centre, at all
- * corners. */
+/* Computes, at all corners, the gradients of the field and of E = field - L, and the difference between the derivative
+ * of the map's nonlinear part N and that at the centre. */
 SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_half e[8],
                                             kernel_lanes_slopes *out)
 {
@@ -238,7 +240,8 @@ SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int ty
 /* Maxima of several norms over the corners of the domain. */
 typedef struct kernel_lanes_most {
     kernel_half bend; /* upper bound of the 8th power of the matrix norm of N's derivative */
-    /* squares of maxima: of |grad F|, of grad E . w, of |grad E|, and of |N' w|, as kernel_half_bounds() uses them */
+    /* squares of maxima over the corners: of |grad F|, of grad E . w, of |grad E|, and of |N' w|, where F is the field,
+     * E = F - L, N the map's nonlinear part and w a ray's direction in reference coordinates */
     kernel_half df, along, steep, bent;
 } kernel_lanes_most;
 
@@ -299,8 +302,8 @@ SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_hal
     memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
 }
 
-/* Computes the two planes, perpendicular to row i of J0^-1, between which all vertices lie, moved outward by `pad`, the
- * error of a ray's positions. */
+/* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices
+ * lie. They are moved outward by `pad`, the error of a ray's positions. */
 SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int i, kernel_half pad, int half,
                                     kernel_bounds *out)
 {
@@ -329,9 +332,10 @@ SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_h
 
 /* Results of kernel_half_bounds() that kernel_half_rate() and the contraction need. */
 typedef struct kernel_half_rates {
-    /* rounding of positions across the rays; gradient of L; coefficients of E */
+    /* rounding error of positions across the rays; gradient of the linear function L; coefficients of E = F - L */
     kernel_half across, gradient[3], e[8];
-    kernel_half gap, slope, theta, slant, rise, w; /* other bounds of kernel_half_bounds(); w: the maximum of |w| */
+    /* bounds that kernel_half_bounds() explains; w is the maximum of |J0^-1 d| over the rays' directions d */
+    kernel_half gap, slope, theta, slant, rise, w;
     kernel_half_mask is_regular;
 } kernel_half_rates;
 
@@ -485,7 +489,7 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     const kernel_half_mask rises = is_regular & (kernel_half_mask)(rise * 0.9999 > least);
     const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
     kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
-    /* L at vertex 0, and the half thickness of the slab |L| <= thickness that contains the isosurface. */
+    /* the linear function L at vertex 0, and half the thickness of the slab |L| <= thickness around the isosurface */
     const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
     e[0] -= level;
     const kernel_half thickness = kernel_half_error(type, e) + 1e-5 + 16 * 6e-8 * size;

@@ -70,7 +70,8 @@ typedef struct kernel_spot {
     float x, y, z;
 } kernel_spot;
 
-/* Returns N of the error bound above: a measure of the vertex's size in the tile's projection. */
+/* Returns the measure N of a vertex's size in the tile's projection, from which the error bounds of edge functions are
+ * computed. */
 SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *tile, kernel_spot a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
@@ -109,8 +110,8 @@ SIMD_INLINE kernel_blur kernel_line_blur(const kernel_line *l, float radius, ker
                          z + 0.25f * (x + y)};
 }
 
-/* Returns the least sum of weights A that is accurate enough for a triangle, from the sums of its edges' errors and
- * extents. Along any axis the edges' extents sum to twice the triangle's extent, hence the factor 1/2. */
+/* Returns the least sum of weights that is accurate enough for a triangle, computed from the sums of its edges' errors
+ * and extents. Along any axis the edges' extents sum to twice the triangle's extent, hence the factor 1/2. */
 SIMD_INLINE float kernel_least_weight(float errors, float extents)
 {
     return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
@@ -311,7 +312,7 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
  * does not matter here. */
 SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
-    /* maps a hex's vertex number to the bits of its coordinates x, y, z, and back */
+    /* maps a hex's vertex number to the bits of its reference coordinates x, y, z, and back */
     static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     const int begins = kernel_has_apex(c->type) ? 4 : c->count;
     int least = 0, swap;
@@ -320,7 +321,7 @@ SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_V
     if (kernel_is_box(c->type)) {
         int axes[3] = {1, 2, 4};
         for (int k = 0; k < 3; k++) {
-            const int at = k == 1; /* sorting network of three: compares axes 0 and 1, 1 and 2, 0 and 1 */
+            const int at = k == 1; /* compares the axes 0 and 1, 1 and 2, 0 and 1, which sorts three of them */
             if (kernel_rank_before(c, corner[corner[least] ^ axes[at + 1]], corner[corner[least] ^ axes[at]]))
                 swap = axes[at], axes[at] = axes[at + 1], axes[at + 1] = swap;
         }

@@ -86,7 +86,7 @@ SIMD_INLINE void kernel_double_take(kernel_half_mask m, const kernel_double_end 
     to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
-/* Results for a packet, computed in two halves. */
+/* Results of kernel_exact.h for a packet of rays, stored in two halves of the lanes because they are in double. */
 typedef struct kernel_double_lanes {
     float is_sound[SIMD_WIDTH], length[SIMD_WIDTH], v_in[SIMD_WIDTH], rest_in[SIMD_WIDTH], v_out[SIMD_WIDTH],
         rest_out[SIMD_WIDTH];
@@ -170,7 +170,8 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
     kernel_polynomial_fit(m->field, c->type, d[3]);
 }
 
-/* Returns the product m of kernel_map.h at r, and its derivatives. */
+/* Returns the bilinear product m, a term of the cell's map (kernel_map.h), at the reference coordinates r, and its
+ * derivatives. */
 static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
 {
     slopes[0] = r[1];

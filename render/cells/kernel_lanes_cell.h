@@ -51,8 +51,8 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_whole *values, int count, co
     }
 }
 
-/* Returns N of kernel_cell.h for one vertex per lane in tile space: a measure of the vertex's size in the tile's
- * projection. */
+/* Returns, for one vertex per lane in tile space, the measure of its size in the tile's projection (N in
+ * kernel_cell.h). */
 SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
 {
     vf depth = vf_set(1);
@@ -60,7 +60,7 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* Returns the error bound of the edge function between vertices with the sizes N (kernel_lanes_size()). */
+/* Returns the error bound of the edge function between two vertices whose sizes are given (kernel_lanes_size()). */
 SIMD_INLINE vf kernel_lanes_doubt(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);

@@ -30,21 +30,24 @@
 
 enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
-/* Squares of the largest norm of n's derivative: 0.78, and 0.89 for callers that bound the error of r themselves. */
+/* Squares of the largest norm of the derivative of the map's nonlinear part: 0.78, and 0.89 for callers that bound the
+ * error of the reference coordinates themselves. */
 #define KERNEL_LOCAL_BENT 0.6f
 #define KERNEL_LOCAL_BENT_MOST 0.8f
 
-/* One cell per lane. `field` has the field's value at the middle, its derivatives along r, and the coefficients of its
- * nonlinear terms. */
+/* The maps of one cell per lane. `field` has the field's value at the middle, its derivatives along the reference
+ * coordinates, and the coefficients of its nonlinear terms. */
 typedef struct kernel_local_cells {
-    /* y = inverse (X - origin) + offset */
+    /* affine approximation y of the reference coordinates of a position X: y = inverse (X - origin) + offset */
     float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
     float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
     float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
-    float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH]; /* bounds of y over all points inside the cell */
+    /* bounds, over all points inside the cell, of the affine approximation y of the reference coordinates */
+    float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     /* square of an upper bound of the Frobenius norm of n's derivative */
     float bend[SIMD_WIDTH];
-    float blur[SIMD_WIDTH]; /* error bound of r: a point closer to the border may be on either side of it */
+    /* error bound of the reference coordinates: a point closer to the cell's border may be on either side of it */
+    float blur[SIMD_WIDTH];
 } kernel_local_cells;
 
 SIMD_INLINE int kernel_bent_terms(int type)
@@ -52,8 +55,9 @@ SIMD_INLINE int kernel_bent_terms(int type)
     return kernel_is_box(type) ? 4 : kernel_is_prism(type) ? 2 : kernel_has_apex(type) ? 1 : 0;
 }
 
-/* Computes the coefficients of the field or a coordinate from its values at a hex's vertices: the value at the middle,
- * the linear terms along r, and the nonlinear terms. The functions below do the same for other types. */
+/* Computes the coefficients of the field or of a coordinate from its values at a hex's vertices: the value at the
+ * middle, the linear terms in the reference coordinates, and the nonlinear terms. The functions below do the same for
+ * other types. */
 SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
 {
     const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
@@ -109,7 +113,7 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
         kernel_tet_terms(v, out);
 }
 
-/* The nonlinear terms at r, and their derivatives along each component of r. */
+/* The nonlinear terms of a cell's map at given reference coordinates, and their derivatives along each of these. */
 typedef struct kernel_bend {
     vf term[KERNEL_BENT_TERMS], along[KERNEL_BENT_TERMS][3];
 } kernel_bend;
@@ -187,7 +191,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
 
 SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
 {
-    /* vertex number by the bits of its coordinates x, y, z */
+    /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm is_least[8];
     kernel_local_least(at, vertex, 8, is_least);
@@ -316,8 +320,9 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
         for (int a = 0; a < 3; a++) inverse[i][a] *= one;
 }
 
-/* Computes bounds of y: the extent of y over all vertices, widened by the error bound of kernel_local_blur(). No point
- * of the cell lies outside, because each is a mean of the vertices with non-negative weights. */
+/* Computes bounds of the affine approximation y of the reference coordinates: its range over all vertices, widened by
+ * the error bound of kernel_local_blur(). No point of the cell is outside of these bounds, because each is a mean of
+ * the vertices with non-negative weights. */
 SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                     kernel_local_cells *out)
 {
@@ -392,11 +397,12 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
-    kernel_bend bend;     /* nonlinear terms and derivatives at r */
+    kernel_bend bend;     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
 
-/* Computes the residual y - (r + n(r)). */
+/* Computes the residual y - (r + n(r)) of Newton's method, where y is the affine approximation of the reference
+ * coordinates r and n the map's nonlinear part. */
 SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf out[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -407,7 +413,9 @@ SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf ou
 
 SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
 {
-    vf j[3][3]; /* derivatives of r + n(r) along each component of r */
+    /* derivatives of r + n(r) along each component of the reference coordinates r, where n is the map's nonlinear
+     * part */
+    vf j[3][3];
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) {
             j[i][a] = vf_set(i == a);
@@ -443,8 +451,9 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
     return largest;
 }
 
-/* Computes r of the points at the positions `at` in tile space. lane: lane of each point's cell. Returns the lanes
- * whose r is accurate to 1e-6. A lane's result does not depend on the other lanes. */
+/* Computes the reference coordinates r of the points at the positions `at` in tile space. lane is the lane that holds
+ * each point's cell. Returns the lanes whose r is accurate to 1e-6. A lane's result does not depend on the other
+ * lanes. */
 SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi lane, const vf at[3],
                                  kernel_local_points *p)
 {
@@ -473,7 +482,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     return vm_not(open);
 }
 
-/* Returns the field at r, per lane. */
+/* Returns the field at the reference coordinates r in each lane's cell. */
 SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
 {
     vf v = kernel_take(cells->field[0], lane);

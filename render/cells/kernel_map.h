@@ -135,7 +135,7 @@ SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
     return out;
 }
 
-/* Returns the polynomial's value at r; each lane has its own coefficients. */
+/* Returns the polynomial's value at the reference coordinates r. Each lane has its own coefficients. */
 SIMD_INLINE vf kernel_value_of(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3])
 {
     vf v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m->m * c[4];
@@ -253,7 +253,8 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     }
 }
 
-/* Returns a field at r in each ray's own cell, from its values at the cells' vertices. */
+/* Returns a field at the reference coordinates r in each ray's own cell, computed from its values at the cells'
+ * vertices. */
 SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
     const kernel_product m = kernel_product_at(kernel_has_apex(type), r);

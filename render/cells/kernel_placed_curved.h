@@ -116,7 +116,7 @@ SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int
  * neighbours. */
 SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
 {
-    /* vertex number by the bits of its coordinates x, y, z */
+    /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {

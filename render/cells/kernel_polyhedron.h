@@ -471,7 +471,8 @@ SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const ker
     *w = end->w_face + (w_sum - end->w);
 }
 
-/* Prepares the profile of the interval: computes the field at the crossed sheets and at both ends. */
+/* Prepares the profile of the interval, which is the piecewise linear field along each ray: computes the field at the
+ * crossed sheets and at both ends. */
 static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
 {
     kernel_interval *i = &stay->interval;
@@ -491,14 +492,16 @@ static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
     }
 }
 
-/* Returns a piece of length zero at the begin of the profile. */
+/* Returns a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along the
+ * ray. */
 SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_stay *stay, vf v_in)
 {
     const kernel_interval *i = &stay->interval;
     return (kernel_profile_piece){i->t_in, i->t_in, v_in, v_in, i->w_in, i->w_in};
 }
 
-/* Replaces *piece by the next piece of each ray's profile. v_out: the value at the profile's end. */
+/* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
+ * interval. */
 SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay *stay, vf v_out,
                                      kernel_profile_piece *piece)
 {
@@ -514,7 +517,7 @@ SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay 
     *piece = (kernel_profile_piece){piece->t1, t, piece->v1, v, piece->w1, w};
 }
 
-/* Returns the rays of the mask whose profile continues behind the piece. */
+/* Returns those of the given rays on which the field has further linear pieces behind the given one. */
 SIMD_INLINE vm kernel_profile_open(const kernel_stay *stay, const kernel_profile_piece *piece, vm mask)
 {
     return vm_and(mask, vf_lt(piece->t1, stay->interval.t_out));

@@ -45,7 +45,8 @@ typedef struct kernel_quad {
     vf e01, e32, e03, e12;
 } kernel_quad;
 
-/* Points of rays on the patch: s from corner 0 to 1, r from corner 0 to 3, and the depth t. */
+/* The points at which rays meet a quad's bilinear patch: parameter s from corner 0 to corner 1, parameter r from corner
+ * 0 to corner 3, and depth t. */
 typedef struct kernel_quad_place {
     vm mask;
     vf s, r, t;
@@ -106,8 +107,8 @@ static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
     return d > 0 ? d : 0;
 }
 
-/* Returns the root in [0, 1] at which the quadratic's derivative is 2 turn. Of the two formulas for it, the one without
- * cancellation is used. */
+/* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `turn`. There are two formulas
+ * for the root; the one in which digits do not cancel is used. */
 static inline double kernel_flat_root(const kernel_flat_quadratic *c, double turn)
 {
     const bool is_sum = c->c1 * turn <= 0;
@@ -123,15 +124,16 @@ static inline double kernel_flat_zero(double v0, double v1)
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* Returns the limit of the root if B or A vanishes for all parameters. The two lines are from corner i to i2 and from
- * corner j to j2. */
+/* Returns the limit of the root of the quadratic A or B (see the top of this file) if it vanishes for all parameters.
+ * The two lines are from corner i to i2 and from corner j to j2. */
 static inline double kernel_flat_limit(const kernel_flat_quad *q, int i, int i2, int j, int j2)
 {
     const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
     return y0 != y1 ? kernel_flat_zero(y0, y1) : kernel_flat_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
 }
 
-/* Computes the point (s, r, depth) at which the Jacobian J has the sign of `root`, where |root| is sqrt(D). */
+/* Computes the point of the patch (parameters s and r, and depth) at which the patch's Jacobian has the sign of `root`.
+ * The magnitude of root is the square root of the discriminant D. */
 static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
                                      const kernel_flat_quadratic *b, double root, double place[3])
 {
@@ -217,7 +219,8 @@ SIMD_INLINE kernel_half_mask kernel_half_vanishes(const kernel_half_quadratic *c
     return (kernel_half_mask)(c->c0 == 0) & (kernel_half_mask)(c->c1 == 0) & (kernel_half_mask)(c->c2 == 0);
 }
 
-/* Returns the quadratic's root at which its derivative is 2 turn, without cancellation (kernel_flat_root()). */
+/* Returns, per lane, the root in [0, 1] of the quadratic at which half of its derivative equals `turn`, by the same
+ * formulas as kernel_flat_root(). */
 SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_half turn)
 {
     const kernel_half zero = {0}, one = zero + 1;
@@ -230,8 +233,8 @@ SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_
     return kernel_half_select((kernel_half_mask)(x >= 0), least, zero);
 }
 
-/* Computes the patch's point for the wanted rays of one half, each of which crosses one triangle. Returns the rays for
- * which A or B vanishes, whose points must be computed one by one. */
+/* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
+ * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
 SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_place *out)
 {
     const kernel_half zero = {0}, one = zero + 1;
@@ -330,7 +333,8 @@ SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
     p->hx = (q->x[2] - q->x[1]) - p->gx, p->hy = (q->y[2] - q->y[1]) - p->gy;
 }
 
-/* At the point (s, r): the patch's derivatives, their determinant, and the distance from the point to the ray. */
+/* Properties of the patch at the parameters (s, r): its derivatives, their determinant, and the distance from the point
+ * to the ray. */
 typedef struct kernel_patch_at {
     vf sx, sy, rx, ry, det, dx, dy;
 } kernel_patch_at;
@@ -373,8 +377,8 @@ SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
     return vm_and(inside, vf_le(vf_abs(at.dx) + vf_abs(at.dy), (e + g) * 1.2e-7f));
 }
 
-/* Returns a first guess of s or r: the relative distance of the ray from two opposite sides, by the areas of the
- * triangles that it forms with each. */
+/* Returns a first guess of the patch parameter s or r: the relative distance of the ray from two opposite sides of the
+ * quad, computed from the areas of the triangles that it forms with each. */
 SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, int l)
 {
     const vf near = vf_abs(q->x[i] * q->y[j] - q->x[j] * q->y[i]), far = vf_abs(q->x[k] * q->y[l] - q->x[l] * q->y[k]);
@@ -528,8 +532,8 @@ typedef struct kernel_ray_box {
 /* A cell's edges as seen by the middle ray of the box, and the squares of their lengths in space. */
 typedef struct kernel_seen_edges {
     vf at[12][2], square[12];
-    vf spread; /* half width + half height of the box of slopes */
-    vf margin; /* bound of the rounding of a turn */
+    vf spread; /* half width plus half height of the range of the rays' slopes */
+    vf margin; /* upper bound of the rounding error of a cross product of two edges */
 } kernel_seen_edges;
 
 SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_seen_edges *out)

@@ -40,9 +40,10 @@ enum { KERNEL_DEVIATION_STEPS = 8 };
 typedef struct kernel_local_nonlinear {
     /* h: coefficients of the field's deviation from linear (the file's opening comment) */
     float terms[KERNEL_BENT_TERMS][SIMD_WIDTH];
-    /* N^2, the square of the bound of the derivative of the map's nonlinear part n */
+    /* square of the upper bound of the derivative of the map's nonlinear part */
     float bend[SIMD_WIDTH];
-    /* lower bound of the error E (kernel_local_budget.h) that the three sampled places cannot show */
+    /* lower bound of the part of the field's deviation that is not visible at the three sampled places (the error E of
+     * kernel_local_budget.h) */
     float unseen[SIMD_WIDTH];
     float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
@@ -54,7 +55,7 @@ typedef struct kernel_local_deviations {
     /* largest residual at these places; if an interval is cut into parts, the largest at all places and parts' ends so
      * far */
     vf residual;
-    vm has_diverged; /* rays for which Newton's method did not find r */
+    vm has_diverged; /* rays for which Newton's method did not find the reference coordinates */
 } kernel_local_deviations;
 
 /* ---- cells ---- */
@@ -72,7 +73,7 @@ SIMD_INLINE float kernel_local_bent_unseen(int type)
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
 
-/* Computes all members of *out except tolerance for the lanes' cells. */
+/* Computes all members of *out except tolerance, for one cell per lane. */
 SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_nonlinear *out)
 {
     vf most = vf_set(0);
@@ -91,10 +92,11 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
 
 /* ---- rays in cells ---- */
 
-/* The line between the values of r at a ray's two faces, and the chords of the nonlinear terms, per ray. A position u
- * on the ray goes from -1/2 to 1/2. */
+/* The line between the reference coordinates at a ray's two faces, and the chords of the nonlinear terms, per ray. A
+ * position u on the ray goes from -1/2 to 1/2. */
 typedef struct kernel_local_chord {
-    vf middle[3], span[3]; /* r at the line's middle, and its difference between the line's ends */
+    /* reference coordinates at the line's middle, and their difference between the line's ends */
+    vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
     vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS];
     vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
@@ -112,7 +114,7 @@ SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BEN
     memcpy(out, b.term, sizeof b.term);
 }
 
-/* Returns the rays for which r lies in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
+/* Returns the rays whose reference coordinates r lie in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
 SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 {
     if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
@@ -141,7 +143,8 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     out->residual_limit = kernel_take(nonlinear->residual_limit, lane);
 }
 
-/* Computes the residual of r at position u, and the field's deviation from its chord there. */
+/* Computes the residual of the reference coordinates r at position u on the ray, and the field's deviation from its
+ * chord there. */
 SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
     vf term[KERNEL_BENT_TERMS];
@@ -160,9 +163,9 @@ SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
     return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
 }
 
-/* Refines r at `count` places from initial guesses by Newton's method. *residual: the largest residual left at any
- * place. Returns the rays for which r is valid at all places: in the cell or slightly outside, with a small enough
- * residual. */
+/* Refines the reference coordinates r at `count` places from initial guesses by Newton's method. *residual receives the
+ * largest residual left at any place. Returns the rays for which r is valid at all places: in the cell or slightly
+ * outside, with a small enough residual. */
 SIMD_INLINE vm kernel_local_settle(const kernel_local_chord *c, const float *places, int count, vm rays, int type,
                                    kernel_local_iterate *at, vf *residual)
 {

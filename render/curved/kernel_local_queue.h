@@ -55,7 +55,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, ker
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
 }
 
-/* Makes `part` the current mesh part. The queues must be empty. */
+/* Makes the mesh part with index `part` the one whose cells are queued from now on. The queues must be empty. */
 SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
 {
     l->part = part;

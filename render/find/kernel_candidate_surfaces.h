@@ -72,9 +72,9 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const 
     return unfolded;
 }
 
-/* Computes L at the vertices and the thickness of the slab (kernel_outline.h). |f| is at most about 1. Positions have
- * an error of at most one rounding, r, of their coordinates, and their mean of at most 8 r. Lanes whose volume is near
- * float32's minimum are removed from `usual`. */
+/* Computes the linear function L (kernel_outline.h) at the vertices, and the thickness of the slab that contains the
+ * isosurface. |f| is at most about 1. Positions have an error of at most one rounding, r, of their coordinates, and
+ * their mean has an error of at most 8 r. Lanes whose volume is near float32's minimum are removed from `usual`. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);

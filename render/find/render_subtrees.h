@@ -5,7 +5,7 @@
 #include "kernel_types.h"
 
 typedef struct render_subtrees {
-    kernel_subtree *items; /* owned by the caller, who frees it with base_free() */
+    kernel_subtree *items; /* array allocated by base_alloc(), which the caller must free with base_free() */
     int64_t count;
 } render_subtrees;
 

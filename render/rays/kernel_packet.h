@@ -210,8 +210,8 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Sets the packet's rays to interval number `turn` of those that the clips of volumes keep. All surfaces must have been
- * traced. */
+/* Restricts the packet's rays to interval number `turn`, counted from 0, of those that the clips of volumes keep. All
+ * surfaces must have been traced before. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
     if (turn == 0) {

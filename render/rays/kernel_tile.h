@@ -123,8 +123,8 @@ static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f,
     b->centre_y = tile->centre_y;
 }
 
-/* Replaces the tile's borders by those of the whole picture: a body that may be in the picture is then reported in
- * block 0. */
+/* Replaces the borders between a tile's blocks by the borders of the whole picture. Block 0 then stands for the
+ * picture: a body that may be visible in it is reported to be in block 0. */
 static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
@@ -176,8 +176,9 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
             error[i] += fabsf(normal[a][i]);
         }
     }
-    /* Positions are at most size + 1 (kernel_packet_tree_rays()). A sum of three products errs by 4 roundings of that
-     * times the normal's 1-norm, the middle and half widths of a box by 1, the normal and the offset by 1. */
+    /* The magnitude of positions is at most size + 1 (kernel_packet_tree_rays()). The sum of three products has an
+     * error of 4 roundings of this number times the 1-norm of the normal; the centre and the half widths of a box add 1
+     * rounding, the normal and the offset 1 more. */
     for (int i = 0; i < KERNEL_LANES; i++) {
         offset[i] = (float)l.offset[i];
         error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));

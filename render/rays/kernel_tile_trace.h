@@ -269,7 +269,7 @@ SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* Returns entries[index] for each lane, where `entries` belong to the tile's columns or rows. */
+/* Returns entries[index] for each lane. `entries` has one number per column, or per row, of the tile. */
 SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);

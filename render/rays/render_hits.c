@@ -57,8 +57,8 @@ hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const flo
 /* ---- the hemisphere ------------------------------------------------------------------------------------------ */
 
 typedef struct hemisphere {
-    double cosine, sine; /* cosine and sine of the angle by which the pixel rotates the spiral */
-    double begin;        /* begin of the spiral's first step, from 0 to 1 */
+    double cosine, sine; /* cosine and sine of the angle by which this pixel's spiral of ray directions is rotated */
+    double begin;        /* position of the first ray direction within the first step of the spiral, from 0 to 1 */
 } hemisphere;
 
 static double part_of(double x)

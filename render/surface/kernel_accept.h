@@ -85,8 +85,8 @@ SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double poin
     }
 }
 
-/* Returns the value at r of the polynomial with the coefficients c, as kernel_value_of() does, but for one point in
- * double. */
+/* Returns the value of the polynomial with the coefficients c at the reference coordinates r, for one point in double;
+ * kernel_value_of() does the same for vectors. */
 SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, const double r[3])
 {
     double m = r[0] * r[1];

@@ -37,8 +37,9 @@
 
 enum { KERNEL_CONTRACTION_STEPS = 7 };
 
-/* Error of r below which one step of Newton's method is the last. That step leaves 2 K / (1 - K) times the square of
- * the error, because f's derivative changes by about 4 K per unit length: 1.8e-7 at most. */
+/* Error of the reference coordinates r below which one step of Newton's method is the last. That step leaves 2 K / (1 -
+ * K) times the square of the error, where K is the contraction constant, because the derivative of f changes by about 4
+ * K per unit length: 1.8e-7 at most. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
 /* A ray in the coordinates of its cell: y and w as above, from the ray's point at the depth of vertex 0 on; L at that
@@ -118,7 +119,7 @@ SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
     }
 }
 
-/* Returns the maximum of s . x over the points x of D. */
+/* Returns the maximum of the dot product s . x over all points x of the reference domain D. */
 SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
 {
     const vf half = 0.5f + rim;
@@ -130,7 +131,8 @@ SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
     return vf_max((vf_max(s[0], vf_set(0)) + vf_max(s[1], vf_set(0))) + s[2], vf_set(0));
 }
 
-/* Converts r to the coordinates of kernel_local.h: for a pyramid, a and b are then counted from the axis. */
+/* Converts the reference coordinates r to those of kernel_local.h: for a pyramid, a and b are then counted from the
+ * axis. */
 SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = r[i];
@@ -138,7 +140,8 @@ SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
     for (int i = 0; i < 2; i++) out[i] -= 0.5f * r[2];
 }
 
-/* Returns a lower bound of the distance from r to the domain's border; it is negative if r is outside. */
+/* Returns a lower bound of the distance from the reference coordinates r to the domain's border. It is negative if r is
+ * outside of the domain. */
 SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
 {
     vf local[3];
@@ -147,14 +150,14 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
     return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
 
-/* Returns the rays for which s at q proves that D contains no root. If there were a root, |s| would be at most two
- * diameters of D; so 8 blur is an upper bound of the rounding, 2 blur times (|s| + 2), and a thousandth of |s|^2 covers
- * the rest. */
+/* Returns the rays for which the step s of the iteration at the point q proves that the reference domain D contains no
+ * root. If there were a root, |s| would be at most two diameters of D; so 8 blur is an upper bound of the rounding, 2
+ * blur times (|s| + 2), and a thousandth of |s|^2 covers the rest. */
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);
     vf blur = 8.0f * c->blur;
-    /* twice the error of crossings of faces, because D is not widened for a pyramid */
+    /* twice the error of crossings of faces, because for a pyramid the reference domain is not widened */
     if (kernel_has_apex(type)) blur = 4.0f * c->rim;
     return vf_lt(2.0f * most + blur, 0.999f * kernel_dot(s, s));
 }
@@ -178,7 +181,8 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
         kernel_contraction_hold(type, c->rim, q);
         kernel_contraction_local(type, q, local);
         kernel_bend_at(type, local, &bend);
-        /* kernel_bounds.h computes J0 with a b / k² = 1/2 instead of 1/4, which leaves this linear term */
+        /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this
+         * linear term */
         if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2];
         for (int i = 0; i < 3; i++) {
             vf at = a[i];

@@ -278,7 +278,8 @@ static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_til
     KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
 }
 
-/* Computes the contour lines' field, its gradient and the surface's normal at r in each ray's own cell. */
+/* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r in each ray's
+ * own cell. */
 SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
                                            const vf r[3], kernel_along *out, int type)
 {

@@ -28,12 +28,12 @@
  * If other ranks have cells, their samples are needed too. Then hits wait for their normals (render_differences.h); the
  * second half of this file samples and lights hits of any pixels, in the tiles and packets in which they were hit. */
 
-/* The field at one point per ray. */
+/* The field at one point per ray, which is sampled for normals by central differences. */
 typedef struct kernel_probe {
     const kernel_surface *surface;
     int layer; /* number of the layer, part of the key of cached cells */
     double isovalue;
-    vf z; /* depths of the points */
+    vf z; /* depths of the points at which the field is sampled */
     vm found;
     vf sample;
 } kernel_probe;
@@ -140,7 +140,8 @@ typedef struct kernel_samples_about {
     vf values[RENDER_DIFFERENCE_SAMPLES];
 } kernel_samples_about;
 
-/* Takes six samples around each hit at depth t, at the distance `reach`. s must be one of the frame's surfaces. */
+/* Takes six samples of the field around each hit at depth t, at the distance `reach` from it. s must be one of the
+ * frame's surfaces. */
 static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p, const kernel_surface *s, int value,
                                                           vm hit, vf t, vf reach, kernel_samples_about *out)
 {

@@ -89,8 +89,8 @@ static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, c
     }
 }
 
-/* Computes the contour lines' field, its gradient and the surface's normal at r, each lane in its own cell. line: the
- * field's polynomial. */
+/* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r, each lane in
+ * its own cell. `line` is the polynomial of the contour lines' field. */
 SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map_lanes *map, const vf line[8], const vf r[3],
                                   kernel_along *out)
 {

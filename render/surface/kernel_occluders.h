@@ -35,11 +35,12 @@ enum {
     KERNEL_TRIANGLE_ROWS,
     KERNEL_SLAB_LOWER = 0, /* bounding box of the cell: lower and upper corner */
     KERNEL_SLAB_UPPER = 3,
-    /* coefficients of L = gradient . position + level; on the surface |L| is at most `thickness` */
+    /* coefficients of the linear function L = gradient . position + level that defines a slab; on the surface |L| is at
+     * most `thickness` */
     KERNEL_SLAB_GRADIENT = 6,
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
-    KERNEL_SLAB_BLUR, /* rounding error of L, divided by the size of positions */
+    KERNEL_SLAB_BLUR, /* rounding error of the slab's linear function L, divided by the size of positions */
     KERNEL_SLAB_REACH,
     KERNEL_SLAB_ROWS
 };
@@ -103,7 +104,7 @@ typedef struct kernel_plumb {
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
     float shear_x, shear_y, stretch;
-    float size; /* size of positions, for the rounding of L in slabs */
+    float size; /* size of positions, from which the rounding error of the slabs' linear functions is computed */
 } kernel_plumb;
 
 SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)
@@ -175,7 +176,8 @@ SIMD_INLINE vm kernel_plumb_triangles(const kernel_plumb *p, const float *rows, 
 
 /* ---- slabs ---- */
 
-/* Computes L of each slab along the ray, level + rise * t, and the slab's thickness including rounding. */
+/* Computes the linear function L of each slab along the ray, as level + rise * t, and the slab's thickness including
+ * rounding. */
 SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf *level, vf *rise, vf *thickness)
 {
     *level = vf_load(rows + KERNEL_SLAB_LEVEL * SIMD_WIDTH);

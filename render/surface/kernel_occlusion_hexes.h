@@ -117,12 +117,14 @@ SIMD_INLINE void kernel_pairs_lines(kernel_placed_curved *h)
     vf_store(h->doubt, vf_set(0));
 }
 
-/* The result for pairs: blocked, or in doubt; other pairs are open. */
+/* The result for each ray-hex pair: the hex blocks the ray, or it is in doubt; in all other pairs the hex does not
+ * block the ray. */
 typedef struct kernel_pair_verdict {
     vm blocked, doubt;
 } kernel_pair_verdict;
 
-/* Returns L at the distance t along each ray. */
+/* Returns the value, at the distance t along each ray, of the linear function L that defines the slab around the
+ * surface. */
 SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
 {
     return vf_load(pairs->level) + vf_load(pairs->rise) * t;

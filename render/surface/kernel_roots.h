@@ -43,7 +43,7 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-#define KERNEL_ROOT_BAND 3e-7f /* rounding error of F if the largest |F| at a vertex is near 1 */
+#define KERNEL_ROOT_BAND 3e-7f /* rounding error of the field F if its largest magnitude at a vertex is near 1 */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
@@ -175,7 +175,8 @@ SIMD_INLINE void kernel_search_face(const kernel_search *s, vm rays, vf face, ke
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
-/* Returns the distance from Y, at the reference coordinates of a face's crossing, to the ray. */
+/* Returns the distance between the ray and the point Y (see the top of this file) at the reference coordinates of a
+ * face's crossing. */
 SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
 {
     const kernel_map_lanes *map = &s->map;
@@ -419,7 +420,8 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map_lane
     }
 }
 
-/* The residuals of the four equations X(r) = ray(t), F(r) = 0 at a point, and the map's product m there. */
+/* The residuals at a point of the four equations X(r) = ray(t) and F(r) = 0, which state that it lies on the ray and
+ * has the isovalue, and the map's product m there. */
 typedef struct kernel_residual {
     kernel_product m;
     vf off[3], value;

@@ -176,8 +176,8 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     kernel_accept(p, state, c, value, hit, &at);
 }
 
-/* Returns a field at r in each ray's own cell, as kernel_maps_value(), but as one function for all types that is not
- * inlined. */
+/* Returns a field at the reference coordinates r in each ray's own cell. It does the same as kernel_maps_value(), but
+ * is a single function for all types that is not inlined. */
 static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
                                                               int type)
 {

@@ -74,7 +74,7 @@ static void free_finds(finds *f)
 
 /* ---- a cell --------------------------------------------------------------------------------------------------- */
 
-/* The current cell, and the isovalue that is searched for in it. */
+/* The cell that is currently searched for occluders, and the isovalue for which it is searched. */
 typedef struct subject {
     finds *into;
     const kernel_frame *frame;
@@ -134,8 +134,8 @@ static bool straddles(const subject *s, double isovalue)
 
 /* ---- tets ------------------------------------------------------------------------------------------------------ */
 
-/* Computes where the surface crosses the edge between two vertices. They must be given in the order of coordinates, so
- * that all cells of the edge compute the same bits. */
+/* Computes the point at which the surface crosses the edge between two vertices. They must be given in the order of
+ * coordinates, so that all cells of the edge compute the same bits. */
 static void cross_edge(const subject *s, double isovalue, int i, int j, float out[3])
 {
     const double *a = place_of(s, i), *b = place_of(s, j);
@@ -196,8 +196,8 @@ static void solve(double m[3][3], const double b[3], double x[3])
     }
 }
 
-/* Computes L by least squares about the mean of the vertices. Values are taken minus the isovalue, times scale. *level:
- * L at the origin. */
+/* Computes the linear function L that fits the values best, by least squares about the mean of the vertices. Values are
+ * taken minus the isovalue, times `scale`. *level receives L at the origin. */
 static void fit(const subject *s, double isovalue, double scale, double gradient[3], double *level)
 {
     double mean[3] = {0, 0, 0}, value = 0, m[3][3] = {{0}}, b[3] = {0, 0, 0};

@@ -172,10 +172,11 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 /* A ray's position in a piece of the transfer function. */
 typedef struct kernel_way {
     vf below, above; /* distances of the value to the piece's low and high end */
-    vf todo;         /* change of the value that remains in this piece */
-    vf left;         /* length that corresponds to this change, in unit distances */
+    vf todo;         /* remaining change of the value within this piece */
+    vf left;         /* length of the ray over which this change takes place, in unit distances */
     vf shortest;     /* lower limit of a step's length, in unit distances */
-    /* value and its rounding error at the end of the piece that is ahead; initially at the segment's begin */
+    /* value at the end of the piece that the ray is approaching, and its rounding error; initially the value at the
+     * segment's begin */
     vf edge, rest;
     vm is_last; /* the segment ends in this piece */
 } kernel_way;
@@ -230,8 +231,8 @@ SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf
 /* One step of the integration in a piece. */
 typedef struct kernel_stretch {
     vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
-    vf rise;           /* change of the opacity over the rest of the ray's interval in the piece */
-    vf share;          /* share of that rest that the step covers */
+    vf rise;           /* change of the opacity over the rest of the ray's part in the piece */
+    vf share;          /* fraction of that rest that the step covers */
     vf length;         /* length of the step, in unit distances */
     vm is_opaque;
 } kernel_stretch;
@@ -290,8 +291,8 @@ SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
     return depth;
 }
 
-/* Adds the light of a step, over which the value changes by `move`. below: the value's distance from the piece's low
- * end at the begin of the step. */
+/* Adds the light of one integration step, over which the value changes by `move`. `below` is the distance of the value
+ * at the step's begin from the piece's low end. */
 SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_place *at, vm open, vf below, vf move,
                                    const kernel_stretch *st, kernel_light *light)
 {

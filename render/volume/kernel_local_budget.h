@@ -63,7 +63,8 @@ enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32
 typedef struct kernel_local_bounds {
     float cost[SIMD_WIDTH];
     float sway[SIMD_WIDTH];
-    float fade[SIMD_WIDTH]; /* cost + R |s'|, as defined at the top of this file */
+    /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined at the top of this file */
+    float fade[SIMD_WIDTH];
     float extinction[SIMD_WIDTH];
     float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* range of values for which the bounds hold */
 } kernel_local_bounds;
@@ -118,7 +119,7 @@ typedef struct kernel_local_pairs {
     vm active;
     vf begin;     /* depth at which the ray's window begins */
     vf count;     /* number of segments into which the interval is divided */
-    float unseen; /* factor by which kernel_local_nonlinear.unseen is multiplied, 1 for a whole interval */
+    float unseen; /* factor by which kernel_local_nonlinear.unseen is multiplied; it is 1 for a whole interval */
 } kernel_local_pairs;
 
 /* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
@@ -128,7 +129,8 @@ SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
 }
 
-/* Returns the rays whose single, raised chord would end outside the values for which the bounds hold. */
+/* Returns the rays for which a single segment is not possible: the values at its ends, raised so that its mean equals
+ * the field's, are outside the range of values for which the error bounds hold. */
 SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
@@ -140,10 +142,12 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_lo
 /* Error terms, per ray, if one segment replaces the ray's whole interval in its cell. */
 typedef struct kernel_local_wrong {
     vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
-    vf quartic; /* E, the bound of the field's quartic part */
+    vf quartic; /* upper bound E of the quartic part of the field's deviation from its chord */
     vf unknown; /* error of the field due to the residual of Newton's method */
     vf length;  /* length of the interval in unit distances */
-    vf fade;    /* variation of g caused by the changes of T and b along the segment */
+    /* variation of the error's weight g (see the top of this file) that is caused by the changes of T and b along the
+     * segment */
+    vf fade;
 } kernel_local_wrong;
 
 SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kernel_local_pairs *p,
@@ -163,16 +167,16 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kerne
     out->fade = kernel_take(b->bounds.fade, lane) * depth;
 }
 
-/* Returns the error of light per unit distance for one segment: the part that varies along the segment, plus the part
- * of its mean. */
+/* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
+ * segment, plus the part of its mean. */
 SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, vf cost)
 {
     const vf half = vf_min(0.5f * (sway + w->fade), cost);
     return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
 }
 
-/* Computes the bounds of light's change over the ray's own values, including those of raised chords (see the top of
- * this file). */
+/* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
+ * includes those of raised chords (see the top of this file). */
 SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic, vf *sway,
                                         vf *cost)
 {

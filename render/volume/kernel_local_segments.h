@@ -1,4 +1,5 @@
-/* Segments of hexes, wedges and pyramids, one ray-cell pair per lane (kernel_segments.h explains segments): */
+/* Computes segments of hexes, wedges and pyramids with one ray-cell pair per lane (kernel_segments.h explains
+ * segments). */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -193,8 +194,8 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel
 
 enum { KERNEL_LOCAL_PARTS = 8 };
 
-/* The division of rays' intervals into equal parts. In the ends of each part, t and value belong to the part, but r
- * belongs to the whole interval. */
+/* The division of rays' intervals into equal parts. In the ends of each part, depth and value are those of the part,
+ * but the reference coordinates are those of the whole interval. */
 typedef struct kernel_local_division {
     kernel_local_chord chord;
     kernel_local_part at; /* end of the last part that was processed */

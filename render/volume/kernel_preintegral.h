@@ -73,8 +73,8 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
     e->colour = vi_from_bits(rest[0]);
 }
 
-/* Returns 1 - exp(-y); *share: that divided by y. For small y the series is used, whose first omitted term is y^6 /
- * 5040. */
+/* Returns 1 - exp(-y). *share receives this number divided by y. For small y the series is used, whose first omitted
+ * term is y^6 / 5040. */
 SIMD_INLINE vf kernel_gone(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
@@ -121,7 +121,8 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
     }
     out->depth = sum[0] * t->depth_unit;
     const vf gone = kernel_gone(0.5f * out->depth, &mean);
-    mean *= 1.0f - 0.5f * gone; /* the mean transmittance along the segment, A / D */
+    /* mean transmittance along the segment, which is its absorption divided by its optical depth */
+    mean *= 1.0f - 0.5f * gone;
     const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
     mean *= t->light_unit;
     out->absorbed = gone * (2.0f - gone);

@@ -33,7 +33,8 @@ typedef struct kernel_segment_double {
  * fewer. */
 typedef struct kernel_cuts {
     int row_count;
-    /* false if a ray has more cuts than there are rows; its cuts are then searched for in the fragments */
+    /* false if a ray crosses more transparent surfaces than there are rows; the depths at which its segments are cut
+     * are then searched for among the tile's fragments */
     bool is_whole;
     int64_t first, last; /* indices of the tile's surface fragments in the thread's list */
     float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
@@ -51,7 +52,7 @@ typedef struct kernel_segments {
     kernel_light heap;
     vf t_begin, t_end; /* depth interval of each ray's window */
     bool is_shortened; /* set when t_end has been lowered since the flag was last cleared */
-    vf per_t;          /* unit distances per t on each ray */
+    vf per_t;          /* number of unit distances (of the transfer function) per unit of t on each ray */
     kernel_cuts cuts;
 } kernel_segments;
 
@@ -103,8 +104,8 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     }
 }
 
-/* Finds the next cuts of the rays by searching all of the tile's fragments, if some ray has more cuts than there are
- * rows. */
+/* Finds the next depth at which transparent surfaces cut each ray, by searching all of the tile's fragments. It is used
+ * if some ray has more such depths than there are rows. */
 static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
@@ -121,7 +122,8 @@ static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts
     return vf_load(next);
 }
 
-/* Returns the depth of each ray's first cut at or behind t; only behind t if `beyond` is set; +inf if there is none. */
+/* Returns the depth of the first transparent surface on each ray at or behind t, or only behind t if `beyond` is set;
+ * +inf if there is none. */
 SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
 {
     vf next = vf_set(INFINITY);
@@ -506,8 +508,8 @@ SIMD_INLINE vf kernel_span_mixed(const kernel_segment_state *state, const kernel
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
-/* Returns the number of equal subintervals into which the interval is divided. *halved: the rays for which no number is
- * enough, which must be bisected. */
+/* Returns the number of equal subintervals into which each ray's interval is divided. *halved receives the rays for
+ * which no number is accurate enough, so that their intervals must be divided by bisection. */
 SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
                                         vm rays, const kernel_interval *stretch, vm *halved)
 {

@@ -491,7 +491,7 @@ SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
     return all;
 }
 
-/* Sets up the packets of the given blocks for volumes; lists them and returns their number. */
+/* Sets up the packets of the given blocks for tracing volumes, and stores them in a list. Returns their number. */
 SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
 {
     int count = 0;

@@ -1,4 +1,4 @@
-/* Samples of volumes for a whole tile: one window of samples at a time, for all the tile's blocks. Hexes, wedges and
+/* Samples volumes for a whole tile, one window of samples at a time, for all blocks of the tile. Hexes, wedges and
  * pyramids are processed one sample per lane (kernel_local_samples.h), and tets of few pixels one ray-tet pair per lane
  * (kernel_small_tets.h). Other cells are fetched, transformed and given their edge functions once per window
  * (kernel_tile_cells.h), and passed to the packets of the blocks that they may meet, where they fill the samples that
