@@ -110,7 +110,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
     m->alone_count = 0;
 }
 
-/* Returns whether the cell is traced in any batch. */
+/* Returns whether the cell is traced in a batch, of tets or of hexes, wedges or pyramids. */
 SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
                                      const kernel_tile_candidate *candidate)
 {
@@ -118,8 +118,8 @@ SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_ba
     return kernel_is_linear(type) ? b->takes_batches : kernel_is_for_curved_batch(t, b, candidate, type);
 }
 
-/* Traces the cells that fit no batch. Traces the batches first, because their cells were found earlier and may hide
- * these. */
+/* Traces the queued cells that fit no batch, one by one. The batches are traced first, because their cells were found
+ * earlier and may hide these. */
 static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;

@@ -342,7 +342,7 @@ SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const u
     kernel_numbers_take_raw(&p->values, vertex, out);
 }
 
-/* Returns the number at that index. */
+/* Returns the array's number at that index, as a double. */
 SIMD_INLINE double kernel_numbers_one(const kernel_numbers *c, int64_t index)
 {
     double wide;

@@ -517,7 +517,7 @@ static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[
     for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
 }
 
-/* Hexes, wedges or pyramids of one type as roots are looked for in them, a cell a lane. */
+/* Hexes, wedges or pyramids of one type, one per lane, in the form in which the search for roots reads them. */
 typedef struct kernel_curved {
     int type;
     int lane; /* lane of the cell that contains all rays of a packet */
@@ -525,7 +525,7 @@ typedef struct kernel_curved {
     const float (*at)[8][SIMD_WIDTH];
     const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     const kernel_bounds *bounds;        /* NULL if the bounds of a single cell have not been computed yet */
-    struct kernel_curved_room *room;    /* for that */
+    struct kernel_curved_room *room;    /* memory for the data and bounds of a single cell */
 } kernel_curved;
 
 /* Memory for a single cell, whose data are copied to all lanes. */
@@ -534,7 +534,7 @@ typedef struct kernel_curved_room {
     kernel_bounds bounds;
 } kernel_curved_room;
 
-/* The tile's rays. */
+/* Returns the range of directions and origins of the tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;

@@ -130,7 +130,7 @@ SIMD_INLINE float kernel_blur_least(kernel_blur most)
     return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
 }
 
-/* ---- four edges at once: the same operations, and so the same bits ---- */
+/* ---- four edges at once: the same operations as for one edge, and so the same bits ---- */
 
 typedef float kernel_four __attribute__((vector_size(16)));
 
@@ -141,7 +141,7 @@ SIMD_INLINE kernel_four kernel_four_load(const float *p)
     return v;
 }
 
-/* Lanes of a vector, and of the four of kernel_spots. */
+/* Permutes the lanes of a vector, and of all four vectors of a kernel_spots. */
 #define KERNEL_PICKED(v, i, j, k, l) __builtin_shufflevector(v, v, i, j, k, l)
 #define KERNEL_PICK(at, i, j, k, l)                                                                                    \
     (kernel_spots)                                                                                                     \
@@ -150,7 +150,7 @@ SIMD_INLINE kernel_four kernel_four_load(const float *p)
             KERNEL_PICKED(at[3], i, j, k, l)                                                                           \
     }
 
-/* Four vertices, and kernel_spot_size() of each. */
+/* Four vertices in tile space, with kernel_spot_size() of each. */
 typedef struct kernel_spots {
     kernel_four x, y, z, size;
 } kernel_spots;
@@ -163,7 +163,7 @@ SIMD_INLINE kernel_four kernel_four_abs(kernel_four v)
     return (kernel_four)((kernel_four_bits)v & 0x7fffffff);
 }
 
-/* Makes four edges' lines, from a to b, and finds their errors and extents (kernel_blur). */
+/* Computes the edge functions of four edges from a to b, with their errors and extents (kernel_blur). */
 SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_spots a, kernel_spots b,
                                    kernel_line lines[4], kernel_four *errors, kernel_four *extents)
 {
@@ -209,8 +209,8 @@ typedef struct kernel_cell {
     float normal[3]; /* for a tet: gradient from kernel_tet_normal(); valid if has_normal */
 } kernel_cell;
 
-/* The places where rays go through a face: v is the value of f, w that of g, r the cell's own coordinates, which are
- * not set for tets. */
+/* Crossings of rays with a face: v is the value of f, w that of g, r the reference coordinates, which are not set for
+ * tets. */
 typedef struct kernel_crossing {
     vm mask;
     vf t, v, w;
@@ -289,7 +289,8 @@ static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
     return count == 4 && lacking == 15;
 }
 
-/* The cell with its values; not placed yet. Of a polyhedron only the type: see kernel_polyhedron.h. */
+/* Reads a cell's type, vertex indices and values, not yet its positions. For a polyhedron only the type is valid
+ * (kernel_polyhedron.h). */
 SIMD_INLINE void kernel_cell_fetch(kernel_cell *c, const grid *g, const grid_field *field, uint32_t index)
 {
     c->index = index;
@@ -380,10 +381,9 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
     }
 }
 
-/* The order of coordinates: a tet, symmetric in its vertices, is put in that order; other cells get ranks, and are
- * turned to begin by them, with all that a cell has of its vertices (but the colours, which come later). Nothing in a
- * cell then depends on how the simulation numbers its vertices, not even where its map is folded and has several
- * solutions. */
+/* Puts a cell's vertices in their canonical order. The vertices of a tet, which is symmetric, are sorted by
+ * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_turn(). Then nothing depends on
+ * how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
 SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
@@ -415,7 +415,8 @@ SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile,
     *out_z = (float)(z - tile->depth_shift);
 }
 
-/* Moves a tet's vertices into tile space, all at once: the operations of kernel_place_in(), and so the same bits. */
+/* Transforms a tet's four vertices into tile space at once, by the operations of kernel_place_in(), so that the bits
+ * are the same. */
 SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
     kernel_doubles d[3], place[3];
@@ -432,7 +433,7 @@ SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const k
     memcpy(c->z, &z, sizeof z);
 }
 
-/* Into tile space, but not in order yet, and without lines. */
+/* Transforms the cell's vertices into tile space. They are not yet in canonical order, and have no edge functions. */
 SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
@@ -478,7 +479,8 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 /* ---- edge functions of a cell ---- */
 
-/* Sums over the edges of each face, in kernel_triangle_least()'s order. */
+/* Returns, per face, the sum over the face's edges. The additions are in the order of kernel_triangle_least(), so that
+ * the bits are the same. */
 SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
 {
     return (__builtin_shufflevector(e[0], e[1], 0, 0, 1, 3) + __builtin_shufflevector(e[0], e[1], 3, 4, 5, 5)) +
@@ -494,7 +496,7 @@ SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const k
     at[0] = kernel_four_load(c->x);
     at[1] = kernel_four_load(c->y);
     at[2] = kernel_four_load(c->z);
-    /* Edges 0 to 3, 4 and 5. */
+    /* The first call computes edges 0 to 3, the second edges 4 and 5. */
     kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2), lines, &errors[0],
                       &extents[0]);
     kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3), lines + 4, &errors[1],

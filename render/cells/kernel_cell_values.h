@@ -1,5 +1,5 @@
-/* A cell's values as layers need them: beside an isovalue, in the domain of a transfer function, as colours; and cells
- * fetched one by one from arrays of any layout. */
+/* Converts a cell's values to the form that layers need: relative to an isovalue, in the domain of a transfer function,
+ * or as colours. Also fetches single cells from arrays of any layout. */
 #ifndef RENDER_KERNEL_CELL_VALUES_H
 #define RENDER_KERNEL_CELL_VALUES_H
 
@@ -91,7 +91,8 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
     }
 }
 
-/* Fetches a tet of finite values, as kernel_cell_fetch() does, for the caller to transform. */
+/* Fetches a tet with finite values, including its vertices' coordinates; the caller must transform it into tile
+ * space. */
 SIMD_INLINE void kernel_arrays_fetch_tet(kernel_cell *c, const kernel_arrays *p, uint32_t index)
 {
     int32_t own[GRID_MAX_CELL_VERTICES][SIMD_WIDTH];

@@ -1,5 +1,5 @@
-/* Crossings of a packet's rays with a cell's faces: the edge functions on the rays, from the cell's lines
- * (kernel_cell.h), then the crossings of tets, then those of cells that have quads. */
+/* Computes the crossings of a packet's rays with one cell's faces. First the edge functions are evaluated on the rays
+ * (kernel_cell.h), then the crossings of tets are computed, then those of cells with quadrilateral faces. */
 #ifndef RENDER_KERNEL_CROSSINGS_H
 #define RENDER_KERNEL_CROSSINGS_H
 
@@ -150,7 +150,7 @@ SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float
     kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
 }
 
-/* Tets: four triangles, of which a ray crosses two or none (kernel_cell.h). */
+/* The following functions intersect rays with tets: of the four triangles a ray crosses two or none (kernel_cell.h). */
 
 SIMD_INLINE void kernel_tet_project(const kernel_packet *p, const kernel_cell *c, vf x[4], vf y[4])
 {
@@ -160,7 +160,7 @@ SIMD_INLINE void kernel_tet_project(const kernel_packet *p, const kernel_cell *c
     }
 }
 
-/* Computes what kernel_edge() gives for each edge, from vertices that are projected once. */
+/* Computes the values of kernel_edge() for all edges of a tet, but projects each vertex only once. */
 static __attribute__((noinline)) void kernel_tet_edges_exactly(const kernel_packet *p, const kernel_cell *c,
                                                                vf e[KERNEL_TET_EDGES])
 {
@@ -184,7 +184,7 @@ SIMD_INLINE void kernel_tet_edges_projected(const kernel_packet *p, const kernel
     }
 }
 
-/* All edge functions at once; one by one only where one of them is in doubt. */
+/* Computes a tet's edge functions, all at once. Only if the sign of one is uncertain are they computed one by one. */
 SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
 {
     if (!p->is_pencil) {
@@ -197,12 +197,13 @@ SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, 
     if (__builtin_expect(vm_any(vm_not(vf_lt(vf_set(c->doubt), least))), 0)) kernel_tet_edges_exactly(p, c, e);
 }
 
-/* A crossed triangle's sums (kernel_cell.h). */
+/* Sums over a crossed triangle's vertices, weighted by the opposite edges: depth, field, colour field, and the weights
+ * themselves (kernel_cell.h). */
 typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
 
-/* face: a row of kernel_tet_face. */
+/* Computes the sums for one face, which is a row of kernel_tet_face. */
 SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, const signed char *face, vf ij, vf jk, vf ik,
                                         bool has_colour)
 {
@@ -219,12 +220,12 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* The two crossings of a ray, in either order. */
+/* The two crossings of each ray with a tet, in either order. */
 typedef struct kernel_ends {
     kernel_sums a, b;
 } kernel_ends;
 
-/* Takes the first and the last of the faces that each ray crosses. */
+/* Selects, for each ray, the first and the last of the four faces that it crosses. */
 SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sums[4])
 {
     const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
@@ -232,7 +233,7 @@ SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sum
     return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
 }
 
-/* Divides the ends by their weights, and puts the nearer one first. */
+/* Divides each crossing's sums by its weight, and stores the nearer crossing as the entry, the other as the exit. */
 SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, kernel_interval *out)
 {
     const vf scale_a = 1.0f / ends->a.weight, scale_b = 1.0f / ends->b.weight;
@@ -249,7 +250,8 @@ SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, ker
     out->w_out = vf_select(swap, w_a, w_b);
 }
 
-/* Chooses as kernel_tet_choose() does, with edges projected again for rays whose weights are not good enough. */
+/* Selects each ray's two crossed faces like kernel_tet_choose(), but projects the edges again for rays whose sum of
+ * weights is too small to be accurate. */
 static __attribute__((noinline, cold)) kernel_ends
 kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
@@ -270,7 +272,7 @@ kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf 
     return kernel_tet_choose(hit, sums);
 }
 
-/* Finds the rays that cross each of the faces, in kernel_tet_face's order. */
+/* Finds the rays that cross each of a tet's four faces, in the order of kernel_tet_face. */
 SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, vm rays, vm hit[4])
 {
     vf e[KERNEL_TET_EDGES];
@@ -281,7 +283,8 @@ SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, 
     }
 }
 
-/* Without branches: all four faces' sums, of which each ray takes its first and its last crossed face's. */
+/* Computes a tet's interval on each ray without branches: the sums are computed for all four faces, and each ray takes
+ * those of the first and the last face that it crosses. */
 SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
                                      kernel_interval *out)
 {
@@ -504,7 +507,8 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     return n;
 }
 
-/* All crossings of a cell with quads; returns how many triangles are crossed by some ray. */
+/* Computes all crossings of rays with a cell that has quadrilateral faces. Returns how many entries of out are set;
+ * each has the rays that it belongs to. */
 SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
                                         kernel_crossing out[KERNEL_MAX_CROSSINGS])
 {

@@ -47,8 +47,8 @@ SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const ker
         if (shape->faces[face].count == 4) kernel_curved_side(h, p, shape->edge_count + face, s);
 }
 
-/* Returns the rays that cross just one half of a quad, whose diagonal is from the loop's vertex 1 where turn is set,
- * else from vertex 0. */
+/* Returns the rays that cross exactly one of a quad's two triangles. The quad's diagonal begins at vertex 1 of its loop
+ * in lanes in which turn is set, else at vertex 0. */
 SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
 {
     vm from[4];
@@ -56,7 +56,7 @@ SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
     return kernel_halves_once(from, side);
 }
 
-/* Projects the vertices along the rays. */
+/* Projects the vertices of each ray's cell along the ray. */
 SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kernel_lane_rays *p, int count, vf x[8],
                                        vf y[8])
 {
@@ -141,7 +141,7 @@ typedef struct kernel_curved_triangle {
     vf e[3];
 } kernel_curved_triangle;
 
-/* Computes the weak rays' edge functions again, from projected vertices. */
+/* Computes the edge functions of the rays in `weak` again, from projected vertices. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
                                                                         const kernel_lane_rays *p, vm weak,
                                                                         kernel_curved_triangle *own)

@@ -29,13 +29,14 @@ typedef struct kernel_polynomial {
     float c[8];
 } kernel_polynomial;
 
-/* Coordinates relative to vertex 0 in tile space, so that they are of the cell's size; and the field. */
+/* The polynomials of a cell's map and field. Positions are relative to vertex 0 in tile space, so that they are of the
+ * cell's size. */
 typedef struct kernel_map {
     bool is_pyramid;
-    float origin[3]; /* vertex 0 */
-    float tolerance; /* a Newton step below it is the last */
+    float origin[3]; /* vertex 0 in tile space */
+    float tolerance; /* the Newton step that is smaller than this is the last one */
     kernel_polynomial position[3], field;
-    double exact[4][8]; /* the positions' coefficients and the field's, not rounded */
+    double exact[4][8]; /* unrounded coefficients of the three positions and of the field */
 } kernel_map;
 
 /* Computes the coefficients c of a hex from the numbers v at its vertices; both may be doubles or vectors of
@@ -154,7 +155,7 @@ SIMD_INLINE void kernel_gradient_of(const vf c[8], bool is_pyramid, const kernel
     out[2] += (r[0] * c[5] + r[1] * c[6]) + m->m * c[7];
 }
 
-/* All lanes with the same. */
+/* Copies one polynomial's coefficients to all lanes. */
 SIMD_INLINE void kernel_polynomial_spread(const kernel_polynomial *p, vf out[8])
 {
     for (int i = 0; i < 8; i++) out[i] = vf_set(p->c[i]);
@@ -190,12 +191,12 @@ SIMD_INLINE void kernel_jacobian_of(const vf position[3][8], bool is_pyramid, co
     out->det = kernel_dot(row[0], out->cross[0]);
 }
 
-/* Maps of cells of one kind, each lane's its own. */
+/* The maps and fields of cells of one type, one cell per lane. */
 typedef struct kernel_map_lanes {
     bool is_pyramid;
     float tolerance;
     vf origin[3], position[3][8], field[8];
-    kernel_half exact[2][4][8]; /* by halves of the lanes */
+    kernel_half exact[2][4][8]; /* unrounded coefficients, by halves of the lanes */
 } kernel_map_lanes;
 
 SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
@@ -263,7 +264,7 @@ SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, con
     return kernel_value_of(c, kernel_has_apex(type), &m, r);
 }
 
-/* Relative to the map's origin. */
+/* Computes the rays' points at depth t, relative to the map's origin. */
 SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes *map, vf t, vf out[3])
 {
     out[0] = (rays->origin_x + rays->slope_x * t) - map->origin[0];
@@ -271,9 +272,9 @@ SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes 
     out[2] = t - map->origin[2];
 }
 
-/* Finds the coordinates of the point at depth t on each wanted ray by Newton's method, from the guess in r. Returns the
- * rays that did not converge. A ray that has converged is left alone, so that its result does not depend on the others
- * of the packet. */
+/* Computes the reference coordinates of the point at depth t on each ray in `wanted` by Newton's method, from the guess
+ * in r. Returns the rays that did not converge. A ray that has converged is not changed any more, so its result does
+ * not depend on the other rays of the packet. */
 SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
 {
     vf target[3];
@@ -311,9 +312,9 @@ SIMD_INLINE vf kernel_map_beyond(const vf r[3])
  * matters. */
 #define KERNEL_MAP_BEYOND 0.25f
 
-/* The coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method may diverge or come
- * to another solution outside of the cell: then once more from the middle of the cell. Returns the rays that found none
- * in the cell or near: theirs are not to be used. */
+/* Computes the reference coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method
+ * may diverge or find another solution outside the cell; it is then repeated from the middle of the cell. Returns the
+ * rays without a solution in or near the cell, whose r must not be used. */
 SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
 {
     const vf most = vf_set(KERNEL_MAP_BEYOND);
@@ -327,7 +328,8 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map_lanes
     return vm_andnot(again, better);
 }
 
-/* The direction of the field's gradient at r, in tile space. */
+/* Computes the direction of the field's gradient at the reference coordinates r, in tile space, of any length and of
+ * either sign. */
 SIMD_INLINE void kernel_lanes_normal(const kernel_map_lanes *map, const vf r[3], vf out[3])
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
@@ -369,8 +371,8 @@ SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
     for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
 }
 
-/* Field and the cell's own coordinates at t, from the guess in r; on rays where the inverse map fails, the lines
- * between the faces' values and coordinates, counted. */
+/* Returns the field at depth t, and computes the reference coordinates from the guess in r. For rays for which the
+ * inverse map fails, both are interpolated linearly between the faces, and *failures counts them. */
 SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_interval *i,
                                   vm wanted, vf t, vf r[3], int64_t *failures)
 {
@@ -461,10 +463,10 @@ SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
     return kernel_is_prism(type) ? &kernel_wedge_domain : &kernel_box_domain;
 }
 
-/* Rays' directions: (0, 0, 1), and up to spread off that in x and y. */
+/* A range of rays: their directions are (0, 0, 1) plus up to `spread` in x and y. */
 typedef struct kernel_beam {
     float spread;
-    float offset; /* |origin_x|, |origin_y| of no ray are more */
+    float offset; /* largest |origin_x| and |origin_y| of the rays */
 } kernel_beam;
 
 #endif

@@ -1,7 +1,7 @@
-/* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
- * kernel_cell_order() and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes.
- * Vertices are put in order first, so that all else comes in order. What is computed in double is computed in two
- * halves. */
+/* Transforms tets into tile space and computes their edge functions, one tet per lane. The operations are those of
+ * kernel_tet_place(), kernel_cell_order() and kernel_tet_lines(), so the results are the same to the bit. Vertices are
+ * sorted first, so that all else follows their canonical order. Computations in double are done in two halves of the
+ * lanes. */
 #ifndef RENDER_KERNEL_PLACED_H
 #define RENDER_KERNEL_PLACED_H
 
@@ -131,7 +131,7 @@ SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_c
     c->doubt = placed->doubt[n];
 }
 
-/* Adds to the cell what kernel_double.h needs. */
+/* Copies lane n's coordinates and values in double to the cell, as kernel_double.h needs them. */
 SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {

@@ -1,8 +1,8 @@
-/* Hexes, wedges or pyramids, one a lane, placed for a tile and given their lines: the operations of
- * kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_curved_lines(), and so the same bits, for
- * as many cells of one type at once as a vector has lanes. Vertices are turned into the order of coordinates first, so
- * that all else comes in order. What is computed in double is computed in two halves. A function's type is a constant
- * where it is called from, so that its loops have known lengths. */
+/* Transforms hexes, wedges or pyramids into tile space and computes their edge functions, one cell per lane, all of one
+ * type. The operations are those of kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and
+ * kernel_curved_lines(), so the results are the same to the bit. Vertices are permuted into their canonical order
+ * first, so that all else follows that order. Computations in double are done in two halves of the lanes. Callers pass
+ * the type as a constant, so that loops have constant lengths. */
 #ifndef RENDER_KERNEL_PLACED_CURVED_H
 #define RENDER_KERNEL_PLACED_CURVED_H
 
@@ -30,20 +30,22 @@ typedef struct kernel_triangle_lines {
     float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH];
 } kernel_triangle_lines;
 
-/* Cells of one type in lanes. A line's direction is the shape's: from an edge's first vertex to its second, and on a
- * quad from its loop's vertex 0 to 2, or 1 to 3 where it is turned. */
+/* Cells of one type, one per lane. The direction of an edge function is fixed by the shape: from an edge's first vertex
+ * to its second, and for a quad's diagonal from vertex 0 of its loop to 2, or from 1 to 3 in lanes in which the face's
+ * bit in `turned` is set. */
 typedef struct kernel_placed_curved {
-    float at[4][8][SIMD_WIDTH]; /* places in tile space, and the field less the isovalue, scaled */
+    float at[4][8][SIMD_WIDTH]; /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex */
     float c[KERNEL_MAX_LINES][SIMD_WIDTH], cu[KERNEL_MAX_LINES][SIMD_WIDTH], cv[KERNEL_MAX_LINES][SIMD_WIDTH];
-    float doubt[SIMD_WIDTH];    /* the largest of the bounds */
-    int32_t turned[SIMD_WIDTH]; /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
-    /* face by face, four bits a corner: kernel_quad_corners() or kernel_triangle_order() */
+    float doubt[SIMD_WIDTH];    /* largest error bound of the cell's edge functions */
+    int32_t turned[SIMD_WIDTH]; /* a bit for each face whose diagonal is from vertex 1 to 3 of its loop */
+    /* Per face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
+     * kernel_triangle_order(). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
     /* edge functions of the triangular faces, in the shape's order */
     kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES];
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
-    /* for kernel_placed_curved_cell() */
+    /* The following members are used only by kernel_placed_curved_cell(), which extracts one lane's cell. */
     float bound[KERNEL_MAX_LINES][SIMD_WIDTH], least_of_all[SIMD_WIDTH];
     kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
@@ -217,17 +219,19 @@ SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_array
 
 /* ---- edge functions ---- */
 
-/* A vertex as lines take it. */
+/* A vertex in tile space, with its size (kernel_lanes_size()), from which edge functions are computed. */
 typedef struct kernel_lanes_spot {
     vf at[3], size;
 } kernel_lanes_spot;
 
-/* The largest bound of kernel_curved_lines() over all lines, and that of kernel_line_blur(). */
+/* Maxima over all edge functions: of the error bound that decides whether a sign is certain, and of the error and
+ * extent that bound the accuracy of weights. */
 typedef struct kernel_lanes_blur {
     vf doubt, error, extent;
 } kernel_lanes_blur;
 
-/* Which of the two ends is the first decides signs alone. Blurs are for cells with triangles. */
+/* Computes edge function number n from its two end vertices. Exchanging the ends changes only signs. The error and
+ * extent are computed only for types with triangles. */
 SIMD_INLINE void kernel_placed_line_of(kernel_placed_curved *out, const kernel_frame *f, float radius, int type, int n,
                                        const kernel_lanes_spot ends[2], kernel_lanes_blur *own)
 {
@@ -242,8 +246,8 @@ SIMD_INLINE void kernel_placed_line_of(kernel_placed_curved *out, const kernel_f
     if (kernel_has_triangles(type)) kernel_lanes_line_blur(line, radius, a->at, b->at, &own->error, &own->extent);
 }
 
-/* Returns the loop's corners from the least on, towards the lesser neighbour, four bits a corner; odd_lanes: where that
- * begins at the loop's vertex 1 or 3. */
+/* Returns a quad's corners in cyclic order from the smallest vertex towards its smaller neighbour, four bits each.
+ * odd_lanes: the lanes in which that order begins at vertex 1 or 3 of the loop. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
@@ -264,7 +268,7 @@ SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8]
     return word;
 }
 
-/* A quad's corners, and its diagonal. */
+/* Stores a quad's corners in canonical order, and returns the end vertices of its diagonal in ends. */
 SIMD_INLINE void kernel_placed_quad(kernel_placed_curved *out, int type, int face, const vf rank[8],
                                     const kernel_lanes_spot spots[8], kernel_lanes_spot ends[2])
 {
@@ -316,8 +320,8 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
 }
 
-/* Stores a triangle's corners in the order, its edges' lines, whose blurs are given, and the least sum of weights that
- * is good enough. */
+/* Stores a triangle's corners in the order of coordinates, its edge functions, and the least sum of weights that is
+ * accurate enough. blurs: errors and extents of the cell's edge functions. */
 SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int face, const vf rank[8],
                                         const kernel_lanes_blur *blurs)
 {
@@ -357,7 +361,7 @@ SIMD_INLINE void kernel_blur_add(kernel_lanes_blur *most, int type, const kernel
     most->extent = vf_max(own->extent, most->extent);
 }
 
-/* Finds the lines of all edges, and of the quads' diagonals from their least corners. */
+/* Computes the edge functions of all edges, and of the quads' diagonals from their smallest corners. */
 SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
                                         int type, const vf rank[8])
 {
@@ -386,8 +390,8 @@ SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_
         kernel_blur_add(&most, type, &own);
     }
     vf_store(out->doubt, most.doubt);
-    /* No less than of any triangle: with the largest error and extent of any line for all three (kernel_blur_least()).
-     */
+    /* An upper bound for all triangles: it uses the largest error and extent of any edge function for all three edges
+     * (kernel_blur_least()). */
     if (kernel_has_triangles(type))
         vf_store(out->least_of_all, 1.0001f * ((3 * most.error) * (3 * most.extent) * (0.5f / KERNEL_WEIGHT_ERROR)));
 }
@@ -438,7 +442,8 @@ SIMD_INLINE void kernel_placed_flip(kernel_line *line)
     line->cv = -line->cv;
 }
 
-/* Lane n as a cell, with all that surfaces ask of it; its lines from the vertex of less rank. */
+/* Copies lane n to a single cell, with all that surfaces need of it. Edge functions are negated if their first vertex
+ * is not the one of smaller rank. */
 static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_placed_curved *h, int type, int n,
                                                                 kernel_cell *c)
 {

@@ -1,6 +1,6 @@
-/* Tets in lanes (kernel_placed.h) on rays that are lanes too, each with a cell of its own: where a ray comes in and
- * goes out. Every operation is that of a packet and one cell (kernel_crossings.h) in the same order, so that a
- * crossing has the same bits however it came to be found. */
+/* Intersects rays with tets, one ray-tet pair per lane; the tets are in lanes too (kernel_placed.h). All operations are
+ * those for a packet and a single cell (kernel_crossings.h), in the same order, so that a crossing has the same bits
+ * however it is computed. */
 #ifndef RENDER_KERNEL_TET_RAYS_H
 #define RENDER_KERNEL_TET_RAYS_H
 
@@ -23,7 +23,7 @@ SIMD_INLINE void kernel_tet_rays_project(const kernel_placed *tets, const kernel
     }
 }
 
-/* Computes edge functions whose sign is in doubt again, from projected vertices, to their exact sign. */
+/* Computes edge functions whose signs are uncertain again from projected vertices, with exact signs. */
 static __attribute__((noinline)) void kernel_tet_rays_exactly(const kernel_placed *tets, const kernel_lane_rays *r,
                                                               vf e[KERNEL_TET_EDGES])
 {
@@ -36,7 +36,7 @@ static __attribute__((noinline)) void kernel_tet_rays_exactly(const kernel_place
     }
 }
 
-/* The rays' vertices as sums of a crossed triangle take them. */
+/* Depths and field values of the four vertices of each ray's tet. */
 typedef struct kernel_tet_vertices {
     vf z[4], f[4];
 } kernel_tet_vertices;
@@ -51,7 +51,7 @@ SIMD_INLINE kernel_sums kernel_tet_rays_sums(const kernel_tet_vertices *v, const
                          .weight = kernel_weight(ij, jk, ik)};
 }
 
-/* Makes the sums of weakly weighted triangles again, from projected vertices. */
+/* Computes the sums of triangles whose weights are not accurate enough again, from projected vertices. */
 static __attribute__((noinline)) void kernel_tet_rays_mend(const kernel_placed *tets, const kernel_lane_rays *r,
                                                            const kernel_tet_vertices *v, const vf e[KERNEL_TET_EDGES],
                                                            const vm weak[4], kernel_sums sums[4])
@@ -69,7 +69,7 @@ static __attribute__((noinline)) void kernel_tet_rays_mend(const kernel_placed *
     }
 }
 
-/* The edge functions on the rays. */
+/* Computes the edge functions of each ray's tet on the ray. */
 SIMD_INLINE void kernel_tet_rays_edges(const kernel_placed *tets, const kernel_lane_rays *r, vf e[KERNEL_TET_EDGES])
 {
     vf least = vf_set(INFINITY);
@@ -82,7 +82,7 @@ SIMD_INLINE void kernel_tet_rays_edges(const kernel_placed *tets, const kernel_l
     if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_tet_rays_exactly(tets, r, e);
 }
 
-/* Finds where the rays come into their tets and go out, and the values there. */
+/* Computes the depths at which each ray enters and leaves its tet, and the field there. */
 SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *tets, const kernel_lane_rays *r, kernel_interval *out)
 {
     vf e[KERNEL_TET_EDGES];

@@ -130,7 +130,7 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 
 /* ---- rays ---- */
 
-/* Vertices, projected along the rays. */
+/* The vertices of each ray's cell, projected along the ray into its plane; the ray is at (0, 0). */
 typedef struct kernel_local_seen {
     vf x[8], y[8];
 } kernel_local_seen;
@@ -145,8 +145,8 @@ SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_loca
     }
 }
 
-/* Returns an edge function, whose sign bit is its side, and lowers *least to its absolute value. A function that is too
- * small has an uncertain sign. */
+/* Returns the bits of the edge function of vertices a and b; their sign bit is the side on which the ray passes the
+ * edge. Lowers *least to the function's absolute value: if that is too small, the sign is uncertain. */
 SIMD_INLINE vi kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
@@ -167,7 +167,7 @@ SIMD_INLINE void kernel_local_sides_of(const kernel_local_seen *s, int type, ker
     }
 }
 
-/* Returns a bit for each face whose edge functions all have the same sign on the ray. */
+/* Returns per ray a mask of the faces whose edge functions all have the same sign: those that the ray crosses. */
 SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -180,8 +180,8 @@ SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int t
     return faces;
 }
 
-/* Returns the rays that cross a quad once, even if it does not look convex; adds those that may cross it twice to
- * *alone. */
+/* Returns the rays that cross a quad exactly once, even if it does not look convex. Adds the rays that may cross it
+ * twice to *alone. */
 SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kernel_curved_sides *sides,
                                          const kernel_shape *shape, int face, vm rays, vm *alone)
 {
@@ -191,7 +191,7 @@ SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kerne
     return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
-/* Finds the faces that the rays cross. dents: per ray, bits of the quads that may not look convex; NULL: there are
+/* Finds the faces that the rays cross. dents: per ray, a bit for each quad that may not look convex; NULL if there are
  * none. */
 SIMD_INLINE void kernel_local_find_given(const kernel_local_faces *f, const kernel_local_rays *own, const vi *dents,
                                          vm rays, kernel_curved_crossed *out, int type)
@@ -218,7 +218,7 @@ static __attribute__((noinline)) void kernel_local_find_dented(const kernel_loca
     KERNEL_OF_TYPE(type, kernel_local_find_given, f, own, dents, rays, out);
 }
 
-/* Finds the two faces that each ray crosses once. Any other ray is marked for the scalar path (out->alone). */
+/* Finds the two faces that each ray crosses once. All other rays are added to out->alone, to be traced one by one. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_local_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
@@ -369,7 +369,7 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2],
     for (int n = 0; n < count; n++) kernel_local_quad_end(&corners[n], type, &places[n], &ends[n]);
 }
 
-/* Computes entry and exit of rays that cross two faces. */
+/* Computes entry and exit of the rays that cross two faces; the nearer point comes first. */
 SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_rays *rays,
                                     const kernel_curved_crossed *crossed, int type, kernel_point out[2])
 {

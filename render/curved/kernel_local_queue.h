@@ -1,5 +1,6 @@
-/* Queues of hexes, wedges and pyramids, one per type, for cells in arrays of any layout. When a queue is full, a vector
- * of its cells is transformed at once. kernel_local_samples.h and kernel_local_segments.h use them. */
+/* Queues of hexes, wedges and pyramids, one queue per cell type, for meshes with arrays of any layout. When a queue is
+ * full, a vector of its cells is transformed at once. Samples (kernel_local_samples.h) and segments
+ * (kernel_local_segments.h) are computed from these queues. */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -180,7 +181,7 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
     return vm_bits(shows);
 }
 
-/* Reads the vertex indices of queued cells before index `end`. */
+/* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
 SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_queue *q, int end, int type)
 {
     for (; q->known < end; q->known++)
@@ -216,7 +217,7 @@ SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
     for (int i = 0; i < 8; i++) memmove(q->vertex[i], q->vertex[i] + SIMD_WIDTH, LEFT * sizeof *q->vertex[i]);
 }
 
-/* Queues a cell, whose vertex indices must have been prefetched; returns whether the queue is full. */
+/* Appends a cell, whose vertex indices must have been prefetched, to the queue. Returns whether the queue is full. */
 SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_queue *q, uint32_t cell, unsigned blocks,
                                    unsigned box, int type)
 {
@@ -230,7 +231,7 @@ SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_que
 
 /* ---- intervals of rays in cells ---- */
 
-/* Computes the interval, relative to depth, in which each ray may be inside its cell. */
+/* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell's slabs. */
 SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_local_rays *rays, vf depth,
                                       vf *near, vf *far)
 {
@@ -247,7 +248,7 @@ SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const ker
         const vf inverse = 1.0f / vf_muladd(row[0], rays->slope[0], vf_muladd(row[1], rays->slope[1], row[2]));
         const vf low = (kernel_take(cells->low[i], rays->lane) - at) * inverse;
         const vf high = (kernel_take(cells->high[i], rays->lane) - at) * inverse;
-        /* A product that is not a number is of a ray along a plane: the others tell. */
+        /* A ray parallel to a slab may give NaN here; max() and min() then keep the bounds of the other slabs. */
         *near = vf_max(vf_min(low, high), *near);
         *far = vf_min(vf_max(low, high), *far);
     }

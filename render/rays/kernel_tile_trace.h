@@ -284,7 +284,8 @@ SIMD_INLINE vi kernel_batch_at(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
-/* Rays of pixels in tile space, with the lane of each ray's cell and the pixel's index among the packets. */
+/* A vector of rays in tile space. lane: the lane that holds the ray's cell; at: position of its pixel among the
+ * packets. */
 typedef struct kernel_local_rays {
     vi lane, at;
     vf origin[2], slope[2];
@@ -308,13 +309,13 @@ SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
                      at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
-/* Rays of a list, each with its own cell. */
+/* A vector of rays from a list, each traced in its own cell. */
 typedef struct kernel_lane_rays {
     vm active;
-    vi lane, at; /* lane of the ray's cell; index of its pixel, by packet and lane */
+    vi lane, at; /* lane that holds the ray's cell; position of its pixel among the tile's packets */
     kernel_rays rays;
-    vf u, v; /* as in kernel_packet */
-    vf far;  /* nearest hit so far; set only by surfaces */
+    vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
+    vf far;  /* nearest hit so far; set only when surfaces are traced */
 } kernel_lane_rays;
 
 /* Loads up to SIMD_WIDTH rays of the list, from ray `first` on; missing rays are inactive. */

@@ -1,5 +1,5 @@
-/* Numbers of cells in lanes, as rays take them; and vectors of doubles, a lane for each of a vf's half: they fill a
- * register. Vectors of more are taken apart by compilers, and their comparisons lane by lane. */
+/* Vectors of doubles, and permutations that give each ray the numbers of its own cell. A kernel_half has SIMD_WIDTH / 2
+ * doubles and fills one register; compilers split larger vectors and compare their lanes one by one. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 

@@ -34,18 +34,18 @@ enum {
 _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
 
 typedef struct kernel_batch {
-    int count, layer, part; /* -1: of none yet */
-    kernel_arrays arrays;   /* the layer's field on the part */
-    bool takes_batches;     /* its tets may be put into batches */
-    bool is_of_faces;       /* the layer's */
-    /* cell by cell */
+    int count, layer, part; /* layer and part of the batch's cells; -1 if no cell was added yet */
+    kernel_arrays arrays;   /* arrays of the layer's field on the mesh part */
+    bool takes_batches;     /* whether tets of this layer and part may be traced in batches */
+    bool is_of_faces;       /* copy of the layer's is_of_faces */
+    /* The batch's cells, one per lane: */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
     float near[SIMD_WIDTH];
     int value[SIMD_WIDTH];
     int32_t vertex[4][SIMD_WIDTH];
     double isovalue[SIMD_WIDTH];
-    kernel_placed tets; /* f: field less the isovalue, scaled */
+    kernel_placed tets; /* transformed cells; f is the field minus the isovalue, scaled */
     bool has_normals;
     vf normal[3];
     kernel_pixel_list rays; /* list of rays to be traced */
@@ -89,7 +89,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 
 /* ---- a cell of the batch that is traced by blocks ---- */
 
-/* Without world coordinates: the normal is known. */
+/* Copies lane n to a single cell. World coordinates are not copied, because the normal is already known. */
 static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, int n, kernel_cell *c)
 {
     kernel_placed_cell(&b->tets, n, c);
@@ -200,7 +200,7 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
                        kernel_tile_layer_batches(t);
 }
 
-/* The last ones. */
+/* Traces the batch's remaining cells. */
 SIMD_INLINE void kernel_batch_end(kernel_tile_trace *t, kernel_batch *b)
 {
     if (!b->count) return;

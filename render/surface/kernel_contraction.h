@@ -93,8 +93,8 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
     out->rim = kernel_take(c->rim, lane);
 }
 
-/* The places of D: the domain, of hexes and wedges wider by rim. Takes r to the nearest, of a pyramid to one that is
- * near. */
+/* Moves the reference coordinates r to the nearest point of the domain D, which for hexes and wedges is widened by
+ * `rim`. For a pyramid the point is only close to the nearest one. */
 SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
 {
     const vf half = 0.5f + rim;

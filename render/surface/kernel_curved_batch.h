@@ -43,7 +43,7 @@
 /* maximum number of pixels in the box of a wedge or pyramid that is traced in a batch, if the mesh has mixed types */
 enum { KERNEL_CURVED_PIXELS = 64 };
 
-/* Cells of one type that wait to be placed together. */
+/* Cells of one type that are queued to be transformed together. */
 typedef struct kernel_curved_batch_pending {
     int type, count;
     uint32_t cell[SIMD_WIDTH];
@@ -55,15 +55,16 @@ typedef struct kernel_curved_batch_pending {
 } kernel_curved_batch_pending;
 
 typedef struct kernel_curved_batch {
-    int layer, part;                        /* -1: of none yet */
-    kernel_arrays arrays;                   /* the layer's field on the part */
-    kernel_curved_batch_pending pending[3]; /* by kernel_shape_number() */
-    kernel_curved_batch_pending *own;       /* those that are traced */
+    int layer, part;                        /* layer and part of the batch's cells; -1 if no cell was added yet */
+    kernel_arrays arrays;                   /* arrays of the layer's field on the mesh part */
+    kernel_curved_batch_pending pending[3]; /* queues of cells by type (kernel_shape_number()) */
+    kernel_curved_batch_pending *own;       /* the queue whose cells are being traced */
     kernel_placed_curved placed;
-    float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
-    float lines[8][SIMD_WIDTH];   /* field of the contour lines by vertex and lane; set only if the layer has lines */
+    /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
+    float colours[8][SIMD_WIDTH];
+    float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
     kernel_bounds bounds;
-    unsigned ready; /* lanes that are cells on their own as well */
+    unsigned ready; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
     kernel_pixel_list rays, met, found, others;
     /* faces crossed by the rays in `met`: the number of the first plus 8 times that of the second */
@@ -91,9 +92,9 @@ SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h
                            .bounds = &h->bounds};
 }
 
-/* ---- cells alone ---- */
+/* ---- single cells of the batch ---- */
 
-/* The lane as a cell. */
+/* Copies the cell in lane n to cells[n], unless that has been done. */
 SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
 {
     if (h->ready >> n & 1) return;
@@ -370,7 +371,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     return blocks;
 }
 
-/* Finds the field's gradients at r, in camera axes; or takes r, from which kernel_vertex_normals() finds normals. */
+/* Computes the field's gradients at the reference coordinates r, in camera axes. With RENDER_VERTEX it stores r
+ * instead, from which kernel_vertex_normals() later computes normals. */
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
                                             vf normal[3])
 {
@@ -451,7 +453,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_known_of, t, h);
 }
 
-/* Searches the other rays from n on, whose ends kernel_curved_batch_cross() has looked at, for their first root. */
+/* Searches the rays of `others` from index n on for their first visible root, and accepts it. Returns the mask of
+ * blocks with a nearer hit. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {
@@ -519,7 +522,7 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* The cells that wait are placed. */
+/* Transforms the queued cells, and lists their rays. Cells with collapsed faces are traced block by block. */
 static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
@@ -560,7 +563,7 @@ static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace 
     own->count = 0;
 }
 
-/* Traces the pending cells. */
+/* Traces the cells of all queues. */
 SIMD_INLINE void kernel_curved_batch_end(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     const int layer = t->layer;
@@ -572,7 +575,7 @@ SIMD_INLINE void kernel_curved_batch_end(kernel_tile_trace *t, kernel_curved_bat
     }
 }
 
-/* Starts a new part and layer. */
+/* Starts a new part and layer: traces the queued cells of the last one first. */
 SIMD_INLINE void kernel_curved_batch_turn(kernel_tile_trace *t, kernel_curved_batch *h, const kernel_arrays *arrays,
                                           int part)
 {
@@ -583,13 +586,13 @@ SIMD_INLINE void kernel_curved_batch_turn(kernel_tile_trace *t, kernel_curved_ba
     h->arrays = *arrays;
 }
 
-/* Can hexes, wedges and pyramids of the layer under way be traced in batches? */
+/* Returns whether hexes, wedges and pyramids of the current layer can be traced in batches. */
 SIMD_INLINE bool kernel_curved_batch_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
 {
     return arrays->has_lanes && kernel_tile_layer_batches(t);
 }
 
-/* Adds a cell of the type to the pending ones. */
+/* Queues a cell of the given type. A queue that is full is traced first. */
 SIMD_INLINE void kernel_curved_batch_wait(kernel_tile_trace *t, kernel_curved_batch *h, int type,
                                           const kernel_tile_candidate *candidate, int value)
 {

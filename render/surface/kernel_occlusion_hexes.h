@@ -83,7 +83,8 @@ SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hex
     vf_store((float *)(void *)h->turned, words[1][KERNEL_CURVED_RECORD_TURNED - KERNEL_CURVED_RECORD_QUADS - 4]);
 }
 
-/* The edge function of the ray itself, its sign exact: products of float32 are, in double. */
+/* Computes the edge function of edge n for the pair's ray. Its sign is exact, because products of float32 are exact in
+ * double. */
 SIMD_INLINE void kernel_pairs_line(kernel_placed_curved *h, int n, const vf from[2], const vf to[2])
 {
     vf c = vf_set(0);
@@ -167,7 +168,8 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
-    /* Where the sign changes the root lies where the counted part is left out, if at all there. */
+    /* If the sign changes, the interval has a root. It counts only if it is not in the parts of the interval that are
+     * excluded, before `from` and behind `to`. */
     const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
     const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
     out.blocked = vm_and(near, vm_and(change, vm_and(before, behind)));

@@ -54,10 +54,10 @@ typedef struct kernel_verdict {
     vm tiny;     /* the field is so close to 0 everywhere that its sign is only rounding */
 } kernel_verdict;
 
-/* What kernel_bounds has of each ray's own cell. */
+/* The bounds of kernel_bounds, gathered for each ray's own cell. */
 typedef struct kernel_limits {
     vf bent[3][8], inverse[3][3], stretch, slope, curve, twist;
-    vf coarsest; /* longer pieces are halved in any case */
+    vf coarsest; /* pieces longer than this share of the interval are always halved */
     vm is_monotone;
 } kernel_limits;
 
@@ -108,7 +108,8 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
     *slope = vf_sqrt(vf_max(largest, between));
 }
 
-/* side: 1 or -1. gap: how far Y(from), Y(to) may be from the ray. */
+/* Judges the piece between two points. side: the sign of the field at `from`, 1 or -1. gap: upper bound of the distance
+ * of Y(from) and Y(to) from the ray. */
 SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kernel_limits *b, const kernel_point *from,
                                         const kernel_point *to, vf gap, vf side)
 {
@@ -150,10 +151,10 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
  * size, which are processed in order. */
 typedef struct kernel_search {
     kernel_rays rays;
-    kernel_map_lanes map; /* set up where more is asked than the interval's ends tell, as the limits are */
+    kernel_map_lanes map; /* set only if the ends of the interval do not decide all rays; the same holds for `limits` */
     kernel_limits limits;
     const kernel_interval *interval;
-    int64_t *failures; /* the map's */
+    int64_t *failures; /* counter of failed inversions of the map */
     vm open;           /* rays that have pieces left */
     vm ended;          /* rays whose last piece has been processed; `side` is then the field's sign at its end */
     vf side;           /* sign of the field at `from`: 1 or -1 */
@@ -395,8 +396,8 @@ SIMD_INLINE kernel_half kernel_half_value(const kernel_half c[8], const kernel_h
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* How far the places r at depth t are off their rays, and the field there, in double: exact but for the rounding of r
- * and t themselves. */
+/* Computes in double how far the points with reference coordinates r at depth t are from their rays, and the field
+ * there. The results are exact except for the rounding of r and t. */
 SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *at,
                                   vf off[3], vf *value)
 {
@@ -427,8 +428,8 @@ typedef struct kernel_residual {
     vf off[3], value;
 } kernel_residual;
 
-/* A step of Newton's method on the four equations at once; t is kept within the bracket. Returns who has not come to
- * its end. */
+/* Does a step of Newton's method for the four equations at once; t stays between low and high. Returns the rays that
+ * have not converged. */
 SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *low,
                                   const kernel_point *high, vm wanted, const kernel_residual *residual,
                                   kernel_point *out)
@@ -458,7 +459,7 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lane
     return vm_and(wanted, vm_not(vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat)));
 }
 
-/* The last step, from residuals in double. */
+/* Does the last step of Newton's method, with residuals computed in double. */
 SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
                                     const kernel_point *low, const kernel_point *high, kernel_point *out)
 {
@@ -472,7 +473,8 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_la
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }
 
-/* The last step to roots from places that are off by no more than end. Changes the map's tolerance. */
+/* Does the last step of Newton's method, from points whose reference coordinates have an error of at most `end`.
+ * Changes the map's tolerance. */
 SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map_lanes *map, vm wanted, float end,
                                     kernel_point *at)
 {
@@ -482,8 +484,8 @@ SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map_lanes *m
     kernel_polish_last(rays, map, wanted, &low, &high, at);
 }
 
-/* The roots between low and high by such steps, the last of them from residuals in double. Returns those of wanted on
- * which they do not converge. */
+/* Refines the roots between low and high by Newton's method; residuals of the last step are in double. Returns those of
+ * the wanted rays for which it does not converge. */
 SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
                                    const kernel_point *low, const kernel_point *high, kernel_point *out)
 {

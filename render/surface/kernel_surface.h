@@ -184,7 +184,7 @@ static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*valu
     return KERNEL_OF_TYPE(type, kernel_maps_value, values, lane, r);
 }
 
-/* Takes the crossings of the isovalue that are visible, and returns them. */
+/* Accepts those of the found crossings of the isovalue that are visible, and returns them. */
 SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                     const kernel_curved *curved, int value, const kernel_map_lanes *map, vm found,
                                     const kernel_point *at)

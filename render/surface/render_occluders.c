@@ -251,7 +251,8 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Faces' corners and diagonals as kernel_placed_curved has them. */
+/* Stores the corners of the hex's faces and the directions of their diagonals, in the format of
+ * kernel_placed_curved. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
     int32_t turned = 0;

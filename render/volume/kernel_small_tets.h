@@ -1,6 +1,6 @@
-/* Small tets, one pixel-tet pair per lane: of a packet's rays most would miss such a tet. Tets are transformed
- * SIMD_WIDTH at a time in any case (kernel_placed.h). The pixels of their bounding boxes are listed, and their
- * crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tet_rays.h). */
+/* Processes small tets with one pixel-tet pair per lane, because most rays of a packet would miss such a tet. Tets are
+ * transformed SIMD_WIDTH at a time in any case (kernel_placed.h). The pixels of their bounding boxes are listed, and
+ * the rays' crossings are computed by the operations of kernel_crossings.h, with the same bits (kernel_tet_rays.h). */
 #ifndef RENDER_KERNEL_SMALL_TETS_H
 #define RENDER_KERNEL_SMALL_TETS_H
 

@@ -35,7 +35,8 @@ enum {
     KERNEL_OPEN_PIECE = 16,
     KERNEL_SORT_PIECE = 64,
     KERNEL_SORT_ENDS = 48,
-    KERNEL_WAIT_AHEAD = 8, /* prefetch distance in tets: first for vertex indices, then for coordinates and values */
+    /* prefetch distance in tets: vertex indices are prefetched that far ahead, then coordinates and values */
+    KERNEL_WAIT_AHEAD = 8,
     KERNEL_WAIT_ROOM = SIMD_WIDTH + 2 * KERNEL_WAIT_AHEAD
 };
 
@@ -59,11 +60,12 @@ typedef struct kernel_tile_cells {
     kernel_block_rays block_rays;
     /* Queue of tets, with the blocks and the box of pixels that each may meet. When it is full, the first SIMD_WIDTH
      * tets are processed. */
-    int pending, known; /* the vertex indices of the first `known` tets have been read */
+    /* number of tets in the queue; of these, the first `known` have their vertex indices in wait_vertices */
+    int pending, known;
     uint32_t wait_cell[KERNEL_WAIT_ROOM];
     uint16_t wait_blocks[KERNEL_WAIT_ROOM], wait_box[KERNEL_WAIT_ROOM];
     int32_t wait_vertices[4][KERNEL_WAIT_ROOM];
-    kernel_tile_take_tets *take_tets; /* NULL: each tet is processed alone */
+    kernel_tile_take_tets *take_tets; /* NULL if each tet is processed on its own */
 } kernel_tile_cells;
 
 /* Transforms the fetched cell and prepares it for the rays of the blocks. Returns the blocks in which it may be
