@@ -22,7 +22,7 @@ typedef struct image {
     /* row-major, height × width: fragment.t_in of the nearest surface hit, +infinity if there is none. NULL: depth was
      * not requested. */
     float *depth;
-    deep_image *deep; /* NULL on every rank if the samples were not requested */
+    deep_image *deep; /* samples of the image, only on rank 0; NULL on every rank if samples were not requested */
     bool is_folded;   /* set if the image is made from fragments that ranks have folded (fragment_fold.h) */
 } image;
 

@@ -36,9 +36,9 @@ typedef enum insitu_anchor {
 } insitu_anchor;
 
 typedef struct insitu_words {
-    const char *text; /* UTF-8, one line */
+    const char *text; /* text in UTF-8, a single line */
     insitu_anchor at;
-    float size; /* height relative to the words of the other decorations: 1, or 1.4 for a title */
+    float size; /* height of the text relative to that of other decorations: 1, or 1.4 for a title */
 } insitu_words;
 
 typedef struct insitu_tick {
@@ -51,11 +51,11 @@ typedef struct insitu_colour_bar {
     const char *label;
     const float *colours; /* row-major, colour_count × 3, linear, from the low end on, evenly spaced */
     int colour_count;     /* at least 2, or at least 1 if is_banded */
-    /* each colour fills a band, and all bands have equal width; else colours are interpolated linearly */
+    /* set if each colour fills a band, where all bands have equal width; otherwise colours are interpolated linearly */
     bool is_banded;
     const float *below; /* 3 values, linear: the colour of values below the low end; NULL: the colour of the low end */
     const float *above; /* same as below, for values above the high end */
-    insitu_anchor at;   /* INSITU_LEFT or INSITU_RIGHT */
+    insitu_anchor at;   /* position in the picture: INSITU_LEFT or INSITU_RIGHT */
     int tick_count;
     const insitu_tick *ticks;
 } insitu_colour_bar;
@@ -64,20 +64,20 @@ typedef struct insitu_colour_bar {
  * one. */
 typedef struct insitu_stroke {
     double from[2], to[2];
-    bool is_behind; /* surfaces and volumes in the picture hide the line */
+    bool is_behind; /* set if surfaces and volumes in the picture hide the line */
 } insitu_stroke;
 
 /* Words beside a point of the picture; they are left out if they would overlap others. */
 typedef struct insitu_label {
-    double at[2];   /* pixels, as of a stroke */
+    double at[2];   /* position of the point in pixels, in the coordinates of a stroke */
     double away[2]; /* unit vector from the point to the words */
-    double gap;     /* between point and words, in heights of words */
+    double gap;     /* distance between the point and the words, as a multiple of the height of words */
     char text[32];
 } insitu_label;
 
 /* A scale bar, whose words give its length in the scene. */
 typedef struct insitu_scale_bar {
-    double length; /* in pixels; 0: there is no bar */
+    double length; /* length in pixels; 0: there is no bar */
     insitu_anchor at;
     char text[300];
 } insitu_scale_bar;
@@ -87,7 +87,7 @@ typedef struct insitu_scale_bar {
 typedef struct insitu_decorations {
     float background[4]; /* linear, premultiplied */
     float colour[3];     /* colour of words and lines, linear */
-    double size;         /* height of words, as a share of the picture's height */
+    double size;         /* height of words, as a fraction of the picture's height */
     int words_count;
     const insitu_words *words;
     int bar_count;
@@ -117,7 +117,7 @@ typedef struct insitu_deep_sample {
 /* The samples of each pixel of an image, by increasing depth and without overlaps. The background is not included. */
 typedef struct insitu_deep {
     const insitu_deep_sample *samples;
-    const int64_t *first;   /* row-major, height × width: index in samples of the pixel's first sample */
+    const int64_t *first;   /* row-major, height × width: index of each pixel's first sample in samples */
     const uint32_t *counts; /* row-major, height × width: number of the pixel's samples */
 } insitu_deep;
 
@@ -128,10 +128,10 @@ typedef struct insitu_image {
      * along the pixel's ray), in scene units. The surface may have any opacity, and volumes may be in front of it.
      * +infinity if there is no surface. */
     const float *depth;
-    const insitu_decorations *decorations; /* NULL: none, and rgba includes the background */
+    const insitu_decorations *decorations; /* NULL: there are no decorations, and rgba includes the background */
     int channel_count;
     const insitu_channel *channels; /* borrowed; ignored if the format has no additional channels */
-    const insitu_deep *deep;        /* NULL, or the samples for a deep format, which uses only them and the size */
+    const insitu_deep *deep;        /* NULL, or the samples for a deep format, which uses only these and the size */
 } insitu_image;
 
 /* Writes to a temporary file beside path and renames it, so that path is never an incomplete picture. Missing folders
@@ -146,13 +146,15 @@ INSITU_API insitu_image_write_function insitu_image_write;
 
 /* A place in a larger picture for a smaller one. */
 typedef struct insitu_place {
-    float *rgba; /* the larger picture's, as insitu_image has them; written */
-    int width;   /* the larger picture's */
-    int x, y;    /* of the smaller one's upper left pixel; all of it lies in the larger one */
+    float *rgba; /* pixels of the larger picture, in the layout of insitu_image.rgba; they are written */
+    int width;   /* width of the larger picture in pixels */
+    /* position in the larger picture of the upper left pixel of the smaller one, which must lie completely inside */
+    int x, y;
 } insitu_place;
 
-/* Draw the image's decorations over its colours and put these into the place; the image stays as it is. On an error,
- * message (size bytes) says what went wrong, and the place is as it was; otherwise it is empty. Local. Thread-safe. */
+/* Draws the image's decorations over its colours and stores the result in the place. The image itself is not changed.
+ * On an error, message (size bytes) describes it, and the place is not changed; otherwise message is empty. Local.
+ * Thread-safe. */
 typedef insitu_status insitu_image_place_function(const insitu_image *image, const insitu_place *place, char *message,
                                                   size_t size);
 

@@ -33,9 +33,10 @@ typedef struct session_field {
 
 /* The sets of cells over which an extent is computed. All of these cells are drawn and have only finite values. */
 typedef enum session_extent_kind {
-    SESSION_SEEN,     /* all these cells */
-    SESSION_POSITIVE, /* all these cells; but for the minimum, only those all of whose values are positive */
-    SESSION_SOLID,    /* all these cells except shells */
+    SESSION_SEEN, /* all drawn cells that have only finite values */
+    /* like SESSION_SEEN, but the minimum is computed over only those cells all of whose values are positive */
+    SESSION_POSITIVE,
+    SESSION_SOLID, /* like SESSION_SEEN, but without shells */
     SESSION_EXTENTS
 } session_extent_kind;
 

@@ -29,7 +29,7 @@ typedef struct session_files {
     image frame;
     session_picture memory; /* memory of the frame */
     session_channels channels;
-    deep_image deep;                  /* its counts are NULL if there is no deep picture */
+    deep_image deep;                  /* samples for deep pictures; the member `counts` is NULL if there are none */
     session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */
     base_error error;                 /* the first error of writing a file */
     double ms;                        /* time that writing has taken, in milliseconds */
