@@ -274,7 +274,8 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
 }
 
 /* An outline is a set of points in tile space whose convex hull contains a cell. It has at most this many points: */
-enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two points on each of the 28 lines between two of them */
+/* enough for eight vertices and for two points on each of the 28 lines between two of them */
+enum { KERNEL_OUTLINE_POINTS = 64 };
 
 typedef struct kernel_outline {
     int count;
