@@ -210,7 +210,7 @@ insitu_session_program(test_session_messages)
 insitu_add_mpi_test(session_messages test_session_messages 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_candidates)
-insitu_add_mpi_test(session_candidates test_session_candidates 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_candidates test_session_candidates 1 3 WHOLE 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 
 insitu_session_program(test_session_changes)

@@ -76,7 +76,7 @@ static void grazed_spheres_keep_max_error(void **state)
         for (int i = 0; i < 3; i++) {
             double worst = 0;
             uint64_t at = 0;
-            for (uint64_t seed = 0; seed < (uint64_t)test_effort(40, 2000); seed++) {
+            for (uint64_t seed = 0; seed < (uint64_t)test_effort(20, 2000); seed++) {
                 const double error = error_of(kind, 3 * seed + (uint64_t)i, asked[i]);
                 if (error > worst) at = 3 * seed + (uint64_t)i;
                 worst = test_worse(worst, error);
@@ -127,7 +127,7 @@ static void short_ways_through_dense_media_keep_max_error(void **state)
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         double worst = 0;
-        for (uint64_t seed = 0; seed < (uint64_t)test_effort(60, 2000); seed++)
+        for (uint64_t seed = 0; seed < (uint64_t)test_effort(30, 2000); seed++)
             worst = test_worse(worst, error_in_fog(kind, seed));
         fprintf(stderr, "%s, dense, max_error 0.001: %.3g of it\n", test_mesh_kind_name(kind), worst / 1e-3);
         assert_true(worst <= 1e-3);

@@ -51,7 +51,7 @@ static void compare(render_fixture *f)
 
 static bool is_due(int turn)
 {
-    return test_is_whole() || turn % 3 == 0;
+    return test_is_whole() || turn % 6 == 0;
 }
 
 static void batches_draw_what_single_cells_do(void **state)

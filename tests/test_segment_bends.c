@@ -181,7 +181,7 @@ static void max_error_is_kept_where_looks_say_little(void **state)
             char what[80];
             int seen = 0;
             if (aim == BLIND && shapes[s] != TEST_UNIT_HEX) continue;
-            const int wanted = test_effort(40, 1500);
+            const int wanted = test_effort(20, 1500);
             for (uint64_t seed = 0; seen < wanted && seed < 8 * (uint64_t)wanted; seed++)
                 seen += judge_cell(shapes[s], aim, seed, worst);
             snprintf(what, sizeof what, "%s, %s, %d cells", test_cell_shape_name(shapes[s]), aim_names[aim], seen);

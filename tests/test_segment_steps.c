@@ -196,10 +196,10 @@ static void a_ray_on_which_it_barely_does(void **state)
 
 enum { KINDS = 4, SEEDS = 12 };
 
-/* Usually a third of the seeds, another one for the next kind. */
+/* By default a sixth of the seeds, other ones for the next kind. */
 static void random_cells_and_steps(void **state)
 {
-    const uint64_t every = (uint64_t)test_effort(3, 1);
+    const uint64_t every = (uint64_t)test_effort(6, 1);
     (void)state;
     for (int polyhedra = 0; polyhedra < 2; polyhedra++)
         for (int kind = 0; kind < KINDS; kind++) {

@@ -93,10 +93,10 @@ static void tets_are_exact_for_every_camera(void **state)
     }
 }
 
-/* Usually 48: a multiple of 16, so that steps, slivers and cameras meet. */
+/* By default 32: a multiple of 16, so that steps, slivers and cameras meet. */
 static uint64_t random_tets(void)
 {
-    return (uint64_t)test_effort(48, 80);
+    return (uint64_t)test_effort(32, 80);
 }
 
 /* Steps of the opacity come in one of four seeds, with slivers and other tets and with every camera. */

@@ -10,10 +10,16 @@
 #include "memory.h"
 #include "test_session_fixture.h"
 
-/* Distance between the allocations that are tried; each case begins at its own. */
-static int stride = 97;
+/* Distance between the allocations that are tried, as the command line gives it; 0: the default. */
+static int given_stride;
 /* The one that fails, or did last. */
 static int64_t allocation;
+
+/* Each case begins at an allocation of its own. Steps on several ranks take longer. */
+static int stride(void)
+{
+    return given_stride ? given_stride : rank_count > 1 ? 193 : 97;
+}
 
 /* ---- scenes and meshes ---------------------------------------------------------------------------------------- */
 
@@ -211,7 +217,7 @@ static void run_failures(bool (*fails_well)(const scenery *s, const failure *f, 
 {
     for (int with_all = 0; with_all < (rank_count > 1 ? 2 : 1); with_all++) {
         failure f = {.n = first, .is_armed = with_all || own_rank == rank_count - 1};
-        for (allocation = f.n; !fails_well(s, &f, state); allocation = f.n) f.n += stride;
+        for (allocation = f.n; !fails_well(s, &f, state); allocation = f.n) f.n += stride();
         if (own_rank == 0) fprintf(stderr, "%s: to allocation %lld\n", s->of->name, (long long)f.n);
     }
 }
@@ -252,7 +258,7 @@ static void failing_step_is_the_same_picture_or_an_error(void **context)
         step_state t;
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
-        run_failures(set_and_step_fail_well, &s, 1 + i % stride, &t);
+        run_failures(set_and_step_fail_well, &s, 1 + i % stride(), &t);
         insitu_destroy(&t.session);
         free_pictures(&t.expected);
         scenery_free(&s);
@@ -280,7 +286,7 @@ static void failing_first_step_is_the_same_picture_or_an_error(void **context)
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
         insitu_destroy(&t.session);
-        run_failures(first_step_fails_well, &s, 1 + i % stride, &t);
+        run_failures(first_step_fails_well, &s, 1 + i % stride(), &t);
         free_pictures(&t.expected);
         scenery_free(&s);
     }
@@ -367,7 +373,7 @@ static void failing_edit_is_told_and_taken_later(void **context)
 
 int main(int argc, char **argv)
 {
-    if (argc > 2) stride = atoi(argv[2]);
+    given_stride = argc > 2 ? atoi(argv[2]) : 0;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(failing_step_is_the_same_picture_or_an_error),
         cmocka_unit_test(failing_first_step_is_the_same_picture_or_an_error),
