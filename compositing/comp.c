@@ -49,7 +49,7 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Average number of bytes per fragment in a message: in most pictures 10 for a hit, 11 for an interval of a volume. */
+/* Expected number of bytes per fragment in a message. Most pictures take 10 for a hit and 11 for a volume interval. */
 static const double usual_bytes = 11;
 
 /* Chooses the route; the result is the same on all ranks. fragments is the largest number on any rank. */

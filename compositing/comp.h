@@ -26,11 +26,11 @@
 #include "image.h"
 #include "pixel_set.h"
 
-/* The ranks that composite, and their settings. */
+/* The communicator of the ranks that composite, and the settings that they share. */
 typedef struct comp_group {
     MPI_Comm comm; /* used only by compositing */
     comp_nodes nodes;
-    comp_schedule schedule; /* COMP_AUTOMATIC: chosen for each picture */
+    comp_schedule schedule; /* COMP_AUTOMATIC chooses the fastest one for each picture */
     int longest_dense;      /* rounds with more ranks are sparse (comp_mail.h); 0: the default of comp_route.h */
     comp_claims *claims;    /* made by comp_claims_create() */
 } comp_group;
@@ -58,7 +58,8 @@ bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
     int64_t sent_fragments; /* sent by this rank, including those to itself */
-    int64_t sent_bytes;     /* sent by this rank to others: fragments and finished pixels, including forwarded ones */
+    int64_t sent_bytes; /* bytes sent by this rank to other ranks: fragments and finished pixels, including forwarded
+                           ones */
     int64_t sent_messages;
     double merge_ms;
     comp_schedule schedule;
@@ -76,7 +77,7 @@ typedef struct comp_statistics {
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
 
-/* The pixels whose fragments overlap; the same on every rank. */
+/* The set of pixels whose fragments overlap. It is the same on every rank. */
 typedef struct comp_overlaps {
     int64_t count;
     unsigned char *pixels; /* pixel_set.h, of the whole image; the caller must call base_free(). NULL if count is 0 */

@@ -4,11 +4,11 @@
 
 const comp_machine comp_usual_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* A rank's fragments are made tile by tile, so that the fragments of a tile, or of a block if it is smaller, have one
- * owner. */
+/* The renderer makes fragments tile by tile, so the fragments of one tile, or of one block if blocks are smaller, go to
+ * a single owner. */
 enum { TILE_PIXELS = 256 };
 
-/* Returns the number of partners in a round to which a rank sends fragments. */
+/* Returns the number of partners to which a rank sends fragments in a round. */
 static double partners_of(const comp_route *route, int round, const comp_load *load)
 {
     const uint32_t together = load->block_pixels < TILE_PIXELS ? load->block_pixels : TILE_PIXELS;
@@ -28,7 +28,8 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
         cost.messages += partners;
         cost.bytes += share * bytes;
         cost.seconds += latency + 2 * overhead * partners + (is_within ? m->node_gap : m->gap) * share * bytes;
-        /* A sparse round ends with a barrier: ranks exchange messages in pairs, at twice the distance each time. */
+        /* A sparse round ends with a barrier, modelled as a dissemination barrier: log2(ranks) exchanges between pairs
+         * of ranks. */
         if (!comp_route_is_dense(route, i)) cost.seconds += ceil(log2(route->ranks)) * (m->latency + 2 * m->overhead);
     }
     if (route->ranks > route->owners) {

@@ -10,12 +10,12 @@
 
 /* Times in seconds; the gap is the time per byte. */
 typedef struct comp_machine {
-    double latency, overhead, gap;                /* between nodes */
-    double node_latency, node_overhead, node_gap; /* within a node */
+    double latency, overhead, gap;                /* for messages between nodes */
+    double node_latency, node_overhead, node_gap; /* for messages within a node */
 } comp_machine;
 
-/* A typical present cluster: 10 GB/s per rank, an overhead of a microsecond, a latency of two microseconds; half of
- * these times within a node. */
+/* Typical values of a current cluster: 10 GB/s per rank, 1 microsecond of overhead and 2 microseconds of latency
+ * between nodes; half of these times within a node. */
 extern const comp_machine comp_usual_machine;
 
 /* The load of the busiest rank. */

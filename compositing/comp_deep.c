@@ -25,7 +25,7 @@ static bool make_room(void **items, int64_t count, int64_t *capacity, size_t siz
     return true;
 }
 
-/* Adds an interval, unless it is invisible. */
+/* Callback of comp_merge_cut(): adds a sample for the interval, unless the interval is invisible. */
 static void take_stretch(void *of_list, const fragment *f)
 {
     comp_deep_list *list = of_list;
@@ -127,11 +127,11 @@ static void take_own(deep_image *out, const comp_deep_list *lists, int count)
     }
 }
 
-/* The numbers of pixels and samples of each rank, on rank 0. */
+/* The numbers of pixels and samples that each rank sends. Only rank 0 uses it. */
 typedef struct deep_inbox {
     int ranks;
     int64_t (*counts)[2];
-    comp_deep_pixel *pixels; /* space for the largest number that another rank has */
+    comp_deep_pixel *pixels; /* receive buffer, large enough for any other rank's pixels */
 } deep_inbox;
 
 static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
@@ -171,8 +171,7 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
                      (long long)samples, (long long)samples * (long long)sizeof *out->samples);
 }
 
-static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int count, deep_inbox *in,
-                               base_error *error)
+static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int count, deep_inbox *in, base_error *error)
 {
     int64_t own[2] = {0, 0};
     bool lacks_memory = false;
@@ -184,7 +183,8 @@ static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int c
     if (lacks_memory || !in->counts)
         base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image's %lld samples",
                   (long long)own[1]);
-    const insitu_status status = comp_agree(comm, lacks_memory || !in->counts ? INSITU_ERROR_MEMORY : INSITU_OK, NULL, error);
+    const insitu_status status =
+        comp_agree(comm, lacks_memory || !in->counts ? INSITU_ERROR_MEMORY : INSITU_OK, NULL, error);
     if (status) return status;
     return comp_mpi_status(MPI_Gather(own, 2, MPI_INT64_T, in->counts, 2, MPI_INT64_T, 0, comm), error);
 }

@@ -5,8 +5,8 @@
 #include "memory.h"
 #include "region.h"
 
-/* Number of rows per chunk of a thread. A thread also marks pixels of the row after its chunk, which is the first row
- * of another thread. */
+/* Number of rows in one thread's chunk. A thread also marks pixels in the first row of the next chunk, which another
+ * thread may process. */
 enum { ROWS = 32 };
 
 /* Stores for each channel, in one byte each, whether two rows of pixels differ. sRGB codes are nearly the square root

@@ -1,4 +1,4 @@
-/* Finds the edges of a picture. */
+/* Finds the pixels at edges of a picture, for example to antialias only these. */
 #ifndef COMP_EDGES_H
 #define COMP_EDGES_H
 

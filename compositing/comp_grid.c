@@ -29,7 +29,7 @@ static void merge_blocks(comp_grid *g)
         g->shift_y++;
 }
 
-/* Reverses merge_blocks(), or divides strips. */
+/* Makes blocks smaller: reverses merge_blocks(), or halves the rows of strips when a block is one strip. */
 static void divide_blocks(comp_grid *g)
 {
     if (g->shift_x > g->shift_y)
@@ -40,8 +40,9 @@ static void divide_blocks(comp_grid *g)
         g->row_shift--;
 }
 
-/* Returns the grid. Blocks are nearly square. They are as small as possible with few enough blocks; but for many ranks
- * as large as possible with enough blocks. A block of one row of a strip is not divided. */
+/* Returns the grid. Its blocks are nearly square. They are as small as possible with at most COMP_FEW_BLOCKS blocks;
+ * for many ranks they are made smaller until every rank has enough. A block of one row of a strip is not divided
+ * further. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
 {
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
@@ -67,7 +68,7 @@ int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
     const uint32_t drawn = hash(hash(block + 1) + (uint32_t)rank);
     const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* between 0 and 1, and may round to 1 */
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
-    const int steps = (int)(16 * (chance + 3)); /* 0 .. 1800 */
+    const int steps = (int)(16 * (chance + 3)); /* logarithm in steps of 1/16, between 0 and 1800 */
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 
@@ -94,7 +95,7 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
 typedef struct takers {
     const comp_claim *claims;
     uint32_t blocks, next;
-    uint64_t beyond; /* in eighths of a block */
+    uint64_t beyond; /* allowed excess over the equal share, in eighths of a block's fragments */
     const uint64_t *loads;
     uint64_t share;
 } takers;

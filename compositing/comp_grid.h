@@ -10,19 +10,20 @@ enum {
     COMP_LANES = 16,
     COMP_ROWS = 32, /* most rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
-    COMP_FEW_BLOCKS = 2048, /* so that claims to all of them are a small message, whatever the picture; unless */
-    COMP_RANK_BLOCKS = 60,  /* a rank has fewer than these, on average, */
-    COMP_EVEN_RANKS = 1024  /* more ranks than this do not get more blocks */
+    COMP_FEW_BLOCKS = 2048, /* target number of blocks, so that a message of all claims is small */
+    COMP_RANK_BLOCKS =
+        60, /* minimum number of blocks per rank on average, even if there are then more than COMP_FEW_BLOCKS */
+    COMP_EVEN_RANKS = 1024 /* more ranks than this do not increase the number of blocks */
 };
 
 typedef struct comp_grid {
     uint32_t width, height;
-    uint32_t row_shift;        /* a strip has 2^row_shift rows */
+    uint32_t row_shift;        /* a strip has 2^row_shift rows of pixels */
     uint32_t across, strips;   /* strips per row, and in total */
     uint32_t shift_x, shift_y; /* a block has 2^shift_x × 2^shift_y strips */
     uint32_t blocks_across, blocks;
-    uint64_t inverse; /* 2^64 / width, rounded up, 0 for width 1: the high word of its product with a pixel is
-                         that divided by width */
+    uint64_t
+        inverse; /* 2^64 / width, rounded up; 0 for width 1. The high 64 bits of inverse * pixel are pixel / width */
     int threads;
 } comp_grid;
 
@@ -68,7 +69,7 @@ static inline uint32_t comp_grid_at(const comp_grid *grid, uint32_t pixel)
     return (y & ((1u << grid->row_shift) - 1)) * COMP_LANES + x % COMP_LANES;
 }
 
-/* The area of a strip in the picture. */
+/* The rectangle of the picture that a strip covers, in pixels. */
 typedef struct comp_area {
     uint32_t x, y, width, height;
 } comp_area;
@@ -92,7 +93,7 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
 /* A rank's claim to a block. The combined claim of all ranks has the largest vote and the sum of the fragments. */
 typedef struct comp_claim {
     int32_t vote;       /* the rank with the largest vote is the owner; 0: the block has no fragments */
-    uint32_t fragments; /* UINT32_MAX: this many or more */
+    uint32_t fragments; /* number of fragments; UINT32_MAX if there are more */
 } comp_claim;
 
 /* Returns a rank's vote to own a block in which it has this number of fragments. */

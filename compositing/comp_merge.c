@@ -91,7 +91,7 @@ static int64_t samples_at(const fragment *sorted, int64_t count)
  * their common face two positions: one of the two samples is left out. */
 typedef struct sample_pass {
     uint32_t layer;
-    int64_t begun; /* number of samples at their cells' begin that have not been matched yet */
+    int64_t begun; /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
     int64_t counted;
 } sample_pass;
 
@@ -166,7 +166,7 @@ static fragment mix_samples(const fragment *samples, int64_t count)
     return mixed;
 }
 
-/* The colour and transmittance that have been accumulated. */
+/* The colour and transmittance accumulated so far along a ray. */
 typedef struct blend {
     double colour[3], transmittance;
 } blend;
@@ -194,7 +194,8 @@ static void blend_mixed(blend *b, const fragment *items, int64_t count, float fr
         const double absorbed = 1 - (double)f->transmittance;
         const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
         const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
-        const double emitted = absorbed > 0 ? own / absorbed : share; /* transmittances near 1 round to it */
+        const double emitted =
+            absorbed > 0 ? own / absorbed : share; /* used when transmittances are so close to 1 that they round to 1 */
         for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] * emitted;
         depth += own;
     }
@@ -233,7 +234,7 @@ static bool is_overlapped(const fragment *sorted, int64_t count)
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
-/* Receives the intervals that are blended, unless take is NULL. */
+/* The callback that receives the blended intervals, and its state. take is NULL if there is none. */
 typedef struct stretch_sink {
     comp_stretch_taker *take;
     void *state;
@@ -295,7 +296,7 @@ static void blend_single(const fragment *f, const float background[4], float out
     *out_depth = nearest_surface(f, 1);
 }
 
-/* Not inlined, so that single fragments have no additional cost. */
+/* Not inlined, because the inlined code would slow down pixels of one fragment. */
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {

@@ -15,9 +15,9 @@
 /* The work space of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
     comp_sheet all, other, pixels;
-    fragment_list left, listed; /* left: .pixel is the index in the strip */
-    uint16_t mixed[COMP_ROWS];  /* pixels that have fragments in left */
-    /* position of the fragments of such a pixel in the list */
+    fragment_list left, listed; /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
+    uint16_t mixed[COMP_ROWS];  /* bit mask per row: pixels that have fragments in left */
+    /* Number of fragments of each mixed pixel, and the end of its fragments in listed. */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;

@@ -7,10 +7,10 @@
 #include "comp_pixels.h"
 #include "comp_strips.h"
 
-/* The strips that one place owns. */
+/* The input of one rank's merge: all fragments in the strips that it owns. */
 typedef struct comp_owned {
-    const comp_strips *own; /* fragments of this rank */
-    comp_arrivals arrivals; /* fragments of other ranks */
+    const comp_strips *own; /* fragments that this rank traced */
+    comp_arrivals arrivals; /* fragments received from other ranks */
     const comp_owners *owners;
     int place;
 } comp_owned;

@@ -12,15 +12,16 @@ typedef struct comp_pixel {
     float rgba[4];
 } comp_pixel;
 
-/* Checks that the image has pixels, and not more than fragments can number. */
+/* Returns an error if the image has no pixels, or more pixels than a fragment's 32-bit pixel index can address.
+ * Local. */
 insitu_status comp_check_size(const image *out, base_error *error);
 
-/* Adds the pixel to a set while other threads may add pixels too. */
+/* Adds the pixel to the set. Other threads may add pixels at the same time. */
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 
-/* The input and output of merging besides pixels. */
+/* Settings of a merge, and where its results go. */
 typedef struct comp_merged {
-    const float *background; /* 4 */
+    const float *background; /* 4 floats: linear premultiplied RGBA */
     bool is_folded;          /* pixels are merged by comp_merge_folded_pixel() */
     image *out;              /* picture of rank 0; NULL on other ranks */
     unsigned char *overlaps; /* pixel_set.h: receives the pixels whose fragments overlap. NULL: not requested */

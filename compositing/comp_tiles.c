@@ -28,9 +28,9 @@ typedef struct room {
 } room;
 
 struct comp_tile_scratch {
-    room starts; /* int64_t, pixels of a tile + 1: where each pixel begins in order */
-    room order;  /* int64_t: numbers of fragments, pixel by pixel */
-    room pile;   /* copies of one pixel's fragments, to be sorted */
+    room starts; /* int64_t, one per pixel of a tile and one more: first index of each pixel in order */
+    room order;  /* int64_t: indices of fragments, sorted by pixel */
+    room pile;   /* copies of one pixel's fragments, which are sorted there */
     int64_t fragments;
     double seconds;
     char apart[64]; /* padding, so that threads do not write to a common cache line */

@@ -1,4 +1,5 @@
-/* A row of a strip as a vector of 16 numbers, which compilers cut to what the machine has. */
+/* A row of a strip as a vector of 16 32-bit numbers. The compiler splits it into registers of the instruction set's
+ * width. */
 #ifndef COMP_COMP_LANES_H
 #define COMP_COMP_LANES_H
 
@@ -31,7 +32,7 @@ ROWS_INLINE void store_lanes(uint32_t *to, lanes values)
     memcpy(to, &values, sizeof values);
 }
 
-/* All bits of the lanes that are in the mask. */
+/* Returns a vector whose lanes in the mask have all bits set and whose other lanes are 0. */
 ROWS_INLINE lanes mask_lanes(unsigned mask)
 {
 #if defined(__AVX512F__)
@@ -46,7 +47,7 @@ ROWS_INLINE lanes select_lanes(lanes which, lanes a, lanes b)
     return (which & a) | (~which & b);
 }
 
-/* All bits that any lane has. */
+/* Returns the bitwise OR of all lanes. */
 ROWS_INLINE uint32_t any_bits(lanes values)
 {
     quad parts[4];

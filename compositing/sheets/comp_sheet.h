@@ -1,14 +1,15 @@
-/* A sheet: at most one fragment, or one finished pixel, for each pixel of a strip; and its lossless compression.
+/* A sheet holds at most one fragment, or one finished pixel, per pixel of a strip. This file also declares its lossless
+ * compression.
  *
- * Values of a picture rise and fall smoothly from row to row. So each is predicted from the one above it, or in a
- * straight line from the two above, as whole numbers modulo 2^32: no float is rounded, and NaN keeps its bits. A row is
- * a vector, so 16 pixels are packed at once, and unpacked. The remains of a row take as many half bytes each as its
- * largest needs:
+ * Values of a picture vary smoothly from row to row. Each value is therefore predicted, either as equal to the value
+ * above it or by linear extrapolation from the two values above it. The prediction uses integers modulo 2^32: no float
+ * is rounded, and NaN keeps its bits. A row is a vector, so that 16 pixels are packed or unpacked at once. All
+ * residuals of a row are stored with the same number of nibbles (half bytes), which is that of the largest one:
  *
- *     head | masks of rows that have gaps | word 1: first value, half bytes of rows, remains | word 2 ...
+ *     head | masks of rows with gaps | word 1: first value, nibble counts of rows, residuals | word 2 ...
  *
- * A word that is the same in all pixels is written once; one that always equals the word before it (t_out of hits, the
- * channels of grey) is not written. */
+ * A word with the same value in all pixels is stored once. A word that equals the preceding word in all pixels is not
+ * stored; examples are t_out of hits and the channels of a grey pixel. */
 #ifndef COMP_COMP_SHEET_H
 #define COMP_COMP_SHEET_H
 
@@ -24,12 +25,14 @@
 
 enum { COMP_WORDS = 7, COMP_PIXEL_WORDS = 5, COMP_SHEET_HEAD = 20, COMP_SHEET_SLACK = 128 };
 
-/* Words of a fragment: all but its pixel, in their order (fragment.h). Those of a finished pixel: depth, then RGBA. */
+/* The words of a fragment are its members except the pixel, in their order (fragment.h). The words of a finished pixel
+ * are its depth and RGBA. */
 typedef struct comp_sheet {
-    uint32_t words[COMP_WORDS][COMP_STRIP_PIXELS]; /* by comp_grid_at(); those of absent pixels mean nothing */
-    uint16_t masks[COMP_ROWS];                     /* the pixels that are there, a bit each */
+    uint32_t words[COMP_WORDS][COMP_STRIP_PIXELS]; /* indexed by comp_grid_at(); words of absent pixels are undefined */
+    uint16_t masks[COMP_ROWS];                     /* one bit per pixel: the pixel is present */
     uint32_t strip;
-    bool is_opaque; /* all are hits of opaque surfaces; of use where sheets of fragments are merged */
+    bool is_opaque; /* all fragments are hits of opaque surfaces, so that only the nearest one is visible when sheets
+                       are merged */
 } comp_sheet;
 
 /* Makes the sheet empty. */
@@ -52,7 +55,8 @@ static inline bool comp_is_opaque(const fragment *item)
     return transmittance == 0 && item->kind >= FRAGMENT_SURFACE;
 }
 
-/* Puts a fragment into the sheet, in the place of one that is there. Word by word, which is faster than by a copy. */
+/* Stores a fragment in the sheet and replaces an earlier one of the same pixel. Assigning the words one by one is
+ * faster than memcpy(). */
 static inline void comp_sheet_put(comp_sheet *sheet, uint32_t at, const fragment *item)
 {
     const unsigned char *const words = (const unsigned char *)item + sizeof item->pixel;
@@ -61,7 +65,7 @@ static inline void comp_sheet_put(comp_sheet *sheet, uint32_t at, const fragment
     sheet->is_opaque = sheet->is_opaque && comp_is_opaque(item);
 }
 
-/* Gets it back, for a pixel of the picture. */
+/* Returns the fragment stored at the index, with this pixel of the picture. */
 static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint32_t pixel)
 {
     uint32_t record[1 + COMP_WORDS] = {pixel};
@@ -71,40 +75,46 @@ static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint
     return item;
 }
 
-/* The head of a packed sheet. */
+/* The header of a packed sheet, as stored in messages. */
 typedef struct comp_sheet_head {
     uint32_t strip;
-    uint16_t bytes, count; /* size of the whole sheet; number of its pixels */
-    uint32_t rows, full;   /* rows that have pixels; that have all */
-    uint32_t kinds;        /* kinds of words, two bits each */
+    uint16_t bytes, count; /* size of the packed sheet in bytes; number of its pixels */
+    uint32_t rows, full;   /* bit masks of rows: those with any pixel, and those with all 16 */
+    uint32_t kinds;        /* a word_kind per word, in two bits each */
 } comp_sheet_head;
 
-/* The most bytes that a sheet of so many pixels and words takes, with slack that may be written behind them. */
+/* Returns an upper bound of the bytes that comp_sheet_write() writes for this number of pixels and words. It includes
+ * the slack that may be written behind the end. */
 size_t comp_sheet_bound(int pixels, int words);
 
 int comp_sheet_count(const comp_sheet *sheet);
 
-/* Writes the first so many words of a sheet; returns the end. Local, as all here. */
+/* Packs the first `words` words of a sheet; returns the end of the packed data. All functions in this file are
+ * local. */
 unsigned char *comp_sheet_write(const comp_sheet *sheet, int words, unsigned char *out);
 
-/* Reads the head alone; returns the sheet's end. */
+/* Reads only the header; returns the end of the packed sheet. */
 const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head);
 
-/* Reads what comp_sheet_write() wrote, with slack behind it; returns the end. */
+/* Unpacks a sheet that comp_sheet_write() packed. `in` must be followed by COMP_SHEET_SLACK readable bytes. Returns the
+ * end of the packed data. */
 const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sheet *sheet);
 
-/* The same by an instruction set that the machine has. The bytes do not depend on it. */
+/* These pack and unpack with the given instruction set, which the processor must have. The packed bytes are the same
+ * for every instruction set. */
 unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int words, unsigned char *out);
 const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet);
 
-/* Adds the fragments of other to all. In pixels that both have, the nearer one stays if all of both are opaque hits;
- * otherwise all keeps its own, and left gets those that other has there. */
+/* Adds the fragments of `other` to `all`. In pixels that both contain, the nearer fragment is kept if all fragments of
+ * both are opaque hits; otherwise `all` keeps its fragment, and left[] receives the mask of the pixels whose fragment
+ * of `other` was not added. */
 void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS]);
 
-/* Blends each fragment over the background, as comp_merge_pixel() does with one that is alone or opaque. */
+/* Blends each fragment over the background. The result equals that of comp_merge_pixel() for a pixel whose only visible
+ * fragment this is. */
 void comp_sheet_finish(const comp_sheet *fragments, const float background[4], comp_sheet *pixels);
 
-/* Stores finished pixels in the picture, and the background in the strip's others. */
+/* Stores finished pixels in the picture, and the background in the other pixels of the strip. */
 void comp_sheet_store(const comp_sheet *pixels, const comp_grid *grid, const float background[4], image *out);
 
 #endif

@@ -1,4 +1,5 @@
-/* Blends the rows of sheets, and stores them: inline code that is compiled once an instruction set. */
+/* Inline code that joins sheets, blends their fragments over the background and stores them in the picture. It is
+ * compiled once per instruction set. */
 #ifndef COMP_COMP_SHEET_BLEND_H
 #define COMP_COMP_SHEET_BLEND_H
 
@@ -11,13 +12,13 @@
 #include "comp_sheet_loops.h"
 #include "fragment_order.h"
 
-/* Words of fragments, and of finished pixels. */
+/* Indices of words: first in a fragment, then in a finished pixel. */
 enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WORD_DEPTH = 0, WORD_RGBA = 1 };
 
 /* ---- joining ------------------------------------------------------------------------------------------------- */
 
-/* The lanes of both in which other's fragment is in front. Depth alone decides, but where it is the same, or no number.
- */
+/* Returns the lanes in `both` where the fragment of `other` is in front of that of `all`. Equal depths and NaN are
+ * resolved by fragment_compare(). */
 ROWS_INLINE lanes nearer_lanes(const comp_sheet *all, const comp_sheet *other, int at, unsigned both)
 {
     const float_lanes old = (float_lanes)load_lanes(&all->words[WORD_T_IN][at]);
@@ -81,7 +82,7 @@ static void finish_pixels(const comp_sheet *fragments, const float background[4]
 
 /* ---- storing ------------------------------------------------------------------------------------------------- */
 
-/* Where a row goes. */
+/* The addresses of a row of the picture. */
 typedef struct picture_row {
     float *rgba, *depth; /* depth may be NULL */
     bool is_aligned;
@@ -99,8 +100,8 @@ ROWS_INLINE void store_quad(float *to, quad value, bool is_aligned)
     memcpy(to, &value, sizeof value);
 }
 
-/* Stores four pixels' channels, given one channel of all four at a time. The stores bypass the caches, for the picture
- * is larger than these. */
+/* Transposes four pixels from one vector per channel to RGBA, and stores them. If is_aligned, the stores bypass the
+ * caches, because the picture is larger than the caches. */
 ROWS_INLINE void store_four(const quad in[4], float *rgba, bool is_aligned)
 {
     const quad a = __builtin_shufflevector(in[0], in[1], 0, 4, 1, 5),
@@ -124,7 +125,7 @@ ROWS_INLINE void store_row(const lanes values[5], const picture_row *to)
     }
 }
 
-/* A row that the picture's edge cuts. */
+/* Stores a row of fewer than 16 pixels, at the picture's right edge. */
 static inline void store_cut_row(const lanes values[5], uint32_t width, const picture_row *to)
 {
     float words[COMP_PIXEL_WORDS][COMP_LANES];

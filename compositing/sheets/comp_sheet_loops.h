@@ -1,19 +1,20 @@
-/* The loops over the rows of a sheet (comp_sheet_table.c), compiled once an instruction set. Only static inline code
- * may be shared by these: see tests/house_kernels.sh. */
+/* The table of loops over the rows of a sheet (comp_sheet_table.c), which are compiled once per instruction set. Only
+ * static inline code may be shared between these objects; tests/house_kernels.sh checks this. */
 #ifndef COMP_COMP_SHEET_LOOPS_H
 #define COMP_COMP_SHEET_LOOPS_H
 
 #include "comp_sheet.h"
 
-/* Closed sheets have the pixels of a sheet with many gaps one behind the other, row by row.
- *
- * The rows of a sheet that have pixels, and the lane whose value stands above a lane that has none above it yet. */
+/* The rows of a sheet that contain pixels, and how their values are predicted. A compacted sheet holds the pixels of a
+ * sheet with many gaps one after the other, row by row. A fresh lane has a pixel but none in the rows above, and is
+ * predicted from another lane. */
 typedef struct sheet_plan {
     int rows, count;
-    bool is_sparse;                            /* such sheets are closed first; fresh lanes are those of others */
-    uint8_t row[COMP_ROWS], number[COMP_ROWS]; /* rows that have pixels, and the number of pixels in each */
+    bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */
+    uint8_t row[COMP_ROWS],
+        number[COMP_ROWS]; /* for each row that contains pixels: its index in the strip, and its number of pixels */
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
-    uint8_t source[COMP_ROWS][COMP_LANES]; /* the lane from which each fresh lane takes its last value */
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose previous value predicts it */
 } sheet_plan;
 
 typedef struct comp_sheet_loops {
@@ -31,7 +32,7 @@ typedef struct comp_sheet_loops {
 
 extern const comp_sheet_loops comp_sheet_plain, comp_sheet_sse42, comp_sheet_avx512;
 
-/* Returns the loops that a machine with the instruction set takes. */
+/* Returns the fastest loops that the instruction set can run. */
 const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa);
 
 #endif

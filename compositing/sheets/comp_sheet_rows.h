@@ -1,21 +1,22 @@
-/* Packs the rows of sheets: inline code that is compiled once an instruction set. */
+/* Inline code that packs and unpacks the rows of sheets. It is compiled once per instruction set. */
 #ifndef COMP_COMP_SHEET_ROWS_H
 #define COMP_COMP_SHEET_ROWS_H
 
 #include "comp_lanes.h"
 #include "comp_sheet_loops.h"
 
-/* A word is foretold in a straight line from the two above it, or from the one above. */
+/* How a word is stored. The first two predict a word by linear extrapolation from the two rows above, or as equal to
+ * the row above. The others store one value for all pixels, or nothing because the word equals the preceding one. */
 enum word_kind { WORD_LINE, WORD_ABOVE, WORD_SAME, WORD_AS_BEFORE };
 
-/* The nearest lane of known, to the left if there is one. */
+/* Returns the nearest lane in `known` to the left of `lane`, or the nearest to the right if there is none. */
 static uint8_t nearest_lane(unsigned known, int lane)
 {
     const unsigned left = known & ((1u << lane) - 1);
     return (uint8_t)(left ? 31 - __builtin_clz(left) : __builtin_ctz(known));
 }
 
-/* Finds the lanes that have no pixel above them. */
+/* Sets plan->fresh to the lanes that have no pixel above them, and plan->source to the lanes that predict these. */
 static void find_fresh(sheet_plan *plan)
 {
     unsigned known = plan->mask[0];
@@ -45,7 +46,7 @@ static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
     if (plan->rows && !plan->is_sparse) find_fresh(plan);
 }
 
-/* What the rows so far foretell. */
+/* The state of the prediction: the last value of each lane, and its difference from the one before. */
 typedef struct forecast {
     lanes last, slope;
 } forecast;
@@ -59,7 +60,7 @@ ROWS_INLINE void begin_fresh(const sheet_plan *plan, int i, forecast *f)
     }
 }
 
-/* Maps values near 0, of either sign, to small ones. */
+/* Zigzag encoding: maps signed integers near 0 to small unsigned ones. */
 ROWS_INLINE lanes fold(lanes value)
 {
     return value << 1 ^ (lanes)((signed_lanes)value >> 31);
@@ -70,7 +71,7 @@ ROWS_INLINE lanes unfold(lanes value)
     return value >> 1 ^ -(value & 1);
 }
 
-/* The forecast learns the row's values. Straight lines begin level. */
+/* Updates the prediction with the values of a row. In fresh lanes the slope stays 0. */
 ROWS_INLINE void learn(forecast *f, lanes values, unsigned mask, unsigned fresh)
 {
     const lanes step = values - f->last;
@@ -89,15 +90,16 @@ ROWS_INLINE void learn_first(forecast *f, lanes values)
     f->slope = (lanes){0};
 }
 
-/* ---- half bytes ---------------------------------------------------------------------------------------------- */
+/* ---- nibbles --------------------------------------------------------------------------------------------------- */
 
 static inline unsigned half_bytes(uint32_t greatest)
 {
     return greatest ? (35 - (unsigned)__builtin_clz(greatest)) / 4 : 0;
 }
 
-/* Bytes of count remains of so many half bytes each: two bytes, one byte and half a byte of each, as many of these as
- * there are. Of half bytes the first eight lanes share bytes with the last eight. */
+/* Returns the number of bytes of `count` residuals with `halves` nibbles each. The nibbles of a residual are stored in
+ * planes of two bytes, one byte and half a byte, as in the binary digits of `halves`. In the plane of half bytes, lane
+ * i and lane i + 8 share a byte. */
 static inline size_t packed_bytes(unsigned halves, int count)
 {
     const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
@@ -105,7 +107,7 @@ static inline size_t packed_bytes(unsigned halves, int count)
     return (halves & 4) / 2 * (size_t)count + (halves & 2) / 2 * (size_t)count + (halves & 1) * (size_t)pairs;
 }
 
-/* Writes count remains; those behind are 0. */
+/* Packs `count` residuals; the lanes behind them must be 0. */
 ROWS_INLINE unsigned char *pack(lanes remains, unsigned halves, int count, unsigned char *out)
 {
     if (halves == 8) {
@@ -120,7 +122,7 @@ ROWS_INLINE unsigned char *pack(lanes remains, unsigned halves, int count, unsig
     uint64_t low, high;
     memcpy(&low, &half, sizeof low);
     memcpy(&high, (const unsigned char *)&half + sizeof low, sizeof high);
-    low |= high << 4; /* what is behind count is 0 */
+    low |= high << 4; /* lanes behind count are 0 */
     memcpy(out, &twos, sizeof twos);
     out += (halves & 4) / 2 * (size_t)count;
     memcpy(out, &ones, sizeof ones);
@@ -129,7 +131,7 @@ ROWS_INLINE unsigned char *pack(lanes remains, unsigned halves, int count, unsig
     return out + (halves & 1) * (size_t)pairs;
 }
 
-/* Reads count remains; those behind mean nothing. */
+/* Unpacks `count` residuals; the lanes behind them are undefined. */
 ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned halves, int count, lanes *remains)
 {
     if (halves == 8) {
@@ -155,7 +157,7 @@ ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned halves
     return in + (halves & 1) * (size_t)pairs;
 }
 
-/* Closes the gaps of a row; behind the values are zeros. */
+/* Moves the lanes in the mask to the front (compress); the other lanes become 0. */
 ROWS_INLINE lanes close_gaps(lanes from, unsigned mask)
 {
 #if defined(__AVX512F__)
@@ -178,7 +180,7 @@ ROWS_INLINE lanes open_gaps(lanes from, unsigned mask)
     return load_lanes(gapped);
 }
 
-/* The same from and to memory, which may be written and read for a whole row. */
+/* These compress and expand a row in memory. They may read and write all 16 values of `to` or `from`. */
 ROWS_INLINE void close_row(const uint32_t *row, unsigned mask, uint32_t *to)
 {
 #if defined(__AVX512F__)
@@ -222,13 +224,13 @@ static void open_sheet(const comp_sheet *closed, const sheet_plan *plan, int wor
 
 /* ---- writing ------------------------------------------------------------------------------------------------- */
 
-/* A word's remains, of both ways to foretell it. */
+/* The residuals of a word for both predictions, indexed by WORD_LINE or WORD_ABOVE. */
 typedef struct word_remains {
     lanes of[2][COMP_ROWS];
     uint8_t halves[2][COMP_ROWS];
 } word_remains;
 
-/* The first row goes from left to right. */
+/* Returns the residuals of the first row, where each value is predicted from its left neighbour. */
 ROWS_INLINE lanes remains_of_first(lanes values, unsigned mask)
 {
     uint32_t own[COMP_LANES + 1];
@@ -238,7 +240,7 @@ ROWS_INLINE lanes remains_of_first(lanes values, unsigned mask)
     return fold(closed - load_lanes(own)) & mask_lanes((1u << __builtin_popcount(mask)) - 1);
 }
 
-/* Foretells a word both ways; returns the way that takes fewer bytes. */
+/* Computes the residuals of both predictions; returns the one that takes fewer bytes. */
 ROWS_INLINE enum word_kind foretell(const uint32_t *words, const sheet_plan *plan, word_remains *out)
 {
     forecast f;
@@ -280,7 +282,8 @@ ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *p
     return out;
 }
 
-/* Bits in which any pixel's word differs from the first pixel's, and from its own word before. */
+/* Returns WORD_SAME if all pixels have the first pixel's value, WORD_AS_BEFORE if all equal the preceding word, and
+ * otherwise WORD_LINE. */
 ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *plan, int word, uint32_t first)
 {
     const uint32_t *own = sheet->words[word], *before = sheet->words[word ? word - 1 : 0];

@@ -1,4 +1,5 @@
-/* The loops of one instruction set, COMP_SHEET_TABLE: compiled once for each (CMakeLists.txt). */
+/* The table of loops of one instruction set, named COMP_SHEET_TABLE. CMakeLists.txt compiles this file once per
+ * instruction set. */
 #include "comp_sheet_blend.h"
 #include "comp_sheet_rows.h"
 

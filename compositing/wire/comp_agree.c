@@ -1,6 +1,6 @@
-/* The numbers of statuses do not say which is worse, but any fixed choice among several failures will do. The largest
- * status, from the lowest rank that has it, is the maximum of one number: so the same reduction has room for another.
- */
+/* The numeric order of statuses has no meaning, but any deterministic choice among several failures is sufficient. The
+ * largest status, from the lowest rank that has it, is encoded in one number, so that a single reduction by maximum
+ * finds both and can carry a second number. */
 #include "comp_agree.h"
 
 #include "memory.h"
@@ -14,7 +14,7 @@ insitu_status comp_mpi_status(int code, base_error *error)
     return base_fail(error, INSITU_ERROR_MPI, "compositing: %s", text);
 }
 
-/* Returns the worst status, and on ranks whose own is another says whose it is. */
+/* Returns the worst status. On ranks whose own status differs, the error message names the rank that failed. */
 static insitu_status tell(insitu_status own, insitu_status worst, int64_t rank, base_error *error)
 {
     if (worst == INSITU_OK || worst == own) return worst;
@@ -35,7 +35,7 @@ insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, ba
     return tell(own, worst, ((int64_t)worst << 32) - all[0], error);
 }
 
-/* An MPI_User_function for claims, which are pairs of int. */
+/* The MPI_User_function that adds claims, each of which is a pair of int. */
 static void add_claims(void *in, void *sum, int *count, MPI_Datatype *type)
 {
     const comp_claim *const added = in;

@@ -1,4 +1,5 @@
-/* One rank's failure is everybody's: no rank waits for another that gave up. */
+/* Agreement on a status over all ranks: an error on one rank becomes an error on all, so that no rank waits for another
+ * that has stopped. */
 #ifndef COMP_COMP_AGREE_H
 #define COMP_COMP_AGREE_H
 
@@ -8,27 +9,29 @@
 #include "comp_grid.h"
 #include "error.h"
 
-/* The memory in which ranks agree on owners, and the operation by which MPI adds claims. Both are made once, because a
- * rank that lacks memory for a picture has to take part in the agreement on its status. */
+/* The buffer in which ranks agree on the owners of blocks, and the MPI operation that adds claims. Both are allocated
+ * once per session, because a rank that runs out of memory for a picture must still take part in the agreement on its
+ * status. */
 typedef struct comp_claims {
     MPI_Op add;
-    comp_claim items[]; /* one per block, and two more */
+    comp_claim items[]; /* one per block; two more carry the status and the maximum */
 } comp_claims;
 
-/* Makes what so many ranks need for any picture; NULL: no memory. Local. May be freed after MPI_Finalize(). */
+/* Allocates the claims of any picture for this number of ranks; returns NULL if memory ran out. Local.
+ * comp_claims_free() may be called after MPI_Finalize(). */
 comp_claims *comp_claims_create(int ranks);
 void comp_claims_free(comp_claims *claims);
 
-/* Returns the largest status of all ranks; ranks whose own is another get a message that names the rank. *greatest (may
- * be NULL) becomes the maximum over all ranks. Collective: one reduction. */
+/* Returns the largest status of all ranks. Ranks whose own status differs get a message that names the failed rank.
+ * *greatest, unless NULL, becomes its maximum over all ranks. Collective: one reduction. */
 insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, base_error *error);
 
-/* The same, and each of so many claims becomes that of all ranks, in the same reduction. *greatest is taken for
- * INT32_MAX if it is more. Of more than 2^20 ranks some are taken for others in messages. */
+/* Same as comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction. *greatest is
+ * limited to INT32_MAX. With more than 2^20 ranks the message may name a wrong rank. */
 insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claims *claims, int count,
                                 base_error *error);
 
-/* INSITU_OK, or INSITU_ERROR_MPI with MPI's own words. Local. */
+/* Converts an MPI error code: returns INSITU_OK, or INSITU_ERROR_MPI with the text of MPI_Error_string(). Local. */
 insitu_status comp_mpi_status(int code, base_error *error);
 
 #endif

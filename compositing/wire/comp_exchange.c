@@ -1,13 +1,13 @@
-/* A rank passes parcels on as they came: nothing is unpacked on the way, and fragments are merged only when all of
- * their pixel's are together. For "over" rounds, and merging on the way would make the picture depend on the schedule.
+/* Ranks forward parcels without unpacking them. The owner merges the fragments of a pixel only when it has all of them:
+ * blending rounds, so merging on the way would make the picture depend on the schedule.
  *
- * A rank on which something fails goes on in the rounds with nothing to send, so that nobody waits for it, and returns
- * its error in the end. */
+ * A rank on which an error occurs continues in the rounds without sending fragments, so that no rank waits for it, and
+ * returns its error at the end. */
 #include "comp_exchange.h"
 
 #include "comp_pack.h"
 
-/* Each round after the first forwards what came in those before. */
+/* Runs the rounds of the route. Each round after the first forwards parcels that were received in earlier rounds. */
 static insitu_status run_rounds(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *held,
                                 insitu_status status, base_error *error)
 {

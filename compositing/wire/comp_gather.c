@@ -1,8 +1,8 @@
-/* Pixels travel as fragments do, in sheets (comp_sheet.h). Those of owned blocks are sent, strips without fragments as
- * heads alone; blocks in which nobody has any are background, which rank 0 knows. A rank with children passes their
- * messages on as they come, in a buffer allocated before, and ends with a message that says that no more follow. So
- * rank 0 need not know how many there are, hears only from its own children, and its memory grows with neither the
- * image nor the ranks. */
+/* Finished pixels are sent in sheets (comp_sheet.h), as fragments are. Owners send all strips of their blocks; a strip
+ * without fragments takes only a header. A block without fragments has no owner, and rank 0 fills it with the
+ * background. A rank with children forwards their messages as they arrive, through a buffer allocated beforehand, and
+ * finally sends a message that marks the end. Rank 0 therefore needs no counts and receives only from its own children,
+ * and its memory does not grow with the image or the number of ranks. */
 #include "comp_gather.h"
 
 #include <string.h>
@@ -29,10 +29,10 @@ int comp_gather_children(const comp_route *route, int place)
 
 /* ---- to the parent ------------------------------------------------------------------------------------------- */
 
-/* The way to the parent. */
+/* The connection to the parent in the gather tree. */
 typedef struct upward {
     comp_mailroom *room;
-    int parent; /* its rank */
+    int parent; /* rank of the parent */
     int code;
 } upward;
 
@@ -44,7 +44,8 @@ static void pass_up(upward *up, const unsigned char *message, int bytes)
     up->room->sent_messages++;
 }
 
-/* The reserve has room for so many sends at once. */
+/* Sends this rank's finished pixels, in batches of COMP_LONGEST_DENSE messages because the request buffer has no more
+ * entries. */
 static void send_own(upward *up, const comp_messages *finished)
 {
     MPI_Request *const requests = up->room->reserve;

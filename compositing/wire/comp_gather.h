@@ -6,24 +6,24 @@
 #include "comp_mail.h"
 #include "image.h"
 
-/* Owners send up a tree of places: within a node to its first place, among nodes in a heap of COMP_GATHER_FAN children
- * each. A route that knows no nodes takes each rank for one. */
+/* Owners send up a tree of places. Within a node every place sends to the node's first place; these form a heap with
+ * COMP_GATHER_FAN children per node. Without information about nodes each rank counts as a node. */
 enum { COMP_GATHER_FAN = 64 };
 
-/* The place to which a place >= 1 sends, and how many places send to one. */
+/* Return the place to which a place >= 1 sends, and the number of places that send to a place. */
 int comp_gather_parent(const comp_route *route, int place);
 int comp_gather_children(const comp_route *route, int place);
 
-/* What rank 0 stores pixels in, and around them. */
+/* The picture in which rank 0 stores pixels, with its grid and background. */
 typedef struct comp_canvas {
     const comp_grid *grid;
-    const float *background; /* 4 */
+    const float *background; /* 4 floats: linear premultiplied RGBA */
     image *out;
 } comp_canvas;
 
-/* Collective. Rank 0 stores what the others send on the canvas; its own pixels are there already. finished are a rank's
- * messages to its parent, which are freed. status is this rank's so far; if it is an error, the rank sends no pixels of
- * its own. Allocates nothing. Returns this rank's own status. */
+/* Rank 0 stores the pixels received from other ranks in the canvas, which contains its own pixels already. `finished`
+ * are this rank's messages to its parent; they are freed. `status` is this rank's status before the call; if it is an
+ * error, the rank sends no pixels of its own. Allocates nothing. Returns this rank's own status. Collective. */
 insitu_status comp_gather(comp_mailroom *room, const comp_route *route, const comp_canvas *canvas,
                           comp_messages *finished, insitu_status status, base_error *error);
 

@@ -1,8 +1,9 @@
-/* In a dense round every partner sends to every other, be it an empty message, so all know how many to expect. In a
- * sparse round only partners that have something send, and nobody knows how many do. So sends are synchronous: they end
- * when they are received. A rank whose sends have ended enters a barrier, and goes on receiving until all have entered
- * it: then no message is under way (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse
- * Data Exchange, 2010). No counts are exchanged; the price is one barrier. */
+/* In a dense round every partner sends to every other, if necessary an empty message, so every rank knows how many
+ * messages to expect. In a sparse round only partners with fragments send, and the number of messages is unknown. Sends
+ * are therefore synchronous: they complete when they are received. A rank whose sends have completed enters a
+ * nonblocking barrier and continues to receive until all ranks have entered it; then no message is in flight (Hoefler,
+ * Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse Data Exchange, 2010). This needs no exchange
+ * of counts, only one barrier. */
 #include "comp_mail.h"
 
 #include <string.h>
@@ -117,12 +118,12 @@ void comp_mailroom_close(comp_mailroom *room)
     *room = (comp_mailroom){0};
 }
 
-/* The state of a round. */
+/* The state of one round on this rank. */
 typedef struct round {
     comp_mailroom *room;
     int tag;
     bool is_sparse;
-    int open; /* partners that have more to send; 0 in a sparse round */
+    int open; /* number of partners that have not sent their last message; 0 in a sparse round */
     comp_messages *in;
     MPI_Request *requests;
     int request_count;
@@ -150,8 +151,8 @@ static void send(round *r, const unsigned char *data, int bytes, int rank)
     r->room->sent_messages++;
 }
 
-/* Makes room for all requests; without memory it uses the reserve, which suffices for the empty messages that end each
- * partner's wait. */
+/* Allocates a request for each message. If memory runs out, the preallocated requests are used and the fragments are
+ * dropped: these requests suffice for the empty messages that every partner must receive. */
 static void make_requests(round *r, comp_messages *out, int partners)
 {
     int count = r->is_sparse ? 0 : partners;
@@ -163,7 +164,7 @@ static void make_requests(round *r, comp_messages *out, int partners)
     r->requests = r->room->reserve;
 }
 
-/* Takes a message that a probe has found. */
+/* Receives a message that MPI_Mprobe() or MPI_Improbe() has matched. If there is no memory for it, it is discarded. */
 static void receive(round *r, MPI_Message *found, const MPI_Status *status)
 {
     int bytes = 0;
@@ -217,7 +218,7 @@ static void receive_sparse(round *r)
     check(r, code);
 }
 
-/* Marks the last message to the rank: no more follow. False: there is none. */
+/* Marks the last message to the rank as the last one; returns false if there is no message to the rank. */
 static bool mark_last(const comp_messages *out, int rank)
 {
     comp_message *last = NULL;

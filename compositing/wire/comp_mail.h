@@ -1,9 +1,9 @@
-/* Messages between ranks: parcels of sheets (comp_sheet.h), each for one owner.
+/* Messages between ranks. A message contains parcels, each for one owner, and a parcel contains sheets (comp_sheet.h).
  *
- *     message | are there more? | parcel | parcel | ...          parcel | owner, records, bytes | sheet | sheet | ...
+ *     message | flag: more follow | parcel | parcel | ...        parcel | owner, records, bytes | sheet | sheet | ...
  *
- * A message is at most COMP_MESSAGE_BYTES long. So a rank that runs out of memory can still receive it, in room that
- * was made before, and throw it away: nobody waits for that rank. */
+ * A message is at most COMP_MESSAGE_BYTES long. A rank that runs out of memory can therefore still receive it in a
+ * buffer allocated beforehand, and discard it, so that no rank waits. */
 #ifndef COMP_COMP_MAIL_H
 #define COMP_COMP_MAIL_H
 
@@ -19,8 +19,8 @@ enum { COMP_MESSAGE_BYTES = 1 << 17, COMP_MESSAGE_HEAD = 4, COMP_PARCEL_HEAD = 1
 
 typedef struct comp_message {
     struct comp_message *next;
-    int rank;  /* that it comes from or goes to */
-    int bytes; /* bytes of data, without the slack behind them */
+    int rank;  /* source or destination */
+    int bytes; /* size of data in use, without the slack behind it */
     unsigned char data[];
 } comp_message;
 
@@ -38,45 +38,45 @@ typedef struct comp_parcel {
     const unsigned char *data;
 } comp_parcel;
 
-/* Gets the message's parcel at *offset (COMP_MESSAGE_HEAD: the first) and moves *offset behind it. False: there are no
- * more. */
+/* Reads the message's parcel at *offset, and sets *offset to the end of the parcel. COMP_MESSAGE_HEAD is the offset of
+ * the first parcel. Returns false if there are no more parcels. */
 bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *out);
 
-/* Writes messages to one rank. */
+/* Collects the messages to one rank. */
 typedef struct comp_writer {
     comp_messages messages;
     int rank;
-    size_t room;   /* the room of the last message */
-    size_t parcel; /* where the last parcel begins; 0: there is none */
+    size_t room;   /* capacity of the last message in bytes */
+    size_t parcel; /* offset of the last parcel in the last message; 0 if there is none */
 } comp_writer;
 
-/* Room for so many bytes of a parcel for the owner, or NULL: no memory. expected is how many bytes may follow in all.
- */
+/* Returns space for this number of bytes in a parcel for the owner, or NULL if memory ran out. `expected` estimates how
+ * many bytes will be written in total; it determines the size of a new message. */
 unsigned char *comp_writer_room(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
-/* Ends what was written there at end; it holds so many records. */
+/* Completes the data that was written up to `end`, which contains this number of records. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
-/* Memory that a rank needs to take part in the rounds even when it runs out of other memory. */
+/* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */
 typedef struct comp_mailroom {
     MPI_Comm comm;
     int rank;
-    unsigned char *waste; /* COMP_MESSAGE_BYTES: receives messages that there is no memory for */
-    MPI_Request *reserve; /* a request for each partner of the longest dense round */
-    comp_sheet *sheet;    /* for pixels that come to rank 0 */
+    unsigned char *waste; /* COMP_MESSAGE_BYTES long: receives messages for which there is no memory */
+    MPI_Request *reserve; /* one request per partner of the longest dense round */
+    comp_sheet *sheet;    /* scratch in which rank 0 unpacks pixels */
     int64_t sent_bytes, sent_messages;
 } comp_mailroom;
 
 insitu_status comp_mailroom_open(MPI_Comm comm, comp_mailroom *out, base_error *error);
 void comp_mailroom_close(comp_mailroom *room);
 
-/* One round: sends the messages of out; *in gets those received, in memory of its own. status is this rank's so far; if
- * it is an error, nothing is sent and all that comes is thrown away. All ranks of comm call it. Returns this rank's own
- * status. */
+/* Runs one round: sends the messages in `out`; *in receives the messages of other ranks, which the caller must free.
+ * `status` is this rank's status before the call; if it is an error, nothing is sent and received messages are
+ * discarded. Returns this rank's own status. Collective. */
 insitu_status comp_mail_round(comp_mailroom *room, const comp_route *route, int round, comp_messages *out,
                               comp_messages *in, insitu_status status, base_error *error);
 
-/* Before the first round: ranks beyond the owners give all to their partners, who take it. */
+/* Runs before the first round: ranks beyond the owners send all their fragments to their partners. */
 insitu_status comp_mail_fold(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *in,
                              insitu_status status, base_error *error);
 

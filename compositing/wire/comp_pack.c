@@ -5,7 +5,7 @@
 #include "memory.h"
 #include "region.h"
 
-/* Bytes of a fragment, from which the room for a message is first guessed. In most pictures fragments take fewer. */
+/* Estimated bytes per fragment, which determine the size of a new message. Fragments of most pictures take fewer. */
 enum { EXPECTED_BYTES = 16 };
 
 static insitu_status no_memory(base_error *error, const char *what)
@@ -15,11 +15,11 @@ static insitu_status no_memory(base_error *error, const char *what)
 
 /* ---- fragments into messages --------------------------------------------------------------------------------- */
 
-/* The strips in which a rank has something, by owner. */
+/* The strips in which this rank has fragments, sorted by owner. */
 typedef struct cargo {
     const comp_strips *strips;
-    uint32_t *order;  /* strips */
-    uint32_t *starts; /* where each owner's begin, and one more */
+    uint32_t *order;  /* indices of strips */
+    uint32_t *starts; /* first index in order for each owner, and the total at the end */
 } cargo;
 
 static bool sort_strips(const comp_owners *owners, cargo *c)
@@ -43,7 +43,7 @@ static bool sort_strips(const comp_owners *owners, cargo *c)
 typedef struct packing {
     comp_writer *writer;
     uint32_t owner;
-    int64_t left; /* fragments for the owner that are not written yet, about */
+    int64_t left; /* estimated number of fragments for the owner that are not written yet */
 } packing;
 
 static bool take_sheet(void *state, const comp_sheet *sheet, int count)
@@ -58,7 +58,7 @@ static bool take_sheet(void *state, const comp_sheet *sheet, int count)
     return true;
 }
 
-/* One of several threads' share of what goes to the owner. */
+/* Packs one thread's share of the fragments for an owner; returns false if memory ran out. */
 static bool pack_owner(const cargo *c, uint32_t owner, int share, int shares, comp_layers *layers, comp_writer *writer)
 {
     const uint32_t begin = c->starts[owner], count = c->starts[owner + 1] - begin;
@@ -72,7 +72,8 @@ static bool pack_owner(const cargo *c, uint32_t owner, int share, int shares, co
     return is_well;
 }
 
-/* What goes to the partner with a digit: the fragments of all owners with it, except this place. */
+/* The work to pack for one partner in the first round: the fragments for all owners with the partner's digit, except
+ * this place itself. */
 typedef struct batch {
     int digit, radix, place;
     int share, shares;
@@ -129,10 +130,10 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
     return no_memory(error, "send");
 }
 
-/* ---- parcels on their way ------------------------------------------------------------------------------------ */
+/* ---- forwarding ------------------------------------------------------------------------------------------------ */
 
-/* Forwards the parcels for owners that have this digit, and this place's digits of the rounds before. All others have
- * been sent in those rounds. */
+/* Forwards the parcels for owners with this digit in this round. Of the digits of earlier rounds, these owners share
+ * those of this place, because the other parcels were sent in the earlier rounds. */
 static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
                        comp_writer *writer)
 {
@@ -169,9 +170,10 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
     return INSITU_OK;
 }
 
-/* ---- out of messages ----------------------------------------------------------------------------------------- */
+/* ---- unpacking ------------------------------------------------------------------------------------------------- */
 
-/* Counts the sheets of each strip, or, where sheets is given, puts each before the last of its strip. */
+/* If sheets is NULL, counts the sheets of each strip in starts. Otherwise stores the address of each sheet in the
+ * counting sort's position of its strip. */
 static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
 {
     for (const comp_message *m = in->first; m; m = m->next) {

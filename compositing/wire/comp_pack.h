@@ -1,4 +1,4 @@
-/* Fragments into messages, and out of them. */
+/* Packs fragments into messages, forwards messages, and finds the received sheets. */
 #ifndef COMP_COMP_PACK_H
 #define COMP_COMP_PACK_H
 
@@ -6,29 +6,29 @@
 #include "comp_route.h"
 #include "comp_strips.h"
 
-/* Who owns the blocks of a picture. */
+/* The owners of the blocks of a picture. */
 typedef struct comp_owners {
-    int32_t *places; /* the place of each block; -1: nobody has anything there */
-    int count;       /* the number of places that may own some */
+    int32_t *places; /* place of each block's owner; -1 if no rank has a fragment in the block */
+    int count;       /* number of places that may own blocks */
 } comp_owners;
 
-/* Writes the rank's fragments for other owners into messages. *out gets those to the partners of the first round, or,
- * if the rank is beyond the owners, to the partner that takes all; *kept gets those that a later round sends. Both are
- * empty at first, and on an error. Local. */
+/* Packs this rank's fragments for other owners into messages. *out receives the messages to the partners of the first
+ * round, or, on a rank beyond the owners, those to its partner. *kept receives the messages that are sent in later
+ * rounds. Both must be empty before the call, and are empty after an error. Local. */
 insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, const comp_route *route, int rank,
                         comp_messages *out, comp_messages *kept, base_error *error);
 
-/* Writes the parcels of in for other owners into messages to the partners of the round. Local. */
+/* Copies the parcels in `in` that are for other owners into messages to the partners of the round. Local. */
 insitu_status comp_forward(const comp_messages *in, const comp_route *route, int round, int rank, comp_messages *out,
                            base_error *error);
 
-/* The sheets that came for an owner, by strip. They point into the messages. */
+/* The received sheets of an owner, sorted by strip. They point into the messages. */
 typedef struct comp_arrivals {
     const unsigned char **sheets;
-    uint32_t *starts; /* where those of each strip begin, and one more */
+    uint32_t *starts; /* first index in sheets for each strip, and the total at the end */
 } comp_arrivals;
 
-/* Finds the sheets of in that are for owner. Local; on an error *out is empty. */
+/* Finds the sheets in `in` that are for this owner. Local; after an error *out is empty. */
 insitu_status comp_arrivals_find(const comp_grid *grid, int owner, const comp_messages *in, comp_arrivals *out,
                                  base_error *error);
 

@@ -1,5 +1,6 @@
-/* The renderer makes fragments tile by tile, so a strip's are in few places of the list. They stay where they are: what
- * is sorted is ranges of the list. Each thread finds those of a part of the list. */
+/* The renderer makes fragments tile by tile, so the fragments of a strip form few contiguous ranges of the list. The
+ * fragments are not moved; instead these ranges are sorted by strip. Each thread finds the ranges of a part of the
+ * list. */
 #include "comp_strips.h"
 
 #include <string.h>
@@ -13,7 +14,7 @@ _Static_assert(sizeof(fragment) == (1 + COMP_WORDS) * sizeof(uint32_t), "a fragm
 
 /* ---- ranges -------------------------------------------------------------------------------------------------- */
 
-/* The ranges of a part of the list, in its order. */
+/* The ranges that one thread found in its part of the list, in the order of the list. */
 typedef struct part {
     comp_range *ranges;
     int64_t count, capacity;
@@ -53,7 +54,7 @@ static void find_ranges(const comp_grid *grid, const fragment *items, int64_t fi
     if (range.count) add_range(p, range);
 }
 
-/* A counting sort by strip; starts are at first counts. */
+/* Sorts the ranges by strip (counting sort). starts must be 0 before the call. */
 static void sort_ranges(const part *parts, int part_count, comp_strips *out)
 {
     uint32_t *const starts = out->starts, sum = 0;
@@ -130,7 +131,7 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip)
 
 /* ---- sheets -------------------------------------------------------------------------------------------------- */
 
-/* Fills a sheet with all of the strip's fragments; false: some pixel has two. */
+/* Fills a sheet with all fragments of the strip; returns false if a pixel has more than one. */
 static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
 {
     comp_sheet_begin(sheet, strip);
@@ -145,8 +146,8 @@ static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
     return true;
 }
 
-/* Sorts a pixel's fragments front to back if they are few: then the first ones of neighbours are of one surface, and
- * compress well. */
+/* Sorts a pixel's fragments front to back unless they are too many. The n-th fragments of neighbouring pixels then
+ * mostly belong to the same surface, and compress well. */
 static void sort_pixel(const fragment **order, uint32_t count)
 {
     if (count > LONGEST_SORTED) return;
@@ -158,7 +159,7 @@ static void sort_pixel(const fragment **order, uint32_t count)
     }
 }
 
-/* Lists the strip's fragments pixel by pixel; those of pixel k then begin at ends[k]. */
+/* Lists the strip's fragments sorted by pixel: those of pixel k begin at ends[k]. Returns false if memory ran out. */
 static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layers)
 {
     const int64_t count = comp_strips_count(s, strip);
@@ -183,7 +184,7 @@ static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layer
     return true;
 }
 
-/* Fills a sheet with the n-th fragments of all pixels; returns their number. */
+/* Fills a sheet with the n-th fragment of each pixel that has one; returns their number. */
 static int fill_layer(const comp_layers *layers, uint32_t n, comp_sheet *sheet, uint32_t strip)
 {
     int count = 0;

@@ -1,4 +1,4 @@
-/* A rank's fragments by strip of the picture. */
+/* Groups a rank's fragments by strip of the picture. */
 #ifndef COMP_COMP_STRIPS_H
 #define COMP_COMP_STRIPS_H
 
@@ -9,42 +9,43 @@
 #include "error.h"
 #include "fragment.h"
 
-/* Fragments that follow each other in the list and are of one strip. */
+/* Consecutive fragments of the list that belong to the same strip. */
 typedef struct comp_range {
     uint32_t strip, first, count;
 } comp_range;
 
 typedef struct comp_strips {
     const comp_grid *grid;
-    const fragment *items; /* borrowed */
-    comp_range *ranges;    /* by strip */
-    uint32_t *starts;      /* where the ranges of each strip begin, and one more */
+    const fragment *items; /* borrowed from the fragment list */
+    comp_range *ranges;    /* sorted by strip */
+    uint32_t *starts;      /* first index in ranges for each strip, and the total at the end */
 } comp_strips;
 
-/* Finds where in the list each strip's fragments are. The list and the grid must outlive out. A pixel beyond the
- * picture is an error. Local. */
+/* Finds the ranges of each strip's fragments. The list and the grid must outlive *out. A fragment whose pixel is not in
+ * the picture is an error. Local. */
 insitu_status comp_strips_make(const comp_grid *grid, const fragment_list *items, comp_strips *out, base_error *error);
 
 void comp_strips_free(comp_strips *strips);
 
-/* Counts the strip's fragments. */
+/* Returns the number of the strip's fragments. */
 int64_t comp_strips_count(const comp_strips *strips, uint32_t strip);
 
-/* A thread's memory for comp_strips_sheets(). All zero: empty. */
+/* Work space of one thread for comp_strips_sheets(). A zeroed struct is empty. */
 typedef struct comp_layers {
     comp_sheet sheet;
-    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* the end of each pixel's fragments, in order */
+    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* end of each pixel's fragments in order, cumulative over the pixels */
     const fragment **order;
     int64_t capacity;
 } comp_layers;
 
 void comp_layers_free(comp_layers *layers);
 
-/* Takes a sheet of so many fragments; false ends the walk. */
+/* Callback that receives a sheet with `count` fragments; a return value of false ends the iteration. */
 typedef bool comp_sheet_taker(void *state, const comp_sheet *sheet, int count);
 
-/* Hands a strip's fragments over in sheets: the first of all pixels, then the second of those that have another, from
- * front to back. False: no memory, or the taker's. Local, and any number of threads at once. */
+/* Passes a strip's fragments to the callback in sheets: first the nearest fragment of every pixel, then the second of
+ * those that have one, and so on. Returns false if memory ran out or the callback returned false. Local; several
+ * threads may call it at once. */
 bool comp_strips_sheets(const comp_strips *strips, uint32_t strip, comp_layers *layers, comp_sheet_taker *take,
                         void *state);
 
