@@ -1,4 +1,4 @@
-/* Bounds of cells from their vertices, for the builders. */
+/* Computes the bounds of cells from their vertices, for the builders. */
 #include "mmbvh_bounds.h"
 
 #include "region.h"
@@ -107,7 +107,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
     return s;
 }
 
-/* Finds the span of the finite numbers of an array. */
+/* Finds the smallest and largest finite number of an array of any type. */
 static void span_of_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
@@ -132,7 +132,7 @@ static inline float float_at(const char *p)
     return *(const float *)(const void *)p;
 }
 
-/* Finds the span of floats, four at a time. NaN is passed over. */
+/* Finds the smallest and largest of an array of floats, four at a time. NaN is ignored. */
 MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
 {
     enum { LANES = 4 };
@@ -217,7 +217,7 @@ item_grid item_grid_make(const double lower[3], const double upper[3])
         has_extent[axis] = extent > 0 && extent < INFINITY;
         longest = has_extent[axis] && extent > longest ? extent : longest;
         grid.origin[axis] = lower[axis];
-        /* Nodes cannot tell cells apart that are nearer than neighbouring floats. */
+        /* A finer grid would not separate more cells, because the nodes' bounds are floats. */
         if (extent > far * 0x1p-22) grid.is_finest = false;
     }
     grid.step = longest / ITEM_TOP;
@@ -232,8 +232,8 @@ static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BL
     return n;
 }
 
-/* Maps floats in the source's coordinates to steps. The origin is a float too: its difference from a near coordinate is
- * exact, and from a far one off by 2^-24 of itself. */
+/* Maps floats in the source's coordinates to grid steps. The origin is a float too: the difference from a coordinate
+ * near it is exact, and from a distant one has a relative error of at most 2^-24. */
 typedef struct span_mapping {
     vec4 origin;
     vec4 factor;
@@ -249,7 +249,7 @@ static span_mapping span_mapping_make(const bounds_source *source, const item_gr
     return m;
 }
 
-/* Rounds to the nearest step; NaN becomes 0. */
+/* Rounds to the nearest step. NaN becomes 0. */
 static inline ivec4 steps_of(const span_mapping *m, vec4 x)
 {
     const vec4 steps = (x - m->origin) * m->factor + 0.5f;

@@ -1,4 +1,4 @@
-/* The boxes a tree is built over: a grid's cells', or given ones. */
+/* The boxes over which a tree is built: either the bounds of a grid's cells, or boxes that the caller gives. */
 #ifndef MMBVH_BOUNDS_H
 #define MMBVH_BOUNDS_H
 
@@ -6,34 +6,35 @@
 #include "mmbvh_item.h"
 #include "mmbvh_sweep.h"
 
-/* Reads the boxes of so many cells, in the source's own coordinates. */
+/* Reads the boxes of `count` cells, in the source's own coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
-/* As above, for coordinates that are floats. */
+/* Same as bounds_read, for coordinates that are floats. */
 typedef void bounds_read_spans(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans);
 
-/* box grows by so many cells. As many from soon on, if not NULL, will be read later and may be prefetched. */
+/* Extends *box by the boxes of `count` cells. `soon`, unless NULL, lists as many cells that will be read later and may
+ * be prefetched. */
 typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
                           fetch_box *box);
 
 struct bounds_source {
-    const grid *g; /* NULL: the boxes are given */
+    const grid *g; /* NULL if the boxes are given */
     double origin[3];
     double scale;
-    const float *lower, *upper; /* given boxes, count x 3 */
-    int64_t box_count;          /* with ghosts */
+    const float *lower, *upper; /* the given boxes, count × 3 values */
+    int64_t box_count;          /* number of boxes, including those of ghosts */
     bounds_read *read;
-    bounds_read_spans *read_spans; /* NULL: not all coordinates are floats */
+    bounds_read_spans *read_spans; /* NULL unless all coordinates are floats */
     bounds_unite *unite;
 };
 
-enum { BOUNDS_BLOCK = 64 }; /* boxes that are read at a time */
+enum { BOUNDS_BLOCK = 64 }; /* number of boxes that are read at once */
 
-/* g NULL: given boxes. */
+/* Returns a source that reads the cells of g, or the given boxes if g is NULL. */
 bounds_source bounds_source_make(const grid *g, const float *lower, const float *upper, int64_t count,
                                  const double origin[3], double scale);
 
-/* Takes a box from the source's coordinates to the tree's, without rounding outward. */
+/* Transforms a box from the source's coordinates to the tree's, without rounding outward. */
 static inline void bounds_transform(const bounds_source *source, fetch_box *box)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -42,12 +43,12 @@ static inline void bounds_transform(const bounds_source *source, fetch_box *box)
     }
 }
 
-/* Quickly finds a box, in the tree's coordinates, that holds all cells whose coordinates are numbers: the box of all
- * vertices, used by cells or not. */
+/* Returns the box of all vertices with finite coordinates, in the tree's coordinates. It contains all such cells, but
+ * is larger than necessary if some vertices belong to no cell. */
 fetch_box bounds_guess(const bounds_source *source, int threads);
 
-/* Gives boxes to items that have only an index. set grows by them, and exact, if not NULL, by the boxes in the source's
- * coordinates. */
+/* Computes the boxes of items that have only an index. Extends *set by the items, and *exact, unless NULL, by the boxes
+ * in the source's coordinates. */
 void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
                   fetch_box *exact);
 

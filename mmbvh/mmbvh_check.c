@@ -1,6 +1,6 @@
-/* The proof of a whole tree. One walk goes in the order in which the nodes must be numbered, and anything not where it
- * is expected is a violation. So every node and entry is met exactly once, and no broken tree makes the walk endless.
- */
+/* Checks a whole tree. One traversal follows the order in which the nodes must be numbered; a node or entry at any
+ * other position is a violation. Every node and entry is therefore visited exactly once, and the traversal ends even if
+ * the tree is broken. */
 #include "mmbvh.h"
 
 #include <inttypes.h>
@@ -13,8 +13,8 @@ typedef struct walk {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    unsigned char *seen; /* by cell, a bit each */
-    int64_t seen_count;  /* cells that could be met: the grid's, or a parent tree's */
+    unsigned char *seen; /* one bit per cell */
+    int64_t seen_count;  /* number of cells of the grid, or of meshes in a parent tree */
     int64_t next_pair;
     int64_t next_entry;
     int64_t unusable;
@@ -59,7 +59,7 @@ static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cel
     return INSITU_OK;
 }
 
-/* Finds the range of the cell's values. False where one is not finite. */
+/* Finds the range of the cell's values; returns false if one of them is not finite. */
 static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
@@ -179,7 +179,7 @@ static insitu_status check_inner(walk *w, int64_t index)
 
 static insitu_status check_nodes(walk *w)
 {
-    /* The right child of each pair on the way down, to be visited later. */
+    /* The nodes that are still to be visited: the right child of each pair on the current path. */
     struct {
         int64_t index;
         int depth;
@@ -203,7 +203,7 @@ static insitu_status check_nodes(walk *w)
     return INSITU_OK;
 }
 
-/* Checks that nothing is left over when the walk is done. */
+/* Checks that the traversal visited all nodes, entries and cells. */
 static insitu_status check_complete(const walk *w)
 {
     if (w->next_pair != w->tree->node_count && w->tree->node_count) {

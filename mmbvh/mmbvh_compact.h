@@ -1,16 +1,16 @@
-/* The compact node: 24 bytes where the thesis's node has 40.
+/* The compact node takes 24 bytes, where the thesis's node takes 40.
  *
- * The tree has a grid of 2^20 steps an axis, whose size is a power of two. A box has one 32-bit word for each axis: its
- * lower bound in whole steps, and above that its extent as a small floating-point number. So a box is known to a
- * millionth of the tree or to 1/256 of itself, whichever is coarser, and a cell far smaller than the rest keeps its
- * shape:
+ * The tree has a grid of 2^20 steps per axis, whose size is a power of two. A box has one 32-bit word per axis: its
+ * lower bound in whole steps, and in the higher bits its extent as a small floating-point number. The precision of a
+ * box is therefore a millionth of the tree's size or 1/256 of its own, whichever is coarser, so that a cell much
+ * smaller than the others keeps its shape:
  *
- *      31    28 27          20 19                                  0
- *     | exponent | mantissa   | lower bound, steps                  |      extent = 16 (1 + mantissa / 256) 2^exponent
- * - 16
+ *      31    28 27          20 19                     0
+ *     | exponent | mantissa   | lower bound in steps   |     extent = 16 (1 + mantissa / 256) 2^exponent - 16
  *
- * All three axes are read by one load and some ten operations on four floats, without a table and without denormals.
- * Products with steps, which are powers of two, are exact, so fusing multiply and add makes no difference. */
+ * Decoding all three axes takes one load and about ten operations on four floats, without a table and without
+ * denormals. Products with steps are exact, because steps are powers of two; a fused multiply-add gives the same
+ * result. */
 #ifndef MMBVH_COMPACT_H
 #define MMBVH_COMPACT_H
 
@@ -22,26 +22,26 @@ enum {
     COMPACT_MANTISSA_BITS = COMPACT_EXTENT_BITS - 4,
     COMPACT_LOWER_MAX = (1 << COMPACT_LOWER_BITS) - 1,
     COMPACT_EXTENT_MAX = (1 << COMPACT_EXTENT_BITS) - 1,
-    COMPACT_ONE = (127 + 4) << 23, /* the bits of 16.0f, an extent's zero */
+    COMPACT_ONE = (127 + 4) << 23, /* bit pattern of 16.0f, which encodes an extent of 0 */
     COMPACT_REF_BITS = 29
 };
 
 typedef struct mmbvh_compact_node {
     uint32_t axis[3];
-    uint32_t link; /* 3 low bits: count, the others: ref, both as in mmbvh_node */
+    uint32_t link; /* count in the 3 low bits and ref in the others, both as in mmbvh_node */
     float range_low;
     float range_high;
 } mmbvh_compact_node;
 
 typedef struct mmbvh_grid {
     float origin[4];
-    float step[4]; /* powers of two; lane 3 of both: 0 */
+    float step[4]; /* powers of two; element 3 of origin and step is 0 */
 } mmbvh_grid;
 
 typedef float compact_vec4 __attribute__((vector_size(16), may_alias, aligned(4)));
 typedef int32_t compact_ivec4 __attribute__((vector_size(16), may_alias, aligned(4)));
 
-/* Lane 3 of both: 0. */
+/* Decodes the words of three axes to the corners of the box. Lane 3 of both corners is 0. */
 static inline void compact_decode_words(ivec4 word, const mmbvh_grid *grid, vec4 *lower, vec4 *upper)
 {
     const vec4 step = *(const compact_vec4 *)(const void *)grid->step;

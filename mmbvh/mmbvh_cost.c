@@ -1,10 +1,12 @@
-/* A ray that meets a convex box meets a box within it with a probability that is the ratio of their surface areas. */
+/* The surface area heuristic: a ray that hits a convex box hits a box inside it with a probability that is the ratio of
+ * their surface areas. */
 #include "mmbvh_cost.h"
 
 #include "mmbvh_sweep.h"
 #include "region.h"
 
-/* The nodes are summed in a fixed number of parts, so that the sum has the same bits for any number of threads. */
+/* The sum over the nodes is divided into a fixed number of parts, so that its rounding does not depend on the number of
+ * threads. */
 enum { PARTS = 64 };
 
 double cost_half_area(const float lower[3], const float upper[3])
@@ -17,7 +19,8 @@ double cost_half_area(const float lower[3], const float upper[3])
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Sums the tests that a ray makes in each node it meets, weighted by the node's surface. */
+/* Returns the sum over the nodes of half the surface area times the tests in the node: each cell of a leaf, or two
+ * boxes. */
 static double area_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
 {
     double sum = 0;
@@ -47,15 +50,15 @@ double cost_area_of_tree(const mmbvh *tree, int threads)
     return area;
 }
 
-/* A ray that meets the root meets a node with the ratio of their surfaces as probability. If the root has no surface,
- * all nodes are met. */
+/* A ray that hits the root hits a node with a probability that is the ratio of their surface areas. If the root's
+ * surface area is 0, all nodes count as hit. */
 double cost_of_area(const mmbvh *tree, double area)
 {
     if (!tree->node_count) return 0;
     float lower[4], upper[4];
     mmbvh_node_box(tree, 0, lower, upper);
     const double root_area = cost_half_area(lower, upper);
-    if (root_area > 0) return 1 + area / root_area; /* 1: the root's own box */
+    if (root_area > 0) return 1 + area / root_area; /* 1 is the test of the root's own box */
     double tests = 0;
     for (int64_t i = 0; i < tree->node_count; i++) {
         const int count = mmbvh_node_count(tree, i);

@@ -1,16 +1,17 @@
-/* The surface area heuristic's cost of a finished tree. */
+/* Computes the cost of a finished tree by the surface area heuristic (SAH). */
 #ifndef MMBVH_COST_H
 #define MMBVH_COST_H
 
 #include "mmbvh.h"
 
-/* Half the surface area of a node's box; 0 for an empty one. */
+/* Returns half the surface area of a node's box, or 0 if the box is empty. */
 double cost_half_area(const float lower[3], const float upper[3]);
 
-/* Computes mmbvh.area, the sum of boxes times tests in them, to the same bits for any number of threads. */
+/* Returns the value of mmbvh.area: the sum over all nodes of half the surface area times the number of tests. The
+ * rounding does not depend on the number of threads. */
 double cost_area_of_tree(const mmbvh *tree, int threads);
 
-/* mmbvh_cost() of a tree of that area. */
+/* Returns the tree's SAH cost (mmbvh_cost()), given the value of cost_area_of_tree(). */
 double cost_of_area(const mmbvh *tree, double area);
 
 #endif

@@ -1,5 +1,5 @@
-/* Reading cells fast. The grid's accessors ask each array for its element type at every element; here the questions
- * are constants of an inlined function, asked once for a whole pass over the cells. */
+/* Fast access to cells. The accessors of grid.h check the element type of an array at every element. Here the types are
+ * constants of inlined functions, and are checked once per pass over the cells. */
 #ifndef MMBVH_FETCH_H
 #define MMBVH_FETCH_H
 
@@ -11,8 +11,8 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* The way in which a cell's vertices are found. Cells are all tets, one after the other, or all hexes, or all of
- * another type, or each has a type of its own, or they are a lattice's. */
+/* How the vertices of a cell are found: all cells are tets, all are hexes, all have the same other type, each has its
+ * own type, or the cells form a lattice. */
 typedef enum fetch_shape {
     FETCH_TETS,
     FETCH_HEXES,
@@ -36,7 +36,7 @@ MMBVH_INLINE int64_t fetch_index(const grid_array *a, int64_t i, const bool wide
     return (wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p) - a->base;
 }
 
-/* Reads a number of an array of floats or doubles. */
+/* Reads an element of an array of floats or doubles. */
 MMBVH_INLINE double fetch_number(const grid_array *a, int64_t i, const bool wide)
 {
     const char *p = a->data + i * a->stride;
@@ -51,42 +51,44 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
-/* Returns where a cell's vertices begin in the connectivity; of a lattice, the cell's first vertex. */
+/* Returns the index of a cell's first entry in the connectivity; for a lattice, the cell's first vertex. */
 MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
     if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
 }
 
-/* Returns a vertex of the cell, from fetch_first() of the cell and the vertex's place in it. */
+/* Returns vertex i of a cell, where `first` is fetch_first() of the cell. */
 MMBVH_INLINE int64_t fetch_corner(const grid *g, int64_t first, int i, const fetch_shape shape, const bool wide_index)
 {
     return shape == FETCH_LATTICE ? first + g->lattice->corner[i]
                                   : fetch_index(&g->connectivity, first + i, wide_index);
 }
 
-/* Prefetches a cell's entries of the connectivity from first on. A lattice has none. */
+/* Prefetches the connectivity of a cell whose first entry is `first`. A lattice has no connectivity. */
 MMBVH_INLINE void fetch_soon(const grid *g, int64_t first, const fetch_shape shape)
 {
     if (shape != FETCH_LATTICE) __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
 }
 
-/* Prefetches the connectivity of later cells, in a pass over cells in the mesh's order. Though the pass is regular, the
- * core's own prefetching comes too late. */
+/* Prefetches the connectivity of later cells, in a pass over the cells in the mesh's order. The hardware prefetcher
+ * reacts too late, although the pass is regular. */
 MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape shape)
 {
-    enum { AHEAD = 512 }; /* entries */
+    enum { AHEAD = 512 }; /* distance in entries of the connectivity */
     if (shape == FETCH_LATTICE) return;
     fetch_soon(g, fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
 }
 
-/* Tells whether an array's numbers follow each other: a constant stride becomes part of an address. */
+/* Checks whether an array's numbers are contiguous. Code for such arrays uses the constant stride in its address
+ * computations. */
 static inline bool fetch_is_packed(const grid_array *a)
 {
     return a->stride == (a->is_wide ? (int64_t)sizeof(double) : (int64_t)sizeof(float));
 }
 
-/* Finds where the values of a cell's vertices are. The last one is repeated up to eight. */
+/* Finds the addresses of the values at a cell's vertices. The last address is repeated, so that there are always
+ * eight. */
 MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                const bool wide_index, const int64_t stride, const char *out[GRID_MAX_CELL_VERTICES])
 {
@@ -96,7 +98,7 @@ MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t 
         out[i] = values->data + fetch_corner(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
 }
 
-/* Reads a cell's values, which are floats, and tells whether all are finite. */
+/* Reads a cell's values, which are floats; returns whether all are finite. */
 MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                     const bool wide_index, const bool is_packed, vec4 out[2])
 {
@@ -106,16 +108,16 @@ MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const float *)(const void *)at[i];
     out[0] = (vec4){v[0], v[1], v[2], v[3]};
     out[1] = shape == FETCH_TETS ? out[0] : (vec4){v[4], v[5], v[6], v[7]};
-    const vec4 poison = (out[0] - out[0]) + (out[1] - out[1]); /* 0 where both are finite, else not a number */
+    const vec4 poison = (out[0] - out[0]) + (out[1] - out[1]); /* 0 if both are finite, otherwise NaN */
     return vec4_all((ivec4)(poison == vec4_set1(0)));
 }
 
-/* A cell's values, or a leaf's: their range, in lanes. */
+/* The range of the values of a cell or leaf, per lane. fetch_doubles_range() combines the lanes. */
 typedef struct fetch_doubles {
     vec2 low, high;
 } fetch_doubles;
 
-/* Reads a cell's values, which are doubles, and tells whether all are finite. */
+/* Reads a cell's values, which are doubles, and computes their range per lane; returns whether all are finite. */
 MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                      const bool wide_index, const bool is_packed, fetch_doubles *out)
 {
@@ -124,7 +126,7 @@ MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, in
     fetch_values(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const double *)(const void *)at[i];
     const vec2 a = {v[0], v[1]}, b = {v[2], v[3]};
-    vec2 poison = (a - a) + (b - b); /* 0 where both are finite, else not a number */
+    vec2 poison = (a - a) + (b - b); /* 0 if both are finite, otherwise NaN */
     *out = (fetch_doubles){vec2_min(a, b), vec2_max(a, b)};
     if (shape != FETCH_TETS) {
         const vec2 c = {v[4], v[5]}, d = {v[6], v[7]};
@@ -135,7 +137,7 @@ MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, in
     return poison[0] + poison[1] == 0;
 }
 
-/* A cell's values: their range, and whether all are finite. */
+/* The range of a cell's values. is_finite is true if all values are finite. */
 typedef struct fetch_range {
     double low, high;
     bool is_finite;
@@ -147,7 +149,7 @@ MMBVH_INLINE fetch_range fetch_doubles_range(const fetch_doubles *v, bool is_fin
                          v->high[0] > v->high[1] ? v->high[0] : v->high[1], is_finite};
 }
 
-/* Finds the range of any cell and any field. */
+/* Finds the range of a cell of any type, for any field. */
 static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
 {
     fetch_range range = {INFINITY, -INFINITY, grid_has_own_value(field, cell)};
@@ -166,7 +168,7 @@ static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *
     return range;
 }
 
-/* A box of doubles that grows, in the grid's own coordinates. */
+/* A bounding box in double, in the grid's own coordinates. */
 typedef struct fetch_box {
     double lower[3];
     double upper[3];
@@ -188,7 +190,7 @@ MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
     }
 }
 
-/* A box of floats that grows: lanes 0 to 2. */
+/* A bounding box in float, in lanes 0 to 2. */
 typedef struct fetch_span {
     vec4 lower, upper;
 } fetch_span;
@@ -214,7 +216,7 @@ static inline fetch_box fetch_span_box(const fetch_span *span)
     return box;
 }
 
-/* The box grows by a cell whose coordinates are floats. */
+/* Extends the box by a cell whose coordinates are floats. */
 MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell, const fetch_shape shape,
                                   const bool wide_index, const bool is_packed)
 {
@@ -231,7 +233,7 @@ MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell,
     }
 }
 
-/* The box grows by a cell whose coordinates are doubles. */
+/* Extends the box by a cell whose coordinates are doubles. */
 MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
                                  const bool wide_index)
 {
@@ -249,8 +251,8 @@ MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, co
     }
 }
 
-/* The box grows by so many cells. Floats are compared as floats, and only the result is widened. Two boxes of floats
- * grow in turns, because each comparison waits for the one before in its box. */
+/* Extends the box by cell_count cells. Floats are compared as floats, and only the result is converted to double. Two
+ * boxes of floats are extended alternately, because each comparison depends on the previous one of the same box. */
 MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
                                   const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
@@ -271,8 +273,8 @@ MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t 
     fetch_box_unite(box, &floats);
 }
 
-/* Rounds a box outward to a node's coordinates. Rounding is monotonic, so the box of rounded points is the rounded box.
- */
+/* Transforms a box to a node's coordinates and rounds it outward. Because rounding is monotonic, this gives the same
+ * box as rounding each vertex. */
 MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], double scale, float *lower,
                                   float *upper)
 {
@@ -282,7 +284,7 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* As above, to the same bits, for a box of floats. Lane 3 may hold anything. */
+/* Same as fetch_box_round(), to the same bits, for a box of floats. Lane 3 of the input is ignored. */
 MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3], double scale, vec4 *lower,
                                    vec4 *upper)
 {
@@ -291,8 +293,8 @@ MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3
     *upper = vec4_xyz(0.0f - vec4_place_down(span->upper, from, -scale));
 }
 
-/* Tells whether fetch_box_cells() serves: all coordinates are floats or all are doubles, of one stride, and no cell is
- * a polyhedron. */
+/* Checks whether fetch_box_cells() can read the grid: the coordinates are all floats or all doubles with the same
+ * stride, and no cell is a polyhedron. */
 static inline bool fetch_is_plain(const grid *g)
 {
     if (grid_has_faces(g) || g->coordinates[0].axis) return false;
@@ -302,7 +304,7 @@ static inline bool fetch_is_plain(const grid *g)
            c[0].stride == c[2].stride;
 }
 
-/* The box grows by a cell of a uniform or rectilinear lattice. */
+/* Extends the box by a cell of a uniform or rectilinear lattice. */
 static inline void fetch_box_axes(fetch_box *box, const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -331,8 +333,9 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     }
 }
 
-/* One instance of a pass for each way an array can be laid out: DEFINE(name, shape, wide_index, wide_number) makes a
- * function, and FETCH_TABLE(prefix) is the table of them, by [shape][wide_index][wide_number]. */
+/* Instantiates a function for each cell shape and element type. DEFINE(name, shape, wide_index, wide_number) must
+ * define one instance, and FETCH_TABLE(prefix) is the table of all instances, indexed by
+ * [shape][wide_index][wide_number]. */
 #define FETCH_INSTANCES(DEFINE, prefix)                                                                                \
     FETCH_EACH_SHAPE(FETCH_SHAPE_INSTANCES, DEFINE, prefix)                                                            \
     DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)                                                            \
@@ -360,7 +363,7 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     }
 /* clang-format on */
 
-/* As above, for floats alone: a table by [shape][wide_index]. */
+/* Same as FETCH_INSTANCES, for floats only; the table is indexed by [shape][wide_index]. */
 #define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
     FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)                                                      \
     DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)

@@ -1,12 +1,12 @@
-/* A cell on its way into a SAH tree: 16 bytes, one vector.
+/* A cell during the construction of a SAH tree: its box and index in one vector of 16 bytes.
  *
  *     lane     0   1   2     3       4  5  6     7
  *           TOP - lower   index    upper      index           lower, upper: 0 .. TOP, in steps of an item_grid
  *                         (low)               (high)
  *
- * The box that holds two boxes is then the lanes' maximum. A vector minus itself with its halves exchanged is twice the
- * centroid minus TOP in the upper half, and the negative of that in the lower one, so that bounds of centroids are a
- * maximum too. Only the choice of planes depends on these boxes, not the bounds that the nodes get. */
+ * The union of two boxes is therefore the maximum of each lane. The vector minus the vector with exchanged halves is
+ * twice the centroid minus TOP in the upper half, and the negative of that in the lower half; bounds of centroids are
+ * therefore maxima too. These boxes determine only the choice of planes, not the bounds of the nodes. */
 #ifndef MMBVH_ITEM_H
 #define MMBVH_ITEM_H
 
@@ -18,15 +18,16 @@ enum { ITEM_TOP = 32767 };
 
 typedef lanes item;
 
-/* A grid in the tree's coordinates. Steps are equally long on all axes, so that surface areas are products of steps. */
+/* A grid in the tree's coordinates. The steps have the same length on all axes, so that surface areas are products of
+ * steps. */
 typedef struct item_grid {
     double origin[3];
-    double step;       /* 0: no axis has a finite extent */
-    double inverse[3]; /* 1 / step; 0 on an axis without a finite extent */
-    bool is_finest;    /* a finer grid would not tell more cells apart */
+    double step;       /* 0 if no axis has a finite extent */
+    double inverse[3]; /* 1 / step, or 0 on an axis without a finite extent */
+    bool is_finest;    /* true if a finer grid would not separate more cells */
 } item_grid;
 
-/* Bounds of items and of their centroids. */
+/* The bounds of a set of items and of their centroids. */
 typedef struct item_set {
     lanes bounds;
     lanes centroids;
@@ -37,16 +38,16 @@ static inline uint32_t item_index(item i)
     return (uint32_t)(uint16_t)i[3] | (uint32_t)(uint16_t)i[7] << 16;
 }
 
-/* An item without a box. */
+/* Returns an item that has an index but no box yet. */
 static inline item item_of_index(uint32_t index)
 {
     return (item){0, 0, 0, (int16_t)(uint16_t)(index & 0xffff), 0, 0, 0, (int16_t)(uint16_t)(index >> 16)};
 }
 
-/* Twice the centroid, less TOP: negative in lanes 0 to 2, as it is in lanes 4 to 6. */
+/* Returns twice the centroid minus TOP in lanes 4 to 6, and the negative of that in lanes 0 to 2. */
 static inline lanes item_centroid(item i)
 {
-    return (lanes)((ulanes)i - (ulanes)lanes_swap(i)); /* the index's lanes wrap */
+    return (lanes)((ulanes)i - (ulanes)lanes_swap(i)); /* the lanes of the index may wrap around */
 }
 
 static inline item_set item_set_empty(void)
@@ -81,28 +82,29 @@ static inline item_set item_set_of(const item *items, int64_t count)
 /* Returns a box's extent in steps, in lanes 0 to 2. */
 static inline lanes item_extent(lanes box)
 {
-    return (lanes)((ulanes)box + (ulanes)lanes_swap(box) - (ulanes)lanes_set1(ITEM_TOP)); /* an empty one's wraps */
+    return (lanes)((ulanes)box + (ulanes)lanes_swap(box) -
+                   (ulanes)lanes_set1(ITEM_TOP)); /* the extent of an empty box wraps around */
 }
 
-/* The terms of half the surface area, xy + yz and zx, of two boxes whose extents are in lanes 0 to 2 and 4 to 6. Lanes
- * 3 and 7 may hold anything. */
+/* Returns the terms xy + yz and zx of half the surface area, for two boxes whose extents are in lanes 0 to 2 and 4 to
+ * 6. Lanes 3 and 7 are ignored. */
 static inline ivec4 item_area_terms(lanes extents)
 {
     const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);
     return lanes_pair_products(extents, turned & (lanes){-1, -1, -1, 0, -1, -1, -1, 0});
 }
 
-/* Half the surface area, in square steps. */
+/* Returns half the surface area of a box, in squared steps. */
 static inline float item_half_area(lanes box)
 {
     const vec4 terms = vec4_from_int(item_area_terms(item_extent(box)));
     return terms[0] + terms[1];
 }
 
-/* Makes the grid over a box. */
+/* Returns the grid over a box, with ITEM_TOP steps on its longest side. */
 item_grid item_grid_make(const double lower[3], const double upper[3]);
 
-/* Rounds a box of doubles to the nearest steps. */
+/* Rounds a box of doubles to the nearest steps of the grid. */
 static inline item item_make(const item_grid *grid, const double lower[3], const double upper[3], uint32_t index)
 {
     item made;

@@ -1,4 +1,4 @@
-/* Vectors of eight 16-bit integers. Every processor that the library is built for has them without a flag. */
+/* Vectors of eight 16-bit integers, which every supported processor has without compiler flags. */
 #ifndef MMBVH_LANES_H
 #define MMBVH_LANES_H
 
@@ -23,7 +23,7 @@ static inline lanes lanes_max(lanes a, lanes b)
 #endif
 }
 
-/* The halves exchanged. */
+/* Returns the vector with its halves exchanged. */
 static inline lanes lanes_swap(lanes a)
 {
 #if defined(__SSE2__)
@@ -33,7 +33,7 @@ static inline lanes lanes_swap(lanes a)
 #endif
 }
 
-/* The upper halves of the products, all unsigned. */
+/* Returns the upper 16 bits of each lane's product, as unsigned numbers. */
 static inline lanes lanes_scale(lanes a, lanes factor)
 {
 #if defined(__SSE2__)
@@ -47,7 +47,7 @@ static inline lanes lanes_scale(lanes a, lanes factor)
 #endif
 }
 
-/* Lanes 0 to 3, signed. */
+/* Returns lanes 0 to 3 as signed integers. */
 static inline ivec4 lanes_lower(lanes a)
 {
 #if defined(__SSE2__)
@@ -57,13 +57,13 @@ static inline ivec4 lanes_lower(lanes a)
 #endif
 }
 
-/* Lanes 4 to 7, signed. */
+/* Returns lanes 4 to 7 as signed integers. */
 static inline ivec4 lanes_upper(lanes a)
 {
     return lanes_lower(lanes_swap(a));
 }
 
-/* Two vectors of integers, the first in lanes 0 to 3; lanes hold what fits into 16 bits, signed. */
+/* Packs two vectors of integers into lanes 0 to 3 and 4 to 7. The integers must fit into 16 bits, signed. */
 static inline lanes lanes_pack(ivec4 a, ivec4 b)
 {
 #if defined(__SSE2__)
@@ -74,7 +74,7 @@ static inline lanes lanes_pack(ivec4 a, ivec4 b)
 #endif
 }
 
-/* The products, each even lane's and the next one's added. */
+/* Multiplies the lanes and returns the sum of each even lane's product and the next one's. */
 static inline ivec4 lanes_pair_products(lanes a, lanes b)
 {
 #if defined(__SSE2__)

@@ -1,11 +1,12 @@
-/* Stores the boxes of nodes in a sweep of bounds, and measures how much the tree's area grows. */
+/* Stores the boxes of nodes during a sweep of bounds, and accumulates the change of the tree's area. */
 #ifndef MMBVH_MEASURE_H
 #define MMBVH_MEASURE_H
 
 #include "mmbvh_store.h"
 #include "mmbvh_sweep.h"
 
-/* Half the surface of a box with lane 3 empty, times the tests in the node: each cell of a leaf, both boxes else. */
+/* Returns half the surface area of a box, whose lane 3 must be 0, times the number of tests in the node: each cell of a
+ * leaf, or both children's boxes. */
 static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
 {
     const vec4 d = upper - lower;
@@ -14,7 +15,8 @@ static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4
     return (x * y + y * z + z * x) * (count ? count : 2);
 }
 
-/* Stores the node's box; adds 1 to misfits where the tree's grid does not hold it. */
+/* Stores the node's box. If the tree's grid cannot represent the box, increments *misfits. If s->is_measured, adds the
+ * change of the node's area to *grown. */
 static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4 upper, int64_t *misfits, double *grown)
 {
     const mmbvh *tree = s->tree;
@@ -30,7 +32,7 @@ static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4
     }
 }
 
-/* Stores the union of the boxes of those children that the sweep has been to; of both where it has been to neither. */
+/* Stores the union of the children's boxes. If the sweep visited only one child, that child's box is used alone. */
 static inline void store_children(const sweep *s, int64_t node, int64_t pair, int64_t *misfits, double *grown)
 {
     vec4 lower[2], upper[2];

@@ -1,4 +1,4 @@
-/* Sweeps, and new ranges on an old tree. */
+/* Runs sweeps over a tree, and computes ranges for new values. */
 #include "mmbvh_sweep.h"
 
 #include <omp.h>
@@ -6,7 +6,11 @@
 #include "mmbvh_fetch.h"
 #include "region.h"
 
-enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_TETS = 96 /* half as large */ };
+enum {
+    RUN_MAX = 4096,
+    PREFETCH_CELLS = 48,
+    PREFETCH_TETS = 96 /* longer, because a tet's connectivity takes half as many bytes as a hex's */
+};
 
 int sweep_threads(const mmbvh_options *options)
 {
@@ -31,13 +35,13 @@ static sweep_sum run_all(const sweep *s, int64_t first, int64_t end)
     return s->then ? run_all(s->then, first, end) : sum;
 }
 
-/* Returns where the nodes below the right one of a pair begin. */
+/* Returns the index of the first descendant of the pair's right node; `end` if that node is a leaf. */
 static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
 {
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
 
-/* Sweeps a pair and all below it, nodes[first .. end), in runs that are not too long for the sweep. */
+/* Sweeps a pair and its descendants, nodes[first .. end), in runs of at most s->run_max nodes. */
 static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->run_max || end - first <= s->run_max) return run_all(s, first, end);
@@ -48,7 +52,7 @@ static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
     return sweep_add(sweep_add(left, right), run_all(s, first, first + 2));
 }
 
-/* Sweeps all below the pair by tasks of at most RUN_MAX nodes, and then the pair itself. */
+/* Sweeps the descendants of the pair in parallel tasks of at most RUN_MAX nodes each, and then the pair itself. */
 static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
@@ -79,11 +83,11 @@ sweep_sum sweep_tree(const sweep *s, int threads)
             region_leave();
         }
     }
-    return sweep_add(sum, run_all(s, 0, 1)); /* the root after its children */
+    return sweep_add(sum, run_all(s, 0, 1)); /* the root is processed after its children */
 }
 
-/* Prefetches the connectivity of later leaves; the sweep goes down through the cells too. Entries longer than a quarter
- * of a cache line may lie across two. */
+/* Prefetches the connectivity of a leaf that is visited later; the sweep processes the cells in descending order. If a
+ * cell's entries may straddle two cache lines, both are prefetched. */
 MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
 {
     const int64_t distance = shape == FETCH_TETS ? PREFETCH_TETS : PREFETCH_CELLS;
@@ -95,13 +99,13 @@ MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape
     if (shape != FETCH_TETS || wide_index) fetch_soon(s->g, first + count - 1, shape);
 }
 
-/* Rounds a range outward. It is empty where no cell was read. */
+/* Rounds a range outward. If no cell was read, the range stays empty. */
 static inline range rounded_range(const fetch_range *r)
 {
     return r->low <= r->high ? (range){round_down(r->low), round_up(r->high)} : range_empty();
 }
 
-/* Lanes grow by whole cells, and become one range in the end. */
+/* Returns the range of a leaf whose values are doubles. Lanes accumulate whole cells, and are combined at the end. */
 MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
                                const bool wide_index, const bool is_packed, int64_t *unusable)
 {
@@ -132,7 +136,8 @@ MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const 
         low = vec4_min(vec4_min(v[0], v[1]), low);
         high = vec4_max(vec4_max(v[0], v[1]), high);
     }
-    return (range){vec4_least(low) + 0.0f, vec4_most(high) + 0.0f}; /* zero positive, as round_down() has it */
+    return (range){vec4_least(low) + 0.0f,
+                   vec4_most(high) + 0.0f}; /* adding 0 makes a negative zero positive, as round_down() does */
 }
 
 MMBVH_INLINE sweep_sum run_ranges(const sweep *s, int64_t first, int64_t end, const fetch_shape shape,
@@ -161,7 +166,7 @@ FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
-/* Serves all fields and cells that the instances above cannot read. */
+/* Returns the range of a leaf for fields and cells that the specialized functions above cannot read. */
 static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
 {
     fetch_range leaf = {(double)INFINITY, -(double)INFINITY, true};
@@ -205,7 +210,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
     return (sweep_sum){0};
 }
 
-/* Tells whether the instances can read the field. */
+/* Checks whether the specialized functions can read the field. */
 static bool is_plain(const grid *g, const grid_field *field)
 {
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;

@@ -1,4 +1,4 @@
-/* Computes the bounds of a tree's nodes, first or again. */
+/* Computes the bounds of a tree's nodes, during the build or for moved vertices. */
 #include <string.h>
 
 #include "mmbvh_bounds.h"
@@ -8,8 +8,8 @@
 
 enum {
     PREFETCH_CELLS = 48,
-    VISIBLE_NODES = 16 /* in a run of a sweep that leaves nodes out; in shorter runs looking for nodes that show nothing
-                          does not pay */
+    VISIBLE_NODES = 16 /* nodes per run of a sweep that skips invisible nodes; in shorter runs the checks cost more than
+                          they save */
 };
 
 static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *misfits, double *grown)
@@ -18,7 +18,7 @@ static void store_cells(const sweep *s, int64_t index, int64_t first, int count,
     fetch_box box;
     float lower[3], upper[3];
     fetch_box_empty(&box);
-    const uint32_t *cells = tree->cells + first; /* the sweep goes down through the cells */
+    const uint32_t *cells = tree->cells + first; /* the sweep processes the cells in descending order */
     s->source->unite(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
     fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
     store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0}, misfits,
@@ -55,7 +55,7 @@ sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep 
     return both;
 }
 
-/* Finds the bounds of all the tree's cells, in the source's coordinates. */
+/* Returns the bounds of all the tree's cells, in the source's coordinates. */
 static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, int threads)
 {
     fetch_box all;
@@ -78,7 +78,8 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
     return all;
 }
 
-/* Makes a new grid for a mesh that has left the tree's, with a margin of an eighth on each side. */
+/* Computes a new grid and new bounds for a mesh that has moved out of the tree's grid, with a margin of an eighth of
+ * its size on each side. */
 static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, int threads)
 {
     const fetch_box exact = exact_bounds(tree, source, threads);
@@ -91,13 +92,14 @@ static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, in
         upper[axis] += margin;
     }
     tree->grid = store_grid(lower, upper);
-    const sweep all = sweep_of_bounds(tree, source); /* not measured: nodes still have boxes of the last grid */
+    const sweep all =
+        sweep_of_bounds(tree, source); /* does not measure areas, because the nodes still have boxes of the old grid */
     if (sweep_tree(&all, threads).count) return INSITU_ERROR_MESH;
     tree->area = cost_area_of_tree(tree, threads);
     return INSITU_OK;
 }
 
-/* A mesh that has shrunk leaves most of its grid's steps unused. */
+/* Checks whether the mesh has shrunk so much that it uses only a small part of its grid's steps. */
 static bool is_grid_wasted(const mmbvh *tree)
 {
     const int few = COMPACT_LOWER_MAX / 8;

@@ -1,26 +1,27 @@
-/* Computes bounds, and ranges with them if asked for, of meshes whose coordinates and values are floats, as most are. A
- * vertex is then one vector, with its value in the fourth lane, and cells are read once, in one long run, whatever the
- * leaves' sizes. */
+/* Computes bounds, and optionally ranges, for meshes whose coordinates and values are floats, which most are. A vertex
+ * is one vector with its value in lane 3. The cells of a run are read in one pass, independent of the sizes of
+ * leaves. */
 #include "mmbvh_bounds.h"
 #include "mmbvh_measure.h"
 
 enum {
-    PART_NODES = 256,                                   /* whose cells are read at a time */
-    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* at most: pairs have one leaf more than inner nodes */
+    PART_NODES = 256, /* maximum number of nodes whose cells are read in one pass */
+    PART_CELLS =
+        (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* maximum number of cells: pairs have one leaf more than inner nodes */
     PREFETCH_CELLS = 64,
     PREFETCH_VERTICES = 24
 };
 
-/* The spans of the cells from first on in the tree's list; lane 3 has the values'. */
+/* The boxes of consecutive cells of the tree's list. Lane 3 holds the range of the values. */
 typedef struct part {
     int64_t first;
-    int64_t unusable; /* cells */
-    int64_t misfits;  /* boxes that the tree's grid does not hold */
-    double grown;     /* sweep_sum */
+    int64_t unusable; /* number of cells with non-finite values */
+    int64_t misfits;  /* number of boxes that the tree's grid cannot represent */
+    double grown;     /* change of the tree's area, as in sweep_sum */
     fetch_span spans[PART_CELLS];
 } part;
 
-/* Constants of a pass, except the arrays. */
+/* Parameters of a pass that are compile-time constants in each instance. */
 typedef struct reading {
     fetch_shape shape;
     bool wide_index, with_values, is_packed;
@@ -44,7 +45,7 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
                         how.with_values ? *(const float *)(const void *)(s->values.data + vertex * value_stride) : 0};
         span.lower = vec4_min(p, span.lower);
         span.upper = vec4_max(p, span.upper);
-        if (how.with_values) poison += p - p; /* 0 while all are finite, then not a number */
+        if (how.with_values) poison += p - p; /* 0 while all values are finite, otherwise NaN */
     }
     if (poison[3] == 0) return span;
     ++*unusable;
@@ -53,8 +54,8 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
     return span;
 }
 
-/* Prefetches one vertex of a cell whose connectivity was prefetched before; the others are near it. Tets do not need
- * it: so many share a vertex that theirs are in the cache already. */
+/* Prefetches one vertex of a cell whose connectivity was prefetched earlier; the other vertices are near it. Not needed
+ * for tets: each vertex is shared by so many of them that it is usually in the cache already. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading how)
 {
     const grid *g = s->source->g;
@@ -71,7 +72,8 @@ MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end
     const uint32_t *cells = s->tree->cells;
     p->first = first;
     for (int64_t i = end - 1; i >= first; i--) {
-        const int64_t later = cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep goes down */
+        const int64_t later =
+            cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep processes the cells in descending order */
         const int64_t entry =
             fetch_first(s->source->g, later, fetch_vertex_count(s->source->g, later, how.shape), how.shape);
         fetch_soon(s->source->g, entry, how.shape);
@@ -90,7 +92,9 @@ MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t firs
     fetch_span_round(&all, tree->origin, tree->scale, &lower, &upper);
     store_measured(s, node, lower, upper, &p->misfits, &p->grown);
     if (how.with_values)
-        set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f}); /* zero positive, as bounds have it */
+        set_range(s, node,
+                  (range){all.lower[3] + 0.0f,
+                          all.upper[3] + 0.0f}); /* adding 0 makes a negative zero positive, as in bounds */
 }
 
 MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
@@ -107,7 +111,7 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
     }
 }
 
-/* Sweeps a pair, or the root, whatever is below. */
+/* Sweeps a pair, or the root, without its descendants. */
 MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
 {
     for (int64_t i = first; i < end; i++) {
@@ -118,7 +122,7 @@ MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end,
     }
 }
 
-/* The first cell below a node, and the end of its cells. */
+/* Return the first cell below a node, and the end of its cells. */
 static int64_t first_cell(const mmbvh *tree, int64_t node)
 {
     while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node);

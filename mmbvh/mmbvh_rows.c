@@ -1,5 +1,5 @@
-/* Each row of cells lies between four rows of vertices, or two in two dimensions. Their values are united vertex by
- * vertex, and then each cell unites those of its two ends. */
+/* Each row of cells lies between four rows of vertices, or two in two dimensions. First the range of these rows' values
+ * is computed at each position; the range of a cell is then the union of those at its two ends. */
 #include "mmbvh_rows.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 
 #include "mmbvh_fetch.h"
 
-/* United values of the vertices at each place along a row. */
+/* The range of the values of all rows at each position along a row of vertices. */
 typedef struct row_places {
     double low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], poison[ROWS_CELLS + 1];
 } row_places;
@@ -22,11 +22,11 @@ bool rows_fit(const grid *g, const grid_field *field)
            grid_lattice_row_axis(g->lattice) >= 0;
 }
 
-/* The least and greatest of two. */
+/* The smaller and the larger of two numbers. */
 #define LESS(a, b) ((a) < (b) ? (a) : (b))
 #define MORE(a, b) ((a) > (b) ? (a) : (b))
 
-/* Unites the values of four rows at each place; poison is 0 where all are finite, else not a number. */
+/* Computes the range of four rows' values at each position. poison is 0 if all values are finite, otherwise NaN. */
 #define UNITE_ROWS(number, to, rows, stride, count)                                                                    \
     for (int64_t n = 0; n < (count); n++) {                                                                            \
         const number a = *(const number *)(const void *)((rows)[0] + n * (stride));                                    \
@@ -61,7 +61,8 @@ DEFINE_RANGES(double_ranges, double, row_places)
 
 enum { EXTENT_LANES = 16 };
 
-/* Poison is 0 where all numbers are finite, else not a number. */
+/* Computes the range of an array; returns false if a number is not finite. poison is 0 while all numbers are finite,
+ * otherwise NaN. */
 #define DEFINE_EXTENT(name, number)                                                                                    \
     static bool name(const char *data, int64_t count, float *low, float *high)                                         \
     {                                                                                                                  \
@@ -104,8 +105,8 @@ bool rows_extent(const grid *g, const grid_field *field, float *low, float *high
                                  : float_extent(data, g->vertex_count, low, high);
 }
 
-/* Finds the next drawn cell from number from on, and how many follow it in its row; returns false where there is none
- * before end. */
+/* Finds the first drawn cell with a number from `from` on, and how many cells follow it in its row. Returns false if
+ * there is none before `end`. */
 static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out)
 {
     while (from < end) {
@@ -124,7 +125,7 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
             if (out->count > ROWS_CELLS) out->count = ROWS_CELLS;
             if (out->count > 0) return true;
         }
-        /* On to the next row: no other number along this axis belongs to a cell. */
+        /* Continues with the next row, because the rest of this row contains no drawn cell. */
         const double outer = l->by_cell.outer[along];
         if (outer == 0) return false;
         from = row + (int64_t)outer;
@@ -140,7 +141,7 @@ bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end
     const char *rows[4];
     const char *data = field->values.data + field->component * field->component_stride;
     const int64_t vertex = grid_lattice_first(l, out->first), stride = field->values.stride;
-    /* Along an axis without cells the vertices' stride is 0, so that a row stands there twice. */
+    /* Along an axis without cells the vertices' stride is 0, so the same row is read twice. */
     const int64_t across[2] = {l->by_vertex.stride[(along + 1) % 3], l->by_vertex.stride[(along + 2) % 3]};
     for (int side = 0; side < 4; side++)
         rows[side] = data + (vertex + (side & 1) * across[0] + (side >> 1) * across[1]) * stride;

@@ -1,5 +1,5 @@
-/* Ranges of a lattice's cells, a row at a time: neighbours in a row share half of their vertices, and the values of a
- * row of vertices follow each other in memory. */
+/* Computes the ranges of a lattice's cells, one row at a time. Neighbouring cells of a row share half of their
+ * vertices, and the values of a row of vertices are contiguous in memory. */
 #ifndef MMBVH_ROWS_H
 #define MMBVH_ROWS_H
 
@@ -7,23 +7,24 @@
 
 enum { ROWS_CELLS = 64 };
 
-/* Cells side by side. */
+/* The ranges of neighbouring cells of one row. */
 typedef struct rows_ranges {
     int64_t first, count;
     float low[ROWS_CELLS], high[ROWS_CELLS]; /* rounded to float as a cast does */
-    unsigned char is_finite[ROWS_CELLS];     /* 1: all values of the cell are; 0 beyond count, in its last eight */
+    unsigned char is_finite[ROWS_CELLS];     /* 1 if all values of the cell are finite; 0 behind count, up to the next
+                                                multiple of 8 */
 } rows_ranges;
 
-/* Tells whether rows_read() serves: cells follow each other along an axis of a lattice, with floats or doubles at their
- * vertices. */
+/* Checks whether rows_read() can read the grid and field: consecutive cells lie along an axis of a lattice, and the
+ * values at vertices are floats or doubles. */
 bool rows_fit(const grid *g, const grid_field *field);
 
-/* Reads the next cells of one row, from the given number on and before end, that are neither padding nor of ghost
- * layers. Flags of ghosts are not looked at. Returns false where there are none. */
+/* Computes the ranges of the next drawn cells of one row, whose numbers are at least `from` and less than `end`.
+ * Padding and ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */
 bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out);
 
-/* Finds the range of the values at all vertices, rounded to float as a cast does. Returns false if they do not follow
- * each other in memory, or some is not finite. */
+/* Finds the range of the values at all vertices, rounded to float as a cast does. Returns false if the values are not
+ * contiguous in memory, or one of them is not finite. */
 bool rows_extent(const grid *g, const grid_field *field, float *low, float *high);
 
 #endif

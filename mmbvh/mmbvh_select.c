@@ -1,8 +1,9 @@
-/* Selects the cells that can be seen. In the thesis (section 4.2) a node whose range meets no isovalue is culled; here
- * a cell is, before there is a tree.
+/* Selects the visible cells. In the thesis (section 4.2) nodes are culled whose range contains no isovalue; here cells
+ * are culled before a tree is built.
  *
- * One pass for each wish writes a bit a cell, and another lists the cells whose bit is set. The first is bound by
- * reading the connectivity and the values; two passes make the list as long as it must be. */
+ * One pass per query sets a bit for each cell found, and a final pass lists the cells whose bits are set. The first
+ * passes are limited by the memory bandwidth of the connectivity and values; with two passes the list is allocated with
+ * its exact size. */
 #include <string.h>
 
 #include "memory.h"
@@ -16,7 +17,8 @@ enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
 
 typedef struct selector selector;
 
-/* Sets the bits of cells begin .. end, a multiple of 64 except in the last run; returns how many are unusable. */
+/* Sets the bits of the cells found in [begin, end), whose length is a multiple of 64 except at the end of the grid;
+ * returns the number of cells with non-finite values. */
 typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
 
 struct selector {
@@ -27,7 +29,7 @@ struct selector {
     uint64_t *bits;
 };
 
-/* Tells whether a cell's values are finite, and whether their range meets an interval. */
+/* The result for one cell: whether its values are finite, and whether their range intersects an interval. */
 typedef struct finding {
     bool is_finite, meets;
 } finding;
@@ -41,7 +43,7 @@ MMBVH_INLINE finding find_range(const selector *s, const fetch_range e)
     return out;
 }
 
-/* A range meets an interval where a value is not above it, and one not below. */
+/* A range intersects an interval if one value is not above the interval and one is not below it. */
 MMBVH_INLINE finding find_floats(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
                                  const bool is_packed)
 {
@@ -65,7 +67,7 @@ MMBVH_INLINE finding find_doubles(const selector *s, int64_t cell, const fetch_s
     return find_range(s, fetch_doubles_range(&v, is_finite));
 }
 
-/* The lanes' sign bits, the first lane's lowest. */
+/* Returns the lanes' sign bits; bit i is that of lane i. */
 static inline int sign_bits(ivec4 a)
 {
 #if defined(__SSE2__)
@@ -75,13 +77,13 @@ static inline int sign_bits(ivec4 a)
 #endif
 }
 
-/* Constants of a pass. */
+/* Parameters of a pass that are compile-time constants in each instance. */
 typedef struct reading {
     fetch_shape shape;
     bool wide_index, wide_number, is_packed;
 } reading;
 
-/* Where the value at one vertex of a cell is. at: the vertex in the cell. */
+/* Returns the address of the value at vertex number `at` of a cell. */
 MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const reading how, const int64_t stride)
 {
     const grid_array *connectivity = &s->g->connectivity;
@@ -93,7 +95,7 @@ MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, cons
     return data + (uintptr_t)(index * stride);
 }
 
-/* The least and greatest value of each of four cells, a cell a lane, and zero where all are finite. */
+/* The value ranges of four cells, one per lane. poison is 0 if all values of the cell are finite. */
 typedef struct four_ranges {
     vec4 low, high, poison;
 } four_ranges;
@@ -108,12 +110,12 @@ MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const
         const vec4 values = {v[0], v[1], v[2], v[3]};
         r.low = vec4_min(values, r.low);
         r.high = vec4_max(values, r.high);
-        r.poison += values - values; /* 0 while all are finite, else not a number */
+        r.poison += values - values; /* 0 while all values are finite, otherwise NaN */
     }
     return r;
 }
 
-/* Rounds the ranges to floats. */
+/* Reads the ranges of four cells whose values are doubles, and rounds them to float. */
 MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, const reading how)
 {
     const int64_t stride = how.is_packed ? (int64_t)sizeof(double) : s->values.stride;
@@ -135,7 +137,8 @@ MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, cons
                          {(float)poison[0][0], (float)poison[0][1], (float)poison[1][0], (float)poison[1][1]}};
 }
 
-/* Four cells of one type: a bit for each whose values are not finite, and for each other that meets an interval. */
+/* Sets a bit in *unusable for each cell whose values are not finite, and in *meeting for each other cell whose range
+ * intersects an interval. */
 MMBVH_INLINE void find_four(const selector *s, const four_ranges *r, uint64_t *unusable, uint64_t *meeting)
 {
     ivec4 meets = {0};
@@ -147,7 +150,7 @@ MMBVH_INLINE void find_four(const selector *s, const four_ranges *r, uint64_t *u
     *meeting = (uint64_t)(sign_bits(meets) & ~poisoned);
 }
 
-/* Bits of those of so many cells that are drawn. */
+/* Returns a bit mask of the cells in [first, first + count) that are drawn. */
 static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
 {
     uint64_t bits = 0;
@@ -158,7 +161,7 @@ static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
 
 typedef finding (*const finder)(const selector *s, int64_t cell, const bool is_packed);
 
-/* Cells that are not drawn are passed over. */
+/* Sets the bits of cells of any type. Cells that are not drawn are skipped. */
 MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder find, const bool is_packed)
 {
     int64_t unusable = 0;
@@ -176,7 +179,7 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
     return unusable;
 }
 
-/* As above, for cells of one type. */
+/* Same as mark(), four cells at a time, for cells that all have the same type. */
 MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, finder find, const reading how)
 {
     int64_t unusable = 0;
@@ -234,8 +237,8 @@ static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
     return mark(s, begin, end, find_any, false);
 }
 
-/* A bit for each of so many bytes, which are 0 or 1, as are those up to the next eight. The product has the eight bits
- * of a word in its last byte. */
+/* Packs bytes with values 0 or 1 into bits. The bytes up to the next multiple of 8 must be readable and 0 or 1. The
+ * product collects the eight bits of a word in its highest byte. */
 static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
 {
     uint64_t bits = 0, eight;
@@ -246,7 +249,7 @@ static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
     return bits;
 }
 
-/* A bit for each cell whose range meets an interval. */
+/* Returns a bit mask of the row's cells whose range intersects an interval. */
 static uint64_t row_bits(const selector *s, const rows_ranges *r)
 {
     unsigned char meets[ROWS_CELLS] = {0};
@@ -258,7 +261,8 @@ static uint64_t row_bits(const selector *s, const rows_ranges *r)
     return packed_bits(meets, r->count);
 }
 
-/* A lattice's cells, row by row. The two words that a row's bits may lie in are in one block of a thread's. */
+/* Sets the bits of a lattice's cells, row by row. Both words that a row's bits may fall into belong to the block of the
+ * same thread. */
 static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
 {
     const grid *g = s->g;
@@ -294,10 +298,11 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     return s;
 }
 
-/* Cells of a lattice whose values are read twice: a block is soon read, and may have no cell that shows. */
+/* Maximum number of cells for which the range of all values is computed first. Small lattices are read quickly, and
+ * often contain no visible cell. */
 enum { MOST_READ_TWICE = 1 << 16 };
 
-/* Tells whether no cell of a small lattice can show, and all are usable, by the range of all values. */
+/* Checks whether the range of all values shows that a small lattice has no visible cell and no non-finite value. */
 static bool shows_nothing(const selector *s)
 {
     float low, high;
@@ -336,7 +341,8 @@ static void list_bits(const uint64_t *bits, int64_t begin, int64_t end, uint32_t
             *out++ = (uint32_t)(WORD_CELLS * i + __builtin_ctzll(word));
 }
 
-/* Each thread has a part of the words: it counts the cells, then writes them where the parts before it end. */
+/* Lists the cells whose bits are set. Each thread counts the cells in its part of the words, and then writes them
+ * behind those of the earlier parts. */
 static bool list_cells(const uint64_t *bits, int64_t words, int threads, mmbvh_selection *out)
 {
     int64_t *ends = base_calloc((size_t)threads + 1, sizeof *ends);

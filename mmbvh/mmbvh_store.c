@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* The power of two not below x; 0 for 0. */
+/* Returns the smallest power of two that is not below x, or 0 for 0. */
 static double power_above(double x)
 {
     int exponent;
@@ -10,7 +10,8 @@ static double power_above(double x)
     return x > 0 ? ldexp(1, fraction > 0.5 ? exponent : exponent - 1) : 0;
 }
 
-/* An axis's step is at least the distance of floats at the box's far end, so that rounding never loses a step. */
+/* The step of an axis is at least the distance of neighbouring floats at the box's far end, so that rounding never
+ * loses a step. */
 mmbvh_grid store_grid(const float lower[3], const float upper[3])
 {
     enum { STEPS = (1 << COMPACT_LOWER_BITS) - (1 << (COMPACT_LOWER_BITS - COMPACT_MANTISSA_BITS)) };

@@ -1,4 +1,4 @@
-/* Writes nodes of any layout. */
+/* Writes nodes in either layout. */
 #ifndef MMBVH_STORE_H
 #define MMBVH_STORE_H
 
@@ -14,21 +14,22 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
     tree->nodes[index].count = (unsigned)count & 7;
 }
 
-/* The grid of a compact layout, over a box that must be finite. */
+/* Returns the grid of the compact layout over a box, which must be finite. */
 mmbvh_grid store_grid(const float lower[3], const float upper[3]);
 
-/* Serves where the quick way rounds inward, and goes outward one step at a time. Returns false where the grid ends
- * before. */
+/* Corrects a box that store_compact() rounded inward: extends it one step at a time. Returns false if the box is not
+ * within the grid. */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
-/* Stores lanes 0 to 2 as the smallest box that the grid has around them; lane 3 must be 0. False where the grid does
- * not reach so far. */
+/* Stores the smallest box representable in the grid that contains lanes 0 to 2; lane 3 must be 0. Returns false if the
+ * box is not within the grid. */
 static inline bool store_compact(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
 {
     mmbvh_compact_node *node = &tree->compact[index];
     const vec4 origin = *(const compact_vec4 *)(const void *)tree->grid.origin;
     const vec4 step = *(const compact_vec4 *)(const void *)tree->grid.step;
-    const vec4 zero = {0}, inverse = (vec4)(0x7f000000 - (ivec4)step); /* powers of two, inverted by their exponents */
+    const vec4 zero = {0},
+               inverse = (vec4)(0x7f000000 - (ivec4)step); /* powers of two, inverted by negating their exponents */
     const ivec4 place =
         vec4_truncate(vec4_min(vec4_max((lower - origin) * inverse, zero), vec4_set1(COMPACT_LOWER_MAX)));
     const vec4 extent = vec4_max((upper - (vec4_from_int(place) * step + origin)) * inverse, zero) + 16.0f;
@@ -52,7 +53,7 @@ static inline void store_reference(const mmbvh *tree, int64_t index, vec4 lower,
     }
 }
 
-/* Stores a box in the node, rounded outward. Returns false where the compact layout's grid does not hold it. */
+/* Stores a box in the node, rounded outward. Returns false if the grid of the compact layout cannot represent it. */
 static inline bool store_box(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
 {
     if (tree->compact) return store_compact(tree, index, lower, upper);
@@ -60,7 +61,7 @@ static inline bool store_box(const mmbvh *tree, int64_t index, vec4 lower, vec4 
     return true;
 }
 
-/* Reads a node's box as two corners, with lane 3 zero. */
+/* Reads a node's box as two corners whose lane 3 is 0. */
 static inline void store_decode(const mmbvh *tree, int64_t index, vec4 *lower, vec4 *upper)
 {
     if (tree->compact) {

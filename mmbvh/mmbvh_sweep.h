@@ -1,7 +1,8 @@
-/* Bottom-up passes over a tree: leaves from their cells, inner nodes from their children.
+/* Bottom-up passes over a tree: leaves are computed from their cells, and inner nodes from their children.
  *
- * Nodes are numbered depth first by pairs, so all below a node are one run of indices, children after parents: a run
- * swept backwards meets every child before its parent, and the runs below two siblings are independent work. */
+ * Nodes are numbered depth first by pairs: the descendants of a node are contiguous, and children come after parents. A
+ * pass from the last node to the first therefore visits every child before its parent, and the descendants of two
+ * siblings can be processed independently. */
 #ifndef MMBVH_SWEEP_H
 #define MMBVH_SWEEP_H
 
@@ -13,11 +14,11 @@ typedef struct sweep sweep;
 typedef struct bounds_source bounds_source;
 
 typedef struct sweep_sum {
-    int64_t count; /* cells that were found unusable, or boxes that the nodes do not hold */
-    double grown;  /* growth of the tree's area (mmbvh.area), in sweeps of bounds that measure it */
+    int64_t count; /* number of unusable cells, or of boxes that the nodes cannot represent */
+    double grown;  /* change of the tree's area (mmbvh.area), if the sweep measures it */
 } sweep_sum;
 
-/* Sweeps nodes end - 1 down to first: the root, a pair, or a pair and all below it. There may be none. */
+/* Processes nodes end - 1 down to first: the root, a pair, or a pair and its descendants. The range may be empty. */
 typedef sweep_sum (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
@@ -26,44 +27,45 @@ struct sweep {
     const grid *g;
     const grid_field *field;
     grid_array values;           /* values of the field's component */
-    const float *box_ranges;     /* ranges of the boxes, for a parent tree */
-    const bounds_source *source; /* source of the bounds, for a sweep of bounds */
-    mmbvh_ranges ranges;         /* written by a sweep of ranges */
-    int64_t run_max;             /* nodes in a run; 0: as many as are worth a task */
-    bool is_measured;            /* for a sweep of bounds: the nodes have bounds already, and grown is wanted */
-    int visible_count;           /* 0: all nodes are swept; else those below nodes that one of these shows */
+    const float *box_ranges;     /* ranges of the boxes of a parent tree, low and high for each */
+    const bounds_source *source; /* source of the cells' boxes, for a sweep of bounds */
+    mmbvh_ranges ranges;         /* receives the result of a sweep of ranges */
+    int64_t run_max;             /* maximum number of nodes per run; 0: no limit other than the size of a task */
+    bool is_measured;  /* for a sweep of bounds of nodes that have bounds already: the change of area is measured */
+    int visible_count; /* 0: all nodes are swept; otherwise only the visible nodes and their children */
     const mmbvh_visible *visible;
-    const sweep *then; /* NULL, or another sweep of the same tree, which follows each run of this one while it is in the
-                          cache */
+    const sweep *then; /* another sweep of the same tree, which is applied to each run after this sweep while the run is
+                          in the cache; may be NULL */
 };
 
-/* Sweeps the whole tree. Returns the sum of what the runs returned (those of the last sweep, if one follows another),
- * to the same bits for any number of threads. */
+/* Sweeps the whole tree. Returns the sum of the runs' results (those of the last sweep, if one follows another); its
+ * rounding does not depend on the number of threads. */
 sweep_sum sweep_tree(const sweep *s, int threads);
 
-/* The sweep that writes ranges of field (NULL: infinite ones). */
+/* Returns a sweep that computes the ranges of the field; if field is NULL, they are infinite. */
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
 
-/* As above, for a parent tree. ranges has a low and a high value for each mesh. */
+/* Same as sweep_of_ranges(), for a parent tree. `ranges` has a low and a high value per mesh. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 
-/* The sweep that writes the bounds. */
+/* Returns a sweep that computes the bounds. */
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 
-/* Makes a sweep of bounds read cells by runs, if their coordinates are floats. */
+/* If the coordinates are floats, changes a sweep of bounds to read the cells of a whole run in one pass. */
 void sweep_bounds_as_floats(sweep *bounds);
 
-/* Tells whether the values are floats at the vertices. */
+/* Checks whether the values are floats at the vertices. */
 bool sweep_reads_floats(const sweep *ranges);
 
-/* Does both sweeps' work for a grid's cells in one, so that a cell is read once. ranges is from sweep_of_ranges() for
- * the same tree. If either cannot be read as floats, they run one after the other. */
+/* Returns a sweep that computes both bounds and ranges of a grid's cells, so that a cell is read once. `ranges` must be
+ * from sweep_of_ranges() for the same tree. If bounds or values cannot be read as floats, the two sweeps run one after
+ * the other. */
 sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
 
-/* Makes the sweep that does both sweeps' work in one pass. Returns false if either cannot be read as floats. */
+/* Makes a sweep that computes bounds and ranges in one pass. Returns false if either cannot be read as floats. */
 bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both);
 
-/* Returns how many threads options ask for. */
+/* Returns the number of threads that the options request, or the default of OpenMP. */
 int sweep_threads(const mmbvh_options *options);
 
 static inline sweep_sum sweep_add(sweep_sum a, sweep_sum b)
@@ -71,10 +73,10 @@ static inline sweep_sum sweep_add(sweep_sum a, sweep_sum b)
     return (sweep_sum){a.count + b.count, a.grown + b.grown};
 }
 
-/* Tells whether the sweep goes below the node. */
+/* Checks whether the sweep visits the node's descendants. */
 bool sweep_shows(const sweep *s, int64_t node);
 
-/* ---- the ranges that sweeps write ------------------------------------------------------------------------------- */
+/* ---- ranges of nodes --------------------------------------------------------------------------------------------- */
 
 typedef struct range {
     float low, high;

@@ -1,6 +1,5 @@
-/* Vectors of four floats (three axes and a spare lane, or four values) and of two doubles. Every processor that the
- * library is built for has them without an instruction set flag, so trees need no kernels of several instruction sets.
- */
+/* Vectors of four floats (three axes and an unused lane, or four values) and of two doubles. Every supported processor
+ * has them without compiler flags, so that trees need no kernels for several instruction sets. */
 #ifndef MMBVH_VEC4_H
 #define MMBVH_VEC4_H
 
@@ -19,7 +18,7 @@ static inline vec4 vec4_set1(float x)
     return (vec4){x, x, x, x};
 }
 
-/* a where a < b, else b: a NaN in a is passed over. */
+/* Returns a if a < b, otherwise b, per lane. A NaN in a is therefore ignored. */
 static inline vec4 vec4_min(vec4 a, vec4 b)
 {
 #if defined(__SSE2__)
@@ -30,7 +29,7 @@ static inline vec4 vec4_min(vec4 a, vec4 b)
 #endif
 }
 
-/* a where a > b, else b. */
+/* Returns a if a > b, otherwise b, per lane. */
 static inline vec4 vec4_max(vec4 a, vec4 b)
 {
 #if defined(__SSE2__)
@@ -53,7 +52,7 @@ static inline float vec4_most(vec4 a)
     return two[0] > two[1] ? two[0] : two[1];
 }
 
-/* Two doubles, by the same rules. */
+/* Vectors of two doubles, with the same rules for NaN. */
 typedef double vec2 __attribute__((vector_size(16), may_alias));
 typedef int64_t ivec2 __attribute__((vector_size(16), may_alias));
 
@@ -82,13 +81,13 @@ static inline vec2 vec2_max(vec2 a, vec2 b)
 #endif
 }
 
-/* Sets the spare lane to zero. */
+/* Sets lane 3 to 0. */
 static inline vec4 vec4_xyz(vec4 a)
 {
     return (vec4)((ivec4)a & (ivec4){-1, -1, -1, 0});
 }
 
-/* Towards zero; the lanes must be in an int's range. */
+/* Rounds towards 0; the results must be in the range of int. */
 static inline ivec4 vec4_truncate(vec4 a)
 {
 #if defined(__SSE2__)
@@ -107,15 +106,16 @@ static inline vec4 vec4_from_int(ivec4 a)
 #endif
 }
 
-/* The largest float not above x, and the smallest not below it. A double beyond the floats' range goes to the largest
- * finite float or to infinity, whichever lies outward. Zero comes out positive, so that equal bounds are equal bits. */
+/* These round a double to the nearest float that is not above, or not below, x. Outside the range of float the result
+ * is the largest finite float or infinity, whichever is in the direction of rounding. A zero result is always positive,
+ * so that equal bounds have equal bits. */
 static inline float round_down(double x)
 {
     float f = (float)x;
     uint32_t bits;
     memcpy(&bits, &f, sizeof bits);
-    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX; /* towards -inf: a negative float's bits grow */
-    bits += (double)f > x ? step : 0u;                  /* f is never +0 here: a tiny negative x rounds to -0 */
+    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX; /* a step towards -inf: the bits of negative floats grow */
+    bits += (double)f > x ? step : 0u; /* f is never +0 if it exceeds x: a tiny negative x rounds to -0 */
     memcpy(&f, &bits, sizeof f);
     return f + 0.0f;
 }
@@ -125,7 +125,7 @@ static inline float round_up(double x)
     return 0.0f - round_down(-x);
 }
 
-/* round_down() of (a - origin) scale, which is computed in double. */
+/* Returns round_down() of (a - origin) * scale, which is computed in double. */
 static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
 {
 #if defined(__SSE2__)
@@ -137,7 +137,7 @@ static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
     const __m128d over01 = _mm_cmpgt_pd(_mm_cvtps_pd(nearest), x01);
     const __m128d over23 = _mm_cmpgt_pd(_mm_cvtps_pd(_mm_movehl_ps(nearest, nearest)), x23);
     const ivec4 over = (ivec4)_mm_shuffle_ps((__m128)over01, (__m128)over23, 0x88);
-    const ivec4 sign = (ivec4)nearest >> 31; /* a negative float's bits grow towards -inf */
+    const ivec4 sign = (ivec4)nearest >> 31; /* the bits of negative floats grow towards -inf */
     return (vec4)((ivec4)nearest + (over & ~(sign + sign))) + 0.0f;
 #else
     vec4 placed;
@@ -146,7 +146,7 @@ static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
 #endif
 }
 
-/* Tells whether any lane's sign bit is set. */
+/* Returns whether the sign bit of any lane is set. */
 static inline bool vec4_any(ivec4 a)
 {
 #if defined(__SSE2__)
@@ -156,7 +156,7 @@ static inline bool vec4_any(ivec4 a)
 #endif
 }
 
-/* Tells whether all lanes' sign bits are set. */
+/* Returns whether the sign bits of all lanes are set. */
 static inline bool vec4_all(ivec4 a)
 {
 #if defined(__SSE2__)

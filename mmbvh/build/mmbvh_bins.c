@@ -1,19 +1,21 @@
-/* Sweeps over the bins of the three axes at once: lane k of a vector is axis k's candidate, so that one transposition
- * turns three boxes' extents into one product sum for three surface areas. */
+/* The bins of the three axes are swept at the same time: lane k of a vector belongs to axis k. One transposition turns
+ * the extents of three boxes into one sum of products that gives three surface areas. */
 #include "mmbvh_bins.h"
 
-enum { RUN_MAX = INT16_MAX }; /* items that a lane can count */
+enum { RUN_MAX = INT16_MAX }; /* largest number of items that a 16-bit lane can count */
 
-/* Few items get few bins, whose own cost is most of a small node's. */
+/* Returns the mapping from centroids to bins. Few items get few bins, because the work per bin dominates the cost of
+ * small nodes. */
 bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
 {
     const int wanted = (int)(4 + (item_count < (int64_t)8 * BINS_MAX ? item_count / 8 : BINS_MAX));
     const int count = wanted < BINS_MAX ? wanted : BINS_MAX;
     const lanes used = centroids & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     const ivec4 least = -lanes_lower(used), extent = lanes_upper(used) - least;
-    /* Below 2^15, where it matters, rounding cannot take a quotient to the next integer. */
+    /* If the quotient is below 2^15, its rounding error is too small to reach the next integer; larger quotients are
+     * clamped. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
-    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* so that 2 steps are told apart */
+    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* one grid step is at most one bin */
     return (bin_mapping){(ulanes)lanes_pack(least, least),
                          lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
 }
@@ -37,16 +39,18 @@ void bins_merge(bins *b, const bins *other, int count)
     }
 }
 
-/* The bins' offsets on each axis: for one item in lanes 0 to 2, for another in lanes 4 to 6. */
+/* Returns the byte offsets of the bins of two items: lanes 0 to 2 hold those of `a` on each axis, lanes 4 to 6 those of
+ * `b`. */
 static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
 {
     const lanes upper = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
-    const lanes lower = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); /* negative */
+    const lanes lower =
+        __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); /* stored as ITEM_TOP - lower, hence the subtraction */
     const ulanes places = (ulanes)lanes_scale((lanes)((ulanes)upper - (ulanes)lower - m->origin), m->factor);
     return places * (uint16_t)sizeof(bin);
 }
 
-/* Adds an item to its bin of each axis. Lane 3 of the boxes counts the items, so that one load and one store a bin
+/* Adds an item to its bin on each axis. Lane 3 of a box counts the items, so that one load and one store per bin
  * suffice. */
 static inline void add(bins *b, const uint16_t offsets[3], item i)
 {
@@ -57,7 +61,7 @@ static inline void add(bins *b, const uint16_t offsets[3], item i)
     }
 }
 
-/* Moves the counts from lane 3, which is 0 afterwards, to the bins. */
+/* Adds the counts in lane 3 of the boxes to the bins' counters, and sets lane 3 to 0. */
 static void keep_counts(bins *b, int count)
 {
     for (int i = 0; i < count; i++) {
@@ -69,13 +73,13 @@ static void keep_counts(bins *b, int count)
     }
 }
 
-/* Adds every stride-th item, count of them, in pairs from the two halves of the list: neighbours often go to the same
- * bin and would wait for each other's store. */
+/* Adds `count` items, every stride-th one, in pairs: one from each half of the list. Neighbouring items often belong to
+ * the same bin, and would then stall on each other's store. */
 static void fill_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
 {
     const int64_t half = count / 2;
     const item *halves = items + half * stride;
-    const bin_mapping m = *mapping; /* in registers */
+    const bin_mapping m = *mapping; /* a local copy stays in registers */
     uint16_t offsets[8];
     for (int64_t i = 0; i < half; i++) {
         const item first = items[i * stride], second = halves[i * stride];
@@ -108,7 +112,7 @@ static inline vec4 half_areas(const lanes boxes[3])
            vec4_from_int(__builtin_shufflevector(xy, zz, 1, 3, 5, 7));
 }
 
-/* The cost of an empty side is NaN, whatever its box, and so never the least. */
+/* Returns the SAH cost of one side per axis. The cost of an empty side is NaN, which never compares as the smallest. */
 static inline vec4 side_cost(const lanes boxes[3], ivec4 counts)
 {
     return (vec4)((ivec4)(half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
@@ -120,7 +124,7 @@ static inline void grow(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
     *counts += *(const ivec4 *)b->of[bin].counts;
 }
 
-/* Takes the best of the three axes, without a branch that could not be predicted. */
+/* Returns the cheapest of the three axes' splits, without unpredictable branches. */
 static bin_split least(vec4 costs, ivec4 borders)
 {
     float cost = costs[0];
@@ -158,7 +162,8 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     return least(best, best_border);
 }
 
-/* A side's box is at least as large as each of its items', so no plane costs less than the sum of the items' areas. */
+/* The box of a side is at least as large as that of each of its items, so no plane costs less than the sum of the
+ * items' areas. */
 float bins_least_cost(const item *items, int64_t count)
 {
     vec4 terms = {0};
@@ -166,19 +171,19 @@ float bins_least_cost(const item *items, int64_t count)
     return terms[0] + terms[1];
 }
 
-/* Each item, of either side, changes places with the first right one so far; then the left end moves if the item is a
- * left one. So there is no branch to be mispredicted. */
+/* Partitions without unpredictable branches: every item is swapped with the first item of the right side, and the left
+ * side then grows by one if the item belongs to it. */
 int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count)
 {
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
-    const int first =
-        (int16_t)m->origin[split.axis] + (split.border * 65536 + factor - 1) / factor; /* the right side's first */
+    const int first = (int16_t)m->origin[split.axis] +
+                      (split.border * 65536 + factor - 1) / factor; /* lowest value of the right side */
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
     char *base = (char *)items;
-    int64_t left = 0; /* bytes */
+    int64_t left = 0; /* in bytes */
     for (int64_t i = 0; i < count; i++) {
-        const int before = upper[8 * i] - lower[8 * i] - first; /* negative for a left item */
+        const int before = upper[8 * i] - lower[8 * i] - first; /* negative for an item of the left side */
         const item moved = items[i];
         item *place = (item *)(void *)(base + left);
         items[i] = *place;

@@ -1,13 +1,13 @@
-/* Each node is a task. A large one goes over its items in chunks, which are tasks too. First they fill bins, which
- * merge to the same bits in any order. When the plane is chosen, each chunk is parted in place. The number of left
- * items makes the border, before which as many right items are left as there are left ones behind it: these are
- * exchanged, first with first.
+/* Each node is a task. A node of many items processes them in chunks, which are tasks too. First the chunks fill bins,
+ * which merge to the same bits in any order. When the plane is chosen, each chunk is partitioned in place. The total
+ * number of left items determines the border; as many right items lie in front of it as left items behind it. These are
+ * swapped, in order.
  *
  *      chunk 0        chunk 1        chunk 2
  *     | l l l r r r | l l r r r r | l l l l r r |
- *                         border ^                    r r r (chunk 0) and one r of chunk 1 with l l l l of chunk 2
+ *                         border ^      swap r r r of chunk 0 and one r of chunk 1 with l l l l of chunk 2
  *
- * Chunks depend on the number of items alone, so the tree does not depend on the threads that run them. */
+ * The chunks depend only on the number of items, so the tree does not depend on the number of threads. */
 #include "mmbvh_branch.h"
 
 #include "region.h"
@@ -17,27 +17,27 @@
 enum {
     CHUNK_MIN = 16384,
     CHUNKS_MAX = 64,
-    PARALLEL_MIN = 8 * CHUNK_MIN /* a node of fewer items is one task */
+    PARALLEL_MIN = 8 * CHUNK_MIN /* a node of fewer items is processed by one task */
 };
 
-/* A node before it is split. */
+/* A node that has not been split yet. */
 typedef struct branch_node {
     item_set set;
-    item_grid grid; /* whose steps the items are in */
+    item_grid grid; /* the grid in whose steps the items' boxes are given */
     int depth;
 } branch_node;
 
-/* A branch being split. */
+/* The state of the split of one node. */
 typedef struct splitting {
     item *items;
     int64_t count;
     int64_t chunk_size;
     int chunk_count;
-    int64_t left[CHUNKS_MAX]; /* items of the left side, by chunk */
+    int64_t left[CHUNKS_MAX]; /* number of left items in each chunk */
     int64_t left_count;
     branch_node node;
     bin_mapping mapping;
-    int64_t stride; /* every so many-th item fills bins */
+    int64_t stride; /* one item in this many is binned */
     bin_split split;
     bins total;
     item_set sides[2];
@@ -59,7 +59,7 @@ static int64_t chunk_end(const splitting *s, int chunk)
     return end < s->count ? end : s->count;
 }
 
-/* Calls act() for every chunk, by tasks. */
+/* Calls act() for every chunk, in parallel tasks. */
 static void for_chunks(splitting *s, const branch_builder *builder,
                        void (*act)(splitting *, const branch_builder *, int chunk, int64_t begin, int64_t end))
 {
@@ -101,10 +101,10 @@ static void part_chunk(splitting *s, const branch_builder *builder, int chunk, i
     for (int side = 0; side < 2; side++) item_set_merge(&s->sides[side], &sides[side]);
 }
 
-/* Runs of items on the wrong side of the border, as a walk meets them. */
+/* Iterates over the ranges of items on the wrong side of the border, in order. */
 typedef struct strays {
     const splitting *s;
-    bool is_left; /* left items behind the border, else right ones before it */
+    bool is_left; /* true: left items behind the border; false: right items in front of it */
     int chunk;
     int64_t next, end;
 } strays;
@@ -159,7 +159,7 @@ static void halve(splitting *s)
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
 }
 
-/* Chooses the plane from a sample of the items, or from all where the sample has none. */
+/* Chooses the plane from a sample of the items, or from all items if the sample allows no split. */
 static void choose(splitting *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);

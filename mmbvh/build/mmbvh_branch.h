@@ -1,5 +1,5 @@
-/* The top of a SAH tree under construction: nodes of many items, split by all threads together, down to subtrees that
- * one thread builds alone. */
+/* Builds the top of a SAH tree. All threads together split nodes with many items, until each part is a subtree that one
+ * thread builds (mmbvh_subtree.h). */
 #ifndef MMBVH_BRANCH_H
 #define MMBVH_BRANCH_H
 
@@ -8,11 +8,11 @@
 typedef struct branch_builder {
     topology_build *build;
     const bounds_source *source;
-    item *items; /* left in the order of the leaves */
+    item *items; /* reordered to the order of the leaves */
     int64_t count;
 } branch_builder;
 
-/* NULL where an allocation failed. */
+/* Builds the tree; returns NULL if an allocation failed. `set` has the bounds of all items, in steps of the grid. */
 topology *branch_build(const branch_builder *builder, const item_set *set, const item_grid *grid);
 
 #endif

@@ -1,5 +1,5 @@
-/* A lattice's order of cells is a good one already: a box of indices is a compact body wherever the lattice is not
- * folded. Each node is halved along the axis on which its cells reach farthest, by the mean length of their edges. */
+/* The cells of a lattice are already in spatial order: a box of indices is compact wherever the lattice is not folded.
+ * Each node is halved along the axis on which its box is longest, estimated by the mean edge length of the cells. */
 #include "mmbvh_bricks.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 
 #include "region.h"
 
-/* A box of cells, by their indices. */
+/* A box of cell indices. */
 typedef struct brick {
     int64_t first[3], count[3];
 } brick;
@@ -15,7 +15,7 @@ typedef struct brick {
 typedef struct bricks {
     topology_build *build;
     const grid_lattice *lattice;
-    double edge[3]; /* mean lengths of the cells' edges along the axes */
+    double edge[3]; /* mean lengths of the cells' edges along each axis, times the number of samples */
     uint32_t *cells;
 } bricks;
 
@@ -40,7 +40,7 @@ int64_t bricks_count(const grid_lattice *lattice)
     return cells_of(&all);
 }
 
-/* The first of a cell's edges along an axis. */
+/* Returns the length of the edge from the vertex to the next one along the axis. */
 static double edge_length(const grid *g, int64_t vertex, int axis)
 {
     double from[3], to[3], sum = 0;
@@ -50,7 +50,7 @@ static double edge_length(const grid *g, int64_t vertex, int axis)
     return sqrt(sum);
 }
 
-/* Computes the mean lengths over some cells all over the lattice. */
+/* Computes the relative mean edge lengths from samples spread over the whole lattice. */
 static void measure_edges(const grid *g, double out[3])
 {
     enum { SAMPLES = 5 };
@@ -67,7 +67,7 @@ static void measure_edges(const grid *g, double out[3])
     }
 }
 
-/* Halves a brick of two cells or more. */
+/* Halves a box of at least two cells along its longest axis. */
 static void halve(const bricks *s, const brick *b, brick halves[2])
 {
     double reach[3];
@@ -89,7 +89,8 @@ static void list_cells(const grid_lattice *l, const brick *b, uint32_t *out)
                 *out++ = (uint32_t)(i * stride[0] + j * stride[1] + k * stride[2]);
 }
 
-/* cells: those of the subtree; first: of the brick's among them. */
+/* Builds the subtree of the box. `cells` is the subtree's cell list, and the box's cells begin at index `first`.
+ * Returns the root's link. */
 static topology_link build_subtree(const bricks *s, topology_scratch *scratch, const brick *b, uint32_t *cells,
                                    int64_t first)
 {

@@ -1,15 +1,15 @@
-/* Trees over a lattice's cells: boxes of indices are halved, so that nothing is sorted and no cell is read. */
+/* Builds trees over the cells of a lattice by halving boxes of indices. Nothing is sorted, and no cell is read. */
 #ifndef MMBVH_BRICKS_H
 #define MMBVH_BRICKS_H
 
 #include "grid.h"
 #include "mmbvh_topology.h"
 
-/* Returns how many cells a tree over all drawn cells has, ghost flags aside. */
+/* Returns the number of cells of a tree over all drawn cells of the lattice, without regard to ghost flags. */
 int64_t bricks_count(const grid_lattice *lattice);
 
-/* Builds the tree over the bricks_count() cells of g's lattice, which are all drawn; cells gets them in the order of
- * the leaves. NULL: out of memory. */
+/* Builds the tree over the bricks_count() cells of the lattice of g, all of which must be drawn; `cells` receives their
+ * indices in the order of the leaves. Returns NULL if memory ran out. */
 topology *bricks_build(topology_build *build, const grid *g, uint32_t *cells);
 
 #endif

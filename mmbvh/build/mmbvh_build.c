@@ -1,9 +1,10 @@
-/* A tree over all cells of a lattice is built by halving boxes of indices (mmbvh_bricks.c). Any other is built in three
- * steps: the boxes of all cells in 16 bytes each, or their keys, twice 8 bytes; the tree
- * without bounds, 4 bytes a node; then the nodes, whose bounds and ranges come from the sweeps that refit them.
+/* The tree over all cells of a lattice is built by halving boxes of indices (mmbvh_bricks.c). Any other tree is built
+ * in three steps. First the boxes of all cells are quantized to 16 bytes each, or their Morton keys are computed (2 × 8
+ * bytes). Then the topology is built, which has no bounds and takes 4 bytes per node. Finally the nodes are written;
+ * the sweeps of a refit compute their bounds and ranges.
  *
- * Peak memory in bytes a cell: 16 for items or keys, 4 for each node (0.35 nodes a tet), 4 for the cell indices of the
- * result. The items are given back before the nodes are made. */
+ * Peak memory in bytes per cell: 16 for items or keys, 4 for each topology node (0.35 nodes per tet), and 4 for the
+ * cell indices of the result. The items are freed before the nodes are allocated. */
 #include "mmbvh.h"
 
 #include <string.h>
@@ -19,14 +20,15 @@
 
 enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 
-/* The memory and counters that a build holds until it ends. */
+/* The settings, buffers and counters of one build. */
 typedef struct build {
     bounds_source source;
-    const uint32_t *selected; /* cells of the grid, without ghosts; NULL: all that are not ghosts */
-    int64_t listed;           /* length of selected, or all cells with ghosts */
+    const uint32_t
+        *selected;  /* indices of the cells to use, none of which may be a ghost; NULL: all cells that are drawn */
+    int64_t listed; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
     int threads;
-    int64_t starts[FILL_CHUNKS + 1]; /* where the chunks' cells begin; ghosts are not counted */
+    int64_t starts[FILL_CHUNKS + 1]; /* first position of each chunk's cells, not counting cells that are left out */
     int64_t count;
     item *items;
     uint64_t *keys, *other_keys;
@@ -57,7 +59,7 @@ static uint32_t listed_cell(const build *b, int64_t i)
     return b->selected ? b->selected[i] : (uint32_t)i;
 }
 
-/* Tells whether the tree is over all cells of a lattice, except ghost layers. */
+/* Checks whether the tree covers all cells of a lattice except ghost layers, so that mmbvh_bricks.h can build it. */
 static bool is_by_bricks(const build *b)
 {
     const grid *g = b->source.g;
@@ -111,7 +113,7 @@ static void fill_keys(const build *b, int chunk, fetch_box *exact)
     morton_place(&b->source, b->coder, keys, count, exact);
 }
 
-/* Fills in all cells by the grid over box, in the tree's coordinates. */
+/* Computes the items or keys of all cells, quantized by a grid over the box (in the tree's coordinates). */
 static void fill(build *b, const fetch_box *box)
 {
     b->grid = item_grid_make(box->lower, box->upper);
@@ -141,7 +143,8 @@ static void fill(build *b, const fetch_box *box)
     }
 }
 
-/* The guess is loose where vertices of ghosts, or of no cell, lie far off. */
+/* Checks whether the guess is much larger than the exact bounds. This happens if vertices of ghosts, or vertices that
+ * no cell uses, are far away. */
 static bool is_loose(const fetch_box *guess, const fetch_box *exact)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -195,7 +198,7 @@ static topology *build_morton(build *b, topology_build *t)
     return morton_build(t, b->keys, b->count);
 }
 
-/* Also finds the exact bounds, of all vertices of the cells. */
+/* Builds the tree over a lattice, and computes the exact bounds from the vertices of its cells. */
 static topology *build_bricks(build *b, topology_build *t)
 {
     uint32_t *cells = b->tree.cells = base_alloc((size_t)b->count * sizeof *cells);
@@ -238,7 +241,7 @@ static bool list_cells(build *b)
     return true;
 }
 
-/* The tree's parts without bounds and with its cells, in the order of the leaves; NULL: out of memory. */
+/* Builds the topology, and stores the tree's cells in the order of the leaves. Returns NULL if memory ran out. */
 static topology *build_topology(build *b, int threads)
 {
     topology_build t;
@@ -289,7 +292,7 @@ static bool build_nodes(build *b)
     return is_built;
 }
 
-/* Makes the tree except its bounds and ranges. */
+/* Builds the tree except for the bounds and ranges of its nodes. */
 static insitu_status make(build *b, base_error *error)
 {
     const int64_t count = b->source.box_count;

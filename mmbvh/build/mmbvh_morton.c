@@ -1,5 +1,6 @@
-/* Bits go to the axes as a box is halved: always across its longest side, so that nodes are as cubic as the mesh
- * allows, whatever its shape. Where a bit goes is looked up, seven bits at a time. */
+/* The bits of a code are assigned to axes by repeatedly halving the bounding box across its longest side. The nodes are
+ * therefore as close to cubes as possible, whatever the shape of the mesh. Bits are interleaved by table lookups, seven
+ * bits at a time. */
 #include "mmbvh_morton.h"
 
 #include <omp.h>
@@ -10,14 +11,14 @@
 
 enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
-    DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
+    DIGIT_BITS = 11, /* number of output streams whose ends fit in a core's cache */
     DIGITS = 1 << DIGIT_BITS,
-    SORT_CHUNKS = 4, /* per thread, so that others can take those of a delayed one */
+    SORT_CHUNKS = 4, /* chunks per thread, so that other threads can take those of a delayed one */
     SORT_CHUNKS_MAX = 64,
-    SORT_LARGE = 16, /* parts above this fraction of all keys are sorted by all threads, */
+    SORT_LARGE = 16, /* parts above 1/SORT_LARGE of all keys are sorted by all threads together */
     SORT_LARGE_MIN = 16384,
-    SORT_INSERTED = 24, /* and parts of so few keys by insertion */
-    SORT_LEFT_BITS = 2  /* a digit has at most 2 to this power of keys, if they are spread evenly */
+    SORT_INSERTED = 24, /* parts with at most this many keys are sorted by insertion */
+    SORT_LEFT_BITS = 2  /* log2 of the number of keys per digit, if they are spread evenly */
 };
 
 static int bits_of(uint64_t x)
@@ -25,7 +26,7 @@ static int bits_of(uint64_t x)
     return x ? 64 - __builtin_clzll(x) : 0;
 }
 
-/* Chooses the axis that each bit of the code halves, the highest bit first; counts the bits of each axis. */
+/* Assigns each bit of the code to an axis, the highest bit first, and counts the bits of each axis. */
 static void choose_axes(const double lower[3], const double upper[3], int code_bits, int axes[], int counts[3])
 {
     double sides[3];
@@ -82,7 +83,7 @@ static inline uint64_t code_of_steps(const morton_coder *coder, const int32_t st
     return code;
 }
 
-/* Returns the code of a cell whose box has this centre, in the source's coordinates. */
+/* Returns the Morton code of a box whose centre is given in the source's coordinates. */
 static inline uint64_t code_of(const bounds_source *source, const morton_coder *coder, const double centre[3])
 {
     int32_t steps[3];
@@ -94,7 +95,7 @@ static inline uint64_t code_of(const bounds_source *source, const morton_coder *
     return code_of_steps(coder, steps);
 }
 
-/* Maps the sum of a box's corners, floats in the source's coordinates, to steps. */
+/* Maps the midpoint of a box of floats, in the source's coordinates, to steps of the code. */
 typedef struct sum_mapping {
     vec4 origin, factor, most;
 } sum_mapping;
@@ -110,7 +111,7 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
     return m;
 }
 
-/* NaN becomes 0. */
+/* Returns the Morton code of a box of floats. A NaN coordinate is mapped to step 0. */
 static inline uint64_t code_of_span(const sum_mapping *m, const morton_coder *coder, const fetch_span *span)
 {
     const vec4 place = ((span->lower + span->upper) * 0.5f - m->origin) * m->factor;
@@ -171,14 +172,14 @@ void morton_place(const bounds_source *source, const morton_coder *coder, uint64
 
 /* ---- sorting ---------------------------------------------------------------------------------------------------- */
 
-/* Keys are sorted by their highest digit first. Neighbours in a mesh are mostly neighbours in its numbering too, so
- * their keys leave by few streams, and the keys of one digit fit a core's cache, where they are sorted to the end. */
+/* Keys are sorted by their highest digit first. Neighbouring cells mostly have neighbouring indices, so consecutive
+ * keys go to few output streams; the keys of one digit then fit in a core's cache, where they are sorted completely. */
 typedef struct digit_counts {
     int64_t of[SORT_CHUNKS_MAX][DIGITS];
 } digit_counts;
 
 typedef struct sorting {
-    int64_t large; /* more keys than these are worth all threads */
+    int64_t large; /* larger parts are sorted by all threads together */
     int chunks, threads;
     digit_counts *counts;
 } sorting;
@@ -204,7 +205,7 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
     }
 }
 
-/* Turns the digits' counts into where each digit begins. */
+/* Converts the digits' counts to the first position of each digit, overall and for each chunk. */
 static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
 {
     int64_t sum = 0;
@@ -244,8 +245,8 @@ static void insert(uint64_t *keys, int64_t count)
     }
 }
 
-/* Sorts the keys at from, in place or to other, by a digit that leaves a few keys for each of its values. No two keys
- * are equal. */
+/* Sorts the keys in `from`, either in place or to `other`, on one thread. The digit is chosen so that each of its
+ * values gets a few keys. All keys must be different. */
 static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
 {
     if (count <= SORT_INSERTED) {
@@ -273,7 +274,7 @@ static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_o
     }
 }
 
-/* As above, by all threads. Keys differ in the top lowest bits at most. */
+/* Same as sort_alone(), on all threads. Keys may differ only in their lowest `top` bits. */
 static void sort_together(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
 {
     int64_t starts[DIGITS + 1];
@@ -315,12 +316,13 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
 
 /* ---- the tree --------------------------------------------------------------------------------------------------- */
 
-/* Counts the keys, of two or more in ascending order, that lie below the change of the highest bit that changes. */
+/* Returns the number of keys in which the highest differing bit is 0. There must be at least two keys in ascending
+ * order. */
 static int64_t split_of(const uint64_t *keys, int64_t count)
 {
     const int bit = bits_of(keys[0] ^ keys[count - 1]) - 1;
     const uint64_t border = keys[count - 1] >> bit << bit;
-    int64_t low = 0, high = count - 1; /* keys[low] is below the border, keys[high] is not */
+    int64_t low = 0, high = count - 1; /* invariant: keys[low] is below the border, keys[high] is not */
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
         if (keys[middle] < border) {

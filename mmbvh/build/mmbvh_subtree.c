@@ -1,9 +1,9 @@
-/* Items are parted in place, so a node's items are always one run, and their final order depends only on their first.
- * Where a node is so small that the grid tells its items apart badly, as in meshes whose cells differ by orders of
- * magnitude, their boxes are read from the vertices again, in steps of a finer grid. */
+/* Items are partitioned in place: the items of a node are always contiguous, and their final order depends only on
+ * their initial order. If a node is so small that the grid is too coarse for its items, as in meshes whose cell sizes
+ * differ by orders of magnitude, the boxes are computed from the vertices again, in steps of a finer grid. */
 #include "mmbvh_subtree.h"
 
-enum { COARSE = 64 }; /* steps of the longest side, at which an area is off by 3 percent */
+enum { COARSE = 64 }; /* number of steps along the longest side at which rounding changes an area by 3 percent */
 
 bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid)
 {
@@ -28,7 +28,7 @@ typedef struct subtree {
     bins bins;
 } subtree;
 
-/* Chooses the plane from a sample where there are many items, or from all where the sample has none. */
+/* Chooses the plane from a sample if there are many items, or from all items if the sample allows no split. */
 static bin_split choose(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
 {
     *mapping = bin_mapping_make(centroids, count);

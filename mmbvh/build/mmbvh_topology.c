@@ -74,7 +74,8 @@ static void write_links(topology *t, const mmbvh *tree, int64_t below)
     t->links = NULL;
 }
 
-/* Writes the root to its slot and all below it to the nodes from below on; returns where they end. */
+/* Writes the root of t to the node `slot` and its descendants to the nodes from `below` on; returns the index behind
+ * the last one. */
 static int64_t write(topology *t, const mmbvh *tree, int64_t slot, int64_t below)
 {
     if (!t->children[0]) {

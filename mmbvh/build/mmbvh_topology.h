@@ -1,7 +1,8 @@
-/* A tree under construction, before it has bounds: only the nodes' children and the leaves' cells.
+/* A tree under construction that has no bounds yet, only the links between nodes and the leaves' cells.
  *
- * Its top has nodes with pointers, made by all threads. Below each of its leaves hangs a subtree that one thread made
- * alone, of 4 bytes a node, numbered as the tree will be. In the end all nodes are numbered and written out. */
+ * Its top consists of nodes with pointers, built by all threads. Each leaf of the top refers to a subtree that one
+ * thread built, with 4 bytes per node and the node order of the final tree. At the end all nodes are numbered and
+ * written to the final tree. */
 #ifndef MMBVH_TOPOLOGY_H
 #define MMBVH_TOPOLOGY_H
 
@@ -10,13 +11,14 @@
 #include "mmbvh.h"
 
 enum {
-    TOPOLOGY_SUBTREE_CELLS = 16384,              /* most cells of a subtree: with their nodes they fit a core's cache */
-    TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32 /* from here on nodes are halved, so that 2^32 cells end within the
-                                                    depth allowed */
+    TOPOLOGY_SUBTREE_CELLS = 16384, /* maximum number of cells in a subtree: cells and nodes fit in a core's cache */
+    TOPOLOGY_MEDIAN_DEPTH =
+        MMBVH_MAX_DEPTH -
+        32 /* from this depth on nodes are halved by count, so that 2^32 cells stay within the maximum depth */
 };
 
-/* A subtree's node. The 3 low bits are a leaf's count, 0 for an inner node; the others are the leaf's first cell, or
- * the inner node's left child, counted from the subtree's begin. */
+/* A node of a subtree. The 3 low bits are the number of cells in a leaf, or 0 for an inner node. The other bits are the
+ * leaf's first cell, or the index of the inner node's left child, both counted from the subtree's begin. */
 typedef uint32_t topology_link;
 
 static inline topology_link topology_leaf(int64_t first, int64_t count)
@@ -29,13 +31,13 @@ static inline topology_link topology_inner(int64_t left)
     return (topology_link)(left << 3);
 }
 
-/* The memory in which a thread makes the links of a subtree. */
+/* The buffer in which a thread builds the links of a subtree. */
 typedef struct topology_scratch {
-    topology_link *links; /* room for 2 TOPOLOGY_SUBTREE_CELLS: all below the root */
+    topology_link *links; /* capacity is 2 TOPOLOGY_SUBTREE_CELLS, enough for all nodes below the root */
     int64_t count;
 } topology_scratch;
 
-/* Takes a place for a pair of siblings. */
+/* Appends two nodes for a pair of siblings; returns the index of the first. */
 static inline int64_t topology_new_pair(topology_scratch *s)
 {
     s->count += 2;
@@ -43,34 +45,34 @@ static inline int64_t topology_new_pair(topology_scratch *s)
 }
 
 typedef struct topology {
-    int64_t first, count;         /* range of the node's cells */
-    struct topology *children[2]; /* NULL: a subtree */
+    int64_t first, count;         /* the node's range in the tree's cell list */
+    struct topology *children[2]; /* NULL if the node is a subtree */
     topology_link root;
-    topology_link *links; /* all below the root */
+    topology_link *links; /* nodes below the root of the subtree */
     int64_t link_count;
 } topology;
 
 /* The data that the tasks of a build share. */
 typedef struct topology_build {
     int threads;
-    topology_scratch *scratch; /* by thread */
-    atomic_bool failed;        /* an allocation */
+    topology_scratch *scratch; /* one per thread */
+    atomic_bool failed;        /* true after an allocation failed */
 } topology_build;
 
-/* False: out of memory. topology_end() must be called all the same. */
+/* Allocates the threads' buffers; returns false if memory ran out. topology_end() must be called in either case. */
 bool topology_begin(topology_build *build, int64_t cells, int threads);
 void topology_end(topology_build *build);
 
-/* NULL: out of memory; the build has then failed. */
+/* Allocates a node of the top; if memory ran out, returns NULL and marks the build as failed. */
 topology *topology_new(topology_build *build, int64_t first, int64_t count);
 
-/* Makes the contents of the thread's scratch the subtree under t. */
+/* Copies the links in the thread's scratch to t, as the subtree with this root. */
 void topology_keep(topology_build *build, topology *t, const topology_scratch *scratch, topology_link root);
 
 int64_t topology_node_count(const topology *t);
 
-/* Writes the nodes of tree, numbered depth first by pairs, the root first, and gives the links' memory back on the way.
- */
+/* Writes all nodes to the tree: root first, then depth first by pairs of siblings. Frees the links as they are
+ * written. */
 void topology_write(topology *t, const mmbvh *tree, int threads);
 
 /* t may be NULL. */
