@@ -1,5 +1,6 @@
-/* The door: which meshes a node makes, what of them has changed, and how ranks agree on what is wrong. A session reads
- * borrowed arrays during a step, so what the door made itself stays in a `part` until the mesh is set again. */
+/* The Blueprint adaptor: it determines which meshes a node contains and what has changed in them, and makes all ranks
+ * agree on errors. A session reads borrowed arrays during a step; arrays that the adaptor allocated itself are
+ * therefore kept in a part until the mesh is set again. */
 #include "insitu/blueprint.h"
 
 #include <stdio.h>
@@ -9,10 +10,10 @@
 #include "blueprint_hash.h"
 #include "blueprint_mesh.h"
 
-/* A mesh that the session has. */
+/* A mesh that was passed to the session. */
 typedef struct door_part {
     char *name;
-    int64_t round; /* of steps in which it was last set */
+    int64_t round; /* step counter when the mesh was last set */
     uint64_t places, cells, fields;
     door_owned owned;
 } door_part;
@@ -23,11 +24,11 @@ struct insitu_blueprint {
     MPI_Comm comm;
     int part_count;
     door_part *parts;
-    int next_part;  /* where the next search begins */
-    int64_t round;  /* counts steps */
-    bool is_begun;  /* something was set for the next step */
-    node_log log;   /* of the sets since the last step */
-    bool has_cycle; /* a domain of the next step has state/cycle; likewise: */
+    int next_part;  /* index at which the next search begins */
+    int64_t round;  /* number of steps so far */
+    bool is_begun;  /* true if something has been set for the next step */
+    node_log log;   /* messages of the calls since the last step */
+    bool has_cycle; /* a domain of the next step has state/cycle; cycle is the largest */
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
@@ -39,7 +40,8 @@ static _Thread_local char create_error[256];
 
 /* ---- parts ------------------------------------------------------------------------------------------------------- */
 
-/* Begins after the part that it found last: domains come in one order, and there may be thousands. */
+/* Finds the part of a mesh. The search begins behind the part found last, because domains are set in the same order
+ * every step, and there may be thousands. */
 static door_part *find_part(insitu_blueprint *door, const char *name)
 {
     for (int i = 0; i < door->part_count; i++) {
@@ -76,7 +78,8 @@ static void remove_part(insitu_blueprint *door, int number)
 
 /* ---- one topology ------------------------------------------------------------------------------------------------ */
 
-/* What the domain says of its changes itself. False: nothing, and a hash is to tell. */
+/* Reads state/insitu_changed, in which the domain may state what has changed; returns false if it does not, so that
+ * hashes must be compared. */
 static bool read_changes(const node *domain, unsigned *changed)
 {
     const char *word;
@@ -94,7 +97,8 @@ static bool read_changes(const node *domain, unsigned *changed)
     return true;
 }
 
-/* Notes the mesh's arrays and fields, and tells what differs from the last time. */
+/* Stores the hashes of the mesh's arrays and field names in the part, and returns the INSITU_CHANGED flags of those
+ * that differ from the previous step. */
 static unsigned find_changes(const node *domain, const char *topology, const door_mesh *mesh, door_part *part)
 {
     unsigned changed = 0;
@@ -109,8 +113,8 @@ static unsigned find_changes(const node *domain, const char *topology, const doo
            (last.places == part->places ? 0 : INSITU_CHANGED_GEOMETRY);
 }
 
-/* Keeps the door's own arrays of the last time where they are the same, since arrays at other addresses are new ones to
- * the session. */
+/* Keeps the adaptor's own arrays of the previous step if the topology has not changed, because the session treats
+ * arrays at other addresses as changed. */
 static void keep_owned(door_mesh *mesh, door_part *part)
 {
     insitu_array *const arrays[] = {&mesh->mesh.offsets, &mesh->mesh.face_offsets, &mesh->mesh.ghosts};
@@ -123,7 +127,7 @@ static void keep_owned(door_mesh *mesh, door_part *part)
     part->owned = made;
 }
 
-/* Hands the mesh over. What it owns becomes the part's. */
+/* Sets the mesh and its fields on the session. The part takes over the mesh's own arrays. */
 static bool hand_over(insitu_blueprint *door, const node *domain, const node *topology, door_mesh *mesh,
                       const char *name)
 {
@@ -177,7 +181,7 @@ static bool read_state(insitu_blueprint *door, const node *domain)
     return true;
 }
 
-/* number: of the domain on this rank; -1: there is but one. */
+/* Sets all topologies of a domain. `number` is the domain's index on this rank, or -1 if there is only one domain. */
 static bool set_domain(insitu_blueprint *door, const node *domain, const char *name, int64_t number)
 {
     node topologies, topology;
@@ -244,7 +248,7 @@ static insitu_status mpi_failure(insitu_blueprint *door)
     return fail(door, INSITU_ERROR_MPI, "insitu_blueprint_step: MPI returned an error");
 }
 
-/* Finds the greatest cycle and time, and one rank at fault. */
+/* Computes the largest cycle and time over all ranks, and finds the lowest rank with an error, or -1. */
 static insitu_status reduce(insitu_blueprint *door, int *at_fault)
 {
     int rank, ranks;
@@ -261,7 +265,7 @@ static insitu_status reduce(insitu_blueprint *door, int *at_fault)
     return INSITU_OK;
 }
 
-/* Returns the error of the rank at fault on all of them. */
+/* Returns the error of the rank at_fault on all ranks. */
 static insitu_status share_error(insitu_blueprint *door, int at_fault)
 {
     int status = (int)door->log.status;

@@ -1,5 +1,6 @@
-/* Unstructured topologies. Blueprint's cells and faces are in VTK's order, and polyhedra are cells of faces of
- * vertices, as here. Its offsets have no last entry, and it may leave them out where there are sizes. */
+/* Reads unstructured topologies. Blueprint's cells and faces use VTK's vertex order, and polyhedra are lists of faces,
+ * which are lists of vertices, as in insitu_mesh. Blueprint's offsets have no final entry, and may be missing if there
+ * are sizes. */
 #include "blueprint_mesh.h"
 
 #include <stdio.h>
@@ -11,7 +12,7 @@ enum { SHAPE_POINT = 1, SHAPE_LINE = 3, MAP_SIZE = 65536 };
 typedef struct shape {
     const char *name;
     int type;
-    int vertices; /* 0: differs from cell to cell */
+    int vertices; /* 0 if it differs from cell to cell */
 } shape;
 
 static const shape shapes[] = {{"tri", INSITU_TRIANGLE, 3},      {"quad", INSITU_QUAD, 4},
@@ -34,7 +35,7 @@ static bool fail_shape(const node *of, const char *path, const char *name)
         "is \"%s\", expected tri, quad, polygonal, tet, hex, wedge, pyramid, polyhedral, mixed, point or line", name);
 }
 
-/* Reads whole numbers that may be missing; count -1 then. */
+/* Reads an optional array of integers. If it is missing, out->count is -1. */
 static bool find_integers(const node *parent, const char *path, node_array *out)
 {
     node found;
@@ -52,11 +53,11 @@ static bool need_integers(const node *parent, const char *path, node_array *out)
 
 /* ---- cells and faces of different sizes ------------------------------------------------------------------------- */
 
-/* Where lists of vertices, or of faces, begin in connectivity. */
+/* Lists of vertices or faces, one after the other in connectivity. */
 typedef struct row_list {
     node_array connectivity, sizes, offsets;
-    int64_t count; /* of the lists */
-    int vertices;  /* of each, or 0: see sizes */
+    int64_t count; /* number of lists */
+    int vertices;  /* length of every list; 0 if the lengths are in sizes */
 } row_list;
 
 static int64_t row_size(const row_list *rows, int64_t i)
@@ -64,7 +65,7 @@ static int64_t row_size(const row_list *rows, int64_t i)
     return rows->sizes.count >= 0 ? node_element(&rows->sizes.array, i) : rows->vertices;
 }
 
-/* Makes the offsets that the node lacks. */
+/* Computes the offsets if the node has none. */
 static bool make_offsets(const node *of, row_list *rows, door_owned *owned)
 {
     const int64_t bytes = rows->count * (int64_t)sizeof(int64_t);
@@ -79,7 +80,7 @@ static bool make_offsets(const node *of, row_list *rows, door_owned *owned)
     return true;
 }
 
-/* Checks that each list ends where the next begins: that is how the session reads them. */
+/* Checks that each list ends where the next one begins, because the session reads them as contiguous. */
 static bool check_offsets(const node *of, const row_list *rows)
 {
     for (int64_t i = 0; i < rows->count; i++) {
@@ -97,7 +98,7 @@ static bool check_offsets(const node *of, const row_list *rows)
     return true;
 }
 
-/* Reads lists of different sizes, `elements` or `subelements`. */
+/* Reads lists of different lengths from a node `elements` or `subelements`. */
 static bool read_rows(const node *of, row_list *rows, door_owned *owned)
 {
     if (!need_integers(of, "connectivity", &rows->connectivity)) return false;
@@ -111,7 +112,7 @@ static bool read_rows(const node *of, row_list *rows, door_owned *owned)
     return check_offsets(of, rows);
 }
 
-/* Faces of polyhedra: polygonal, of one size, or mixed. */
+/* Reads the faces of polyhedra, which may be polygonal, all of one shape, or mixed. */
 static bool read_faces(const node *topology, door_mesh *out)
 {
     node faces;
@@ -133,7 +134,7 @@ static bool read_faces(const node *topology, door_mesh *out)
 
 /* ---- cells of several types ------------------------------------------------------------------------------------- */
 
-/* Reads the types that numbers of shapes have, and tells whether they are VTK's already. */
+/* Reads the map from shape numbers to cell types. *are_vtk is set to true if all numbers are VTK's cell types. */
 static bool read_map(const node *elements, door_mesh *out, bool *are_vtk)
 {
     node map;
@@ -158,7 +159,7 @@ static bool read_map(const node *elements, door_mesh *out, bool *are_vtk)
     return true;
 }
 
-/* Checks the cells' numbers against the map, and leaves out what has points or lines. */
+/* Checks that the map contains every cell's number. A topology that contains points or lines is left out. */
 static bool check_numbers(const node *elements, const node_array *numbers, door_mesh *out, bool *has_polyhedra)
 {
     for (int64_t i = 0; i < numbers->count; i++) {
@@ -216,7 +217,7 @@ static bool read_fixed(const node *elements, const shape *of, door_mesh *out)
     if (!find_integers(elements, "offsets", &rows.offsets)) return false;
     rows.count = rows.offsets.count >= 0 ? rows.offsets.count : rows.connectivity.count / of->vertices;
     if (rows.offsets.count >= 0 && !check_offsets(elements, &rows)) return false;
-    rows.offsets = (node_array){.count = 0}; /* checked to be no others than there would be */
+    rows.offsets = (node_array){.count = 0}; /* not needed: check_offsets() found them equal to the regular offsets */
     take_rows(&rows, out);
     return true;
 }

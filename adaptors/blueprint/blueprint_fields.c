@@ -1,5 +1,5 @@
-/* Fields, and among them the flags of cells that are not drawn. Of a lattice all vertex arrays are in one order and all
- * cell arrays in another: the topology's, and that of the first element field. */
+/* Reads fields, including ghost flags. On a lattice all vertex arrays must have the same strides, and so must all cell
+ * arrays: those of the topology for vertices, and those of the first element field for cells. */
 #include "blueprint_mesh.h"
 
 #include <stdlib.h>
@@ -9,16 +9,16 @@
 typedef struct door_field {
     node at, values;
     bool is_element;
-    int64_t first;      /* the tuple of the first vertex or cell, */
-    int64_t strides[3]; /* and tuples from one to the next along each axis of a lattice */
+    int64_t first;      /* index of the first vertex's or cell's tuple in the array */
+    int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
 } door_field;
 
-/* Bits of VTK's flags that hide a cell: duplicate, refined, hidden. The others describe it. */
+/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. */
 enum { VTK_HIDING = 1 | 8 | 32 };
 
 /* ---- which fields ----------------------------------------------------------------------------------------------- */
 
-/* Tells whether VTK's attribute of the field is its flags of ghosts. */
+/* Checks whether state/metadata/vtk_fields declares the field as ghost flags. */
 static bool is_called_ghosts(const node *domain, const char *name)
 {
     node states, state;
@@ -33,7 +33,8 @@ static bool is_ghosts(const node *domain, const char *name)
     return strcmp(name, "vtkGhostType") == 0 || strcmp(name, "ascent_ghosts") == 0 || is_called_ghosts(domain, name);
 }
 
-/* Tells whether the field is on the topology; a field of another one is none of ours, whatever else is wrong. */
+/* Checks whether the field belongs to the topology. Fields of other topologies are ignored even if they contain
+ * errors. */
 static bool is_on(const node *field, const char *topology)
 {
     const char *name;
@@ -41,7 +42,8 @@ static bool is_on(const node *field, const char *topology)
     return strcmp(name, topology) == 0;
 }
 
-/* Reads where a field is and of what; false where it is wrong or left out. */
+/* Finds the values and association of a field. Returns false if the field is invalid (which sets the error) or is left
+ * out (which is reported if `tells`). */
 static bool find_field(const node *field, door_field *out, bool tells)
 {
     const char *association;
@@ -62,11 +64,12 @@ static bool find_field(const node *field, door_field *out, bool tells)
     return node_need(&out->at, "values", &out->values);
 }
 
-/* Visits the fields of a topology; false after the last one, or where one is wrong. */
+/* Iterates over the fields of a topology. next_field() returns false behind the last field, or if a field is
+ * invalid. */
 typedef struct field_walk {
     const node *domain;
     const char *topology;
-    bool tells; /* what is left out */
+    bool tells; /* reports fields that are left out */
     node fields, field;
     int64_t next;
     door_field found;
@@ -95,9 +98,9 @@ uint64_t door_field_names(const node *domain, const char *topology)
     return sum;
 }
 
-/* ---- orders of lattices ------------------------------------------------------------------------------------------ */
+/* ---- strides of lattices ----------------------------------------------------------------------------------------- */
 
-/* Cells or vertices along each axis, at least 1. */
+/* Returns the number of cells or vertices along each axis, at least 1. */
 static void counts_of(const door_mesh *mesh, bool is_element, int64_t counts[3])
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -106,7 +109,7 @@ static void counts_of(const door_mesh *mesh, bool is_element, int64_t counts[3])
     }
 }
 
-/* Reads the field's order: packed, or by its offsets and strides. */
+/* Reads the field's offsets and strides; without them the field is packed. */
 static bool read_order(const door_mesh *mesh, door_field *field)
 {
     int64_t counts[3], offsets[3] = {0, 0, 0};
@@ -128,7 +131,7 @@ static bool read_order(const door_mesh *mesh, door_field *field)
     return !field->at.log->status;
 }
 
-/* Tells whether the strides along all axes of more than one place are the same. */
+/* Checks whether the strides are equal along all axes with more than one element. */
 static bool is_same_order(const int64_t counts[3], const int64_t a[3], const int64_t b[3])
 {
     bool is_same = true;
@@ -136,7 +139,7 @@ static bool is_same_order(const int64_t counts[3], const int64_t a[3], const int
     return is_same;
 }
 
-/* Tells whether the field's order is that of the mesh's vertices or cells. */
+/* Checks whether the field's strides are those of the mesh's vertices or cells. */
 static bool has_order(const door_mesh *mesh, const door_field *field)
 {
     int64_t counts[3];
@@ -146,7 +149,7 @@ static bool has_order(const door_mesh *mesh, const door_field *field)
                          field->is_element ? mesh->lattice.cell_strides : mesh->lattice.vertex_strides);
 }
 
-/* Gives the cells of a lattice the order of its first element field. */
+/* Sets the cell strides of a lattice to those of its first element field. */
 static void take_cell_order(door_mesh *mesh, const door_field *field)
 {
     int64_t counts[3];
@@ -159,7 +162,7 @@ static void take_cell_order(door_mesh *mesh, const door_field *field)
 
 /* ---- arrays ------------------------------------------------------------------------------------------------------ */
 
-/* Reads one component, from the mesh's first vertex or cell on. */
+/* Describes the array of one component, beginning with the mesh's first vertex or cell. */
 static bool read_component(const node *values, const door_mesh *mesh, const door_field *field, insitu_array *out)
 {
     node_array array;
@@ -177,7 +180,8 @@ static bool read_component(const node *values, const door_mesh *mesh, const door
 
 /* ---- ghosts ------------------------------------------------------------------------------------------------------ */
 
-/* The flags of the mesh's cells as bytes of the door's own. */
+/* Returns new flags of the mesh's cells, owned by the adaptor: 1 where `flags` has a bit of the mask, otherwise 0. NULL
+ * if memory ran out. */
 static unsigned char *own_flags(const node *of, door_mesh *mesh, const insitu_array *flags, int64_t mask)
 {
     unsigned char *own = door_own(of, &mesh->owned, mesh->mesh.cell_count);
@@ -205,7 +209,8 @@ static bool take_flags(const door_field *field, door_mesh *mesh)
     return true;
 }
 
-/* Reads the cells of a window, in indices of the domain's own. *fits: they are among the domain's. */
+/* Reads the range of cells of a window, as indices in the domain. *fits is set to whether the range lies in the
+ * domain. */
 static bool read_window(const node *window, const door_mesh *mesh, int64_t first[3], int64_t end[3], bool *fits)
 {
     static const char *const origins[3] = {"origin/i", "origin/j", "origin/k"};
@@ -231,8 +236,8 @@ static void mark_cells(const int64_t strides[3], const int64_t first[3], const i
             for (int64_t i = first[0]; i < end[0]; i++) flags[i * strides[0] + j * strides[1] + k * strides[2]] = 1;
 }
 
-/* Flags the cells that finer domains cover, by the windows of the domain's nestsets. Some codes count a window's
- * vertices, or in indices of another level: such windows are left out. */
+/* Sets the ghost flags of the cells that finer domains cover, according to the windows of the nestset. Some codes write
+ * windows in vertices, or in indices of another level; windows that do not fit the domain are left out. */
 static bool cover_cells(const node *nestset, door_mesh *mesh)
 {
     node windows, window;
@@ -287,7 +292,7 @@ bool door_read_ghosts(const node *domain, const char *topology, door_mesh *mesh)
 
 /* ---- values ------------------------------------------------------------------------------------------------------ */
 
-/* Reads the field's components into an array that the caller frees. */
+/* Describes the field's components in an array, which the caller must free. NULL after an error. */
 static insitu_array *read_values(const door_field *field, const door_mesh *mesh, int *count)
 {
     const int64_t children = node_child_count(&field->values);

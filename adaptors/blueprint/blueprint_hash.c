@@ -13,7 +13,8 @@ static uint64_t mix(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Several independent sums, since each multiplication waits for the one before. */
+/* Hashes contiguous bytes in several independent lanes, because each multiplication depends on the previous one of its
+ * lane. */
 static uint64_t hash_bytes(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -27,7 +28,8 @@ static uint64_t hash_bytes(const char *data, int64_t bytes)
     return mix(mix(lanes[0], lanes[1]), mix(lanes[2], lanes[3]));
 }
 
-/* As above, of elements apart, all of one size, which is a constant where this is called from. */
+/* Same as hash_bytes(), for elements of a given size and stride. The function is inlined so that the size is a
+ * constant. */
 static inline uint64_t hash_elements(const char *data, int64_t count, int64_t stride, size_t size)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, bits[LANES] = {0};
@@ -58,7 +60,7 @@ static uint64_t hash_array(uint64_t sum, const insitu_array *array, int64_t coun
     }
 }
 
-/* Tells whether the coordinates are x y z x y z ..., without anything between. */
+/* Checks whether the coordinates are stored as x y z x y z ... without gaps. */
 static bool are_interleaved(const insitu_array coordinates[3])
 {
     const int64_t size = node_type_bytes(coordinates[0].type);

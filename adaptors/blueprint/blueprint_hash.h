@@ -1,13 +1,13 @@
-/* Hashes of a mesh's arrays, by which the door finds what changes from step to step. */
+/* Hashes of a mesh's arrays, by which the adaptor detects changes between steps. */
 #ifndef BLUEPRINT_HASH_H
 #define BLUEPRINT_HASH_H
 
 #include "insitu/insitu.h"
 
-/* Of the coordinates: as they are read, and their contents. */
+/* Returns a hash of the mesh's coordinates, including origin, spacing and axes of a lattice. */
 uint64_t door_hash_places(const insitu_mesh *mesh);
 
-/* Of the cells, their faces and ghosts. */
+/* Returns a hash of the mesh's cell types, connectivity, faces and ghost flags. */
 uint64_t door_hash_cells(const insitu_mesh *mesh);
 
 #endif

@@ -1,4 +1,4 @@
-/* One topology of one domain as the session takes it. */
+/* Converts a topology of a Blueprint domain to the mesh that is passed to the session. */
 #ifndef BLUEPRINT_MESH_H
 #define BLUEPRINT_MESH_H
 
@@ -6,7 +6,7 @@
 
 enum { DOOR_OWNED = 4 };
 
-/* What of a mesh the session borrows from the door: arrays that the node lacks. */
+/* Arrays that the adaptor allocates because the node does not contain them. The session borrows them with the mesh. */
 typedef struct door_owned {
     void *arrays[DOOR_OWNED];
     int count;
@@ -14,38 +14,38 @@ typedef struct door_owned {
 
 typedef struct door_mesh {
     insitu_mesh mesh;
-    insitu_lattice lattice; /* what mesh.lattice points to, of all but unstructured topologies */
-    bool is_left_out;       /* nothing of it is drawn; the log says why */
+    insitu_lattice lattice; /* mesh.lattice points to it, unless the topology is unstructured */
+    bool is_left_out;       /* the topology is not drawn; the log contains the reason */
     bool has_cell_order;    /* lattice.cell_strides are those of an element field */
-    int *type_map;          /* what mesh.cell_type_map points to */
+    int *type_map;          /* mesh.cell_type_map points to it, unless NULL */
     door_owned owned;
 } door_mesh;
 
-/* Allocates an array that lives as long as the mesh; NULL, an error, where memory runs out. */
+/* Allocates an array that lives as long as the mesh. If memory runs out, sets the error and returns NULL. */
 void *door_own(const node *of, door_owned *owned, int64_t bytes);
 void door_owned_free(door_owned *owned);
 
-/* Reads the topology with its coordset. False where the node is wrong. */
+/* Reads the topology and its coordset. Returns false if the node is invalid. */
 bool door_read_topology(const node *domain, const node *topology, door_mesh *out);
 
-/* Releases the tables, but not what is owned. */
+/* Frees the tables that are needed only until the mesh is set, but not the arrays in `owned`. */
 void door_mesh_end(door_mesh *mesh);
 
-/* Reads cells of an unstructured topology; vertices are known. */
+/* Reads the cells of an unstructured topology, after its vertices. */
 bool door_read_unstructured(const node *topology, door_mesh *out);
 
-/* Takes the order of element fields of a lattice and the flags of cells that are not drawn. */
+/* Reads the strides of a lattice's element fields, and the ghost flags of the topology. */
 bool door_read_ghosts(const node *domain, const char *topology, door_mesh *out);
 
-/* Sets all fields of the topology on the session's mesh. names: a sum over their names; count: of them. False where
- * the node is wrong or the session refuses one. */
+/* Sets all fields of the topology on the session's mesh, and increases *count by their number. Returns false if the
+ * node is invalid or the session rejects a field. */
 bool door_set_fields(const node *domain, const char *topology, const door_mesh *mesh, insitu_session *session,
                      const char *name, int *count);
 
-/* A sum over the names of the fields that the above would set. */
+/* Returns a hash of the names of the fields that door_set_fields() would set. It does not depend on their order. */
 uint64_t door_field_names(const node *domain, const char *topology);
 
-/* How many numbers so many cells or vertices span, from the first to the last. */
+/* Returns the number of array elements from the first to the last cell or vertex, including padding. */
 int64_t door_reach(const int64_t counts[3], const int64_t strides[3]);
 
 #endif

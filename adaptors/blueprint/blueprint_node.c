@@ -7,7 +7,7 @@
 
 /* ---- messages ------------------------------------------------------------------------------------------------ */
 
-/* Writes the path of a node, from the root on. */
+/* Appends the path of a node, beginning at the root. */
 static void write_path(const node *n, char *out)
 {
     if (n->parent) write_path(n->parent, out);
@@ -39,7 +39,7 @@ bool node_fail(const node *parent, const char *path, insitu_status status, const
     return false;
 }
 
-/* Adds a line; nothing where memory runs out. */
+/* Appends a line to the text. If memory runs out, the text stays as it is. */
 static void add_line(char **text, const char *where, const char *what)
 {
     const size_t length = *text ? strlen(*text) : 0, room = length + strlen(where) + strlen(what) + 4;
@@ -123,7 +123,7 @@ bool node_string(const node *parent, const char *path, const char **out)
 
 /* ---- arrays -------------------------------------------------------------------------------------------------- */
 
-/* By Conduit's numbers of types, 3 to 12. 0: no numbers. */
+/* Converts a Conduit type id (3 to 12) to an insitu_type. Returns 0 for other ids, which are not numeric. */
 static int type_of(int64_t id)
 {
     static const unsigned char types[] = {0,
@@ -213,7 +213,8 @@ bool node_is_integers(const node_array *array)
     return array->array.type != INSITU_FLOAT32 && array->array.type != INSITU_FLOAT64;
 }
 
-/* Describes the single number at a path; false where there is none. */
+/* Finds the single number at a path. Returns false if it is missing, and sets the error if it is needed or is not a
+ * single number. */
 static bool find_number(const node *parent, const char *path, bool is_needed, node *found, node_array *out)
 {
     if (!node_find(parent, path, found))

@@ -1,4 +1,5 @@
-/* Coordsets and topologies. Uniform, rectilinear and structured ones become lattices, whose cells nobody lists. */
+/* Reads coordsets and topologies. Uniform, rectilinear and structured ones become lattices, which need no list of
+ * cells. */
 #include "blueprint_mesh.h"
 
 #include <string.h>
@@ -7,7 +8,8 @@ static const char *const index_names[3] = {"i", "j", "k"};
 
 /* ---- lattices ------------------------------------------------------------------------------------------------ */
 
-/* Takes the counts of vertices, 1 or more along each axis. Leaves out what has cells of less than two dimensions. */
+/* Stores the number of vertices along each axis, which must be at least 1. A topology whose cells have fewer than two
+ * dimensions is left out. */
 static bool take_counts(const node *of, const char *path, const int64_t counts[3], door_mesh *out)
 {
     int flat = 0;
@@ -26,7 +28,7 @@ static bool take_counts(const node *of, const char *path, const int64_t counts[3
     return true;
 }
 
-/* Without padding, i fastest. */
+/* Sets the strides of an array without padding, in which i varies fastest. */
 static void set_packed(const int64_t counts[3], int64_t strides[3])
 {
     strides[0] = 1;
@@ -34,7 +36,7 @@ static void set_packed(const int64_t counts[3], int64_t strides[3])
     strides[2] = strides[1] * (counts[1] > 0 ? counts[1] : 1);
 }
 
-/* Takes packed orders of vertices and cells. */
+/* Sets packed strides for vertices and cells. */
 static void pack_lattice(door_mesh *out)
 {
     int64_t counts[3];
@@ -45,7 +47,8 @@ static void pack_lattice(door_mesh *out)
     out->mesh.cell_count = door_reach(out->lattice.cells, out->lattice.cell_strides);
 }
 
-/* The lattice of the whole has its first vertex where the block says that its own would be the given number. */
+/* Reads a uniform coordset. elements/origin is the index of the block's first vertex in the whole lattice; the origin
+ * of the whole lattice is computed from it, so that all blocks compute the same coordinates. */
 static bool read_uniform(const node *coordset, const node *topology, door_mesh *out)
 {
     static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
@@ -71,7 +74,8 @@ static bool read_uniform(const node *coordset, const node *topology, door_mesh *
     return true;
 }
 
-/* Coordinates along x, y and z; false where some are missing. Other systems are left out. */
+/* Finds the coordinates along x, y and z. Returns false if one is missing. A coordset in another system (r, theta, phi)
+ * is left out. */
 static bool find_axes(const node *coordset, node_array axes[3], int *count, door_mesh *out)
 {
     static const char *const paths[3] = {"values/x", "values/y", "values/z"};
@@ -104,7 +108,7 @@ static bool read_rectilinear(const node *coordset, door_mesh *out)
     return true;
 }
 
-/* Takes vertices by their coordinates; without z in two dimensions. */
+/* Reads the coordinates of each vertex. In two dimensions there is no z. */
 static bool read_explicit(const node *coordset, door_mesh *out)
 {
     static const char *const paths[3] = {"values/x", "values/y", "values/z"};
@@ -128,7 +132,7 @@ static bool read_explicit(const node *coordset, door_mesh *out)
 
 /* ---- structured ---------------------------------------------------------------------------------------------- */
 
-/* Reads the counts of cells, and the order of vertices where it is not packed. */
+/* Reads the number of vertices along each axis, and the offsets and strides of the vertices if they are not packed. */
 static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3], int64_t strides[3])
 {
     static const char *const dims[3] = {"elements/dims/i", "elements/dims/j", "elements/dims/k"};
@@ -193,7 +197,7 @@ static bool find_coordset(const node *domain, const node *topology, node *sets, 
     return node_string(out, "type", type);
 }
 
-/* Tells whether the coordset is of the kind that topologies of the type have. */
+/* Checks that the coordset's type is the one that this type of topology requires. */
 static bool check_kind(const node *topology, const char *type, const char *of_coordset)
 {
     const bool is_explicit = strcmp(type, "structured") == 0 || strcmp(type, "unstructured") == 0;

@@ -8,7 +8,7 @@
 
 enum { PARAMETERS = 64 };
 
-/* A parameter of the scene that the simulation wants to read. */
+/* A parameter of the scene whose value the simulation requested for its results. */
 typedef struct wanted {
     char name[NODE_NAME];
     double value;
@@ -20,15 +20,15 @@ static struct catalyst_state {
     insitu_blueprint *door;
     int rank;
     bool has_begun_mpi;
-    insitu_status status; /* of the last call */
+    insitu_status status; /* status of the last call */
     char message[NODE_MESSAGE + 64];
-    char told[2048]; /* the last text to stderr about what is left out */
+    char told[2048]; /* last text about left out items that was printed to stderr */
     int wanted_count;
     wanted parameters[PARAMETERS];
 } state;
 
-/* Catalyst's functions return a status alone; the words go to stderr, on rank 0, as the simulation may not ask for the
- * results. */
+/* Stores the error, and prints the message to stderr on rank 0, because Catalyst's functions return only a status and
+ * the simulation may never read the results. */
 static insitu_status fail(insitu_status status, const char *message)
 {
     state.status = status;
@@ -39,7 +39,7 @@ static insitu_status fail(insitu_status status, const char *message)
 
 /* ---- initialize -------------------------------------------------------------------------------------------------- */
 
-/* Starts MPI where the simulation has none, and finds the communicator. */
+/* Initializes MPI if the simulation has not, and determines the communicator. */
 static bool find_communicator(const node *root, MPI_Comm *comm)
 {
     int is_begun;
@@ -61,7 +61,7 @@ static bool is_yaml(const char *path)
     return dot && (strcmp(dot, ".yaml") == 0 || strcmp(dot, ".yml") == 0);
 }
 
-/* The first scene among catalyst/scripts: a path, or a node with a filename. NULL: there is none. */
+/* Returns the first scene in catalyst/scripts, which is a path or a node with a filename. NULL if there is none. */
 static const char *find_script(const node *root)
 {
     node scripts, script, file;
@@ -76,7 +76,7 @@ static const char *find_script(const node *root)
     return NULL;
 }
 
-/* Finds the scene; is_text: it is the scene itself. */
+/* Finds the scene. *is_text is set to true if *scene is the text of a scene instead of a path. */
 static bool find_scene(const node *root, const char **scene, bool *is_text)
 {
     *is_text = false;
@@ -89,7 +89,7 @@ static bool find_scene(const node *root, const char **scene, bool *is_text)
                                "there is no scene: give insitu/scene, a *.yaml among scripts, or INSITU_SCENE");
 }
 
-/* Notes the names below catalyst/insitu/parameters, with what they are if the scene does not have them. */
+/* Stores the names in catalyst/insitu/parameters, with the values to return if the scene lacks these parameters. */
 static bool find_parameters(const node *root)
 {
     node all, one;
@@ -105,7 +105,7 @@ static bool find_parameters(const node *root)
     return true;
 }
 
-/* Agrees on an error of the node, which may be of one rank. */
+/* Makes an error in the node of any rank an error on all ranks. */
 static insitu_status agree(MPI_Comm comm, const node_log *log)
 {
     int worst = (int)log->status;
@@ -142,14 +142,14 @@ insitu_status catalyst_door_initialize(const insitu_conduit *conduit, const void
 
 /* ---- execute ----------------------------------------------------------------------------------------------------- */
 
-/* A channel's data: a mesh of one or many domains, or several meshes by name. */
+/* Sets the data of a channel: a mesh of one or several domains, or several named meshes. */
 static bool set_channel(const node *channel)
 {
     const char *type;
     node data, mesh;
     char name[2 * NODE_NAME];
     if (!node_string(channel, "type", &type)) return false;
-    if (!node_find(channel, "data", &data)) return true; /* a rank without */
+    if (!node_find(channel, "data", &data)) return true; /* this rank has no data */
     const bool is_multimesh = strcmp(type, "multimesh") == 0;
     if (!is_multimesh && strcmp(type, "mesh") != 0 && strcmp(type, "amrmesh") != 0)
         return node_fail(channel, "type", INSITU_ERROR_MESH, "is \"%s\", expected mesh, multimesh or amrmesh", type);
@@ -180,7 +180,7 @@ static void tell_left_out(const insitu_blueprint_report *report)
     if (*state.told) fprintf(stderr, "catalyst-insitu: left out:\n%s\n", state.told);
 }
 
-/* Reads the step's number and time; NULL where the node has none. */
+/* Reads the cycle and time, and whether the node has them. */
 static bool read_state(const node *root, int64_t *cycle, double *time, bool *has_cycle, bool *has_time)
 {
     const char *path = node_has(root, "catalyst/state/timestep") ? "catalyst/state/timestep" : "catalyst/state/cycle";

@@ -1,10 +1,10 @@
-/* The functions of Catalyst's table; catalyst_implementation() makes the table itself. */
+/* The functions that Catalyst calls. catalyst_implementation() (catalyst_impl_insitu.h) defines the table of them. */
 #include <catalyst_impl_insitu.h>
 
 #include "catalyst_door.h"
 #include "insitu/conduit.h"
 
-/* Beyond Catalyst's own numbers, for errors of libinsitu. */
+/* Converts errors of libinsitu to numbers above those that Catalyst uses itself. */
 static enum catalyst_status status_of(insitu_status status)
 {
     return status ? (enum catalyst_status)(100 + (int)status) : catalyst_status_ok;

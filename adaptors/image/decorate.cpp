@@ -1,8 +1,8 @@
-/* Everything is drawn in linear light on premultiplied colours, so that edges of lines and letters are smooth on any
- * background. Strokes that the picture hides are drawn under it, the background under these, and all else over it.
- * Sizes are shares of the picture's height: a picture of twice the size looks the same, only finer. Words have a rim in
- * the background's colour, so that they can be read over any picture and hide little of it. Where everything stands
- * says layout.cpp. */
+/* Everything is drawn in linear light on premultiplied colours, so that the edges of lines and letters are smooth on
+ * any background. Strokes that the picture hides are drawn behind it, the background behind these, and everything else
+ * in front. Sizes are proportional to the picture's height: a picture of twice the size looks the same at a higher
+ * resolution. Text has a halo in the background's colour, so that it is legible on any picture and hides little of it.
+ * layout.cpp computes the positions. */
 #include "decorate.h"
 #include "layout.h"
 #include "typeface.h"
@@ -19,7 +19,7 @@ struct sheet {
     const insitu_image &image;
     const insitu_decorations &what;
     std::vector<float> &rgba;
-    typeface *font; /* NULL where there are no words */
+    typeface *font; /* NULL if there is no text */
 };
 
 /* ---- pixels -------------------------------------------------------------------------------------------------- */
@@ -30,7 +30,7 @@ float *pixel_at(sheet &s, int x, int y)
                         static_cast<std::size_t>(x))];
 }
 
-/* Blends a colour of this opacity over the pixel, or under it. */
+/* Blends a colour with this opacity over the pixel, or behind it. */
 void blend(float *pixel, const float colour[3], double opacity, bool is_behind)
 {
     const double seen = is_behind ? opacity * (1 - std::min(1.0, static_cast<double>(pixel[3]))) : opacity;
@@ -47,7 +47,7 @@ void put_background(sheet &s)
     }
 }
 
-/* Returns how much of the pixel [x, x + 1) the interval covers. */
+/* Returns the fraction of the pixel [x, x + 1) that the interval covers. */
 double covered(double low, double high, int x)
 {
     return std::clamp(std::min(high, x + 1.0) - std::max(low, static_cast<double>(x)), 0.0, 1.0);
@@ -71,7 +71,8 @@ double distance_to(const insitu_stroke &line, double x, double y)
     return std::hypot(x - (line.from[0] + at * dx), y - (line.from[1] + at * dy));
 }
 
-/* Goes row by row over the columns that the line may meet, so that lines cost their length, not their box. */
+/* Visits row by row the columns that the line may cross, so that the cost of a line is proportional to its length and
+ * not to its bounding box. */
 void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float colour[3], double opacity = 1)
 {
     const double reach = 0.5 * width + 1, dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
@@ -104,9 +105,10 @@ void draw_strokes(sheet &s, bool behind)
         if (s.what.strokes[i].is_behind == behind) draw_stroke(s, s.what.strokes[i], line_width(s), s.what.colour);
 }
 
-/* ---- words --------------------------------------------------------------------------------------------------- */
+/* ---- text ---------------------------------------------------------------------------------------------------- */
 
-/* The rim around words and their lines: in the background's colour, unless that is transparent. */
+/* The opacity of the halo around text and its lines. The halo has the background's colour; there is none if the
+ * background is transparent. */
 const double rim_opacity = 0.75;
 
 double rim_of(int size)
@@ -150,7 +152,7 @@ void draw_rimmed_stroke(sheet &s, const insitu_stroke &line, double width, int s
 
 /* ---- colour bars --------------------------------------------------------------------------------------------- */
 
-/* Looks a colour up, linear between the table's entries, as the renderer does. */
+/* Interpolates linearly between the table's entries, as the renderer does. */
 void colour_at(const insitu_colour_bar &bar, double place, float out[3])
 {
     const int last = bar.colour_count - 1;
@@ -182,7 +184,7 @@ void draw_frame(sheet &s, const area &a)
     }
 }
 
-/* Draws small boxes beyond the ends, where values outside the range have colours of their own. */
+/* Draws small boxes beyond the ends of the bar, if values outside the range have colours of their own. */
 void draw_outside(sheet &s, const insitu_colour_bar &bar, const block &b)
 {
     const double height = 0.45 * b.size;
@@ -191,7 +193,7 @@ void draw_outside(sheet &s, const insitu_colour_bar &bar, const block &b)
     if (bar.above) fill(s, above, bar.above, 1), draw_frame(s, above);
 }
 
-/* Draws the bar and its ticks on the right; their numbers and the label are lines of the block. */
+/* Draws a colour bar with its ticks on the right. The numbers and the label are lines of the block. */
 void draw_bar(sheet &s, const block &b)
 {
     const insitu_colour_bar &bar = s.what.bars[b.index];
@@ -205,9 +207,9 @@ void draw_bar(sheet &s, const block &b)
     }
 }
 
-/* ---- lengths and axes ------------------------------------------------------------------------------------------ */
+/* ---- scale bar and axes ---------------------------------------------------------------------------------------- */
 
-/* Draws the bar below its words. */
+/* Draws the scale bar below its text. */
 void draw_scale_bar(sheet &s, const block &b)
 {
     const double middle = 0.5 * (b.room.x0 + b.room.x1), half = 0.5 * s.what.scale_bar.length;
@@ -219,7 +221,7 @@ void draw_scale_bar(sheet &s, const block &b)
     for (const insitu_stroke &stroke : strokes) draw_stroke(s, stroke, width, s.what.colour);
 }
 
-/* Draws x, y and z in red, green and blue, beginning with the one that points away from the eye most. */
+/* Draws the axes x, y and z in red, green and blue, beginning with the one farthest from the viewer. */
 void draw_axes(sheet &s, const block &b)
 {
     static const float colours[3][3] = {{0.8F, 0.05F, 0.05F}, {0.05F, 0.5F, 0.05F}, {0.08F, 0.2F, 0.9F}};
@@ -238,7 +240,7 @@ void draw_axes(sheet &s, const block &b)
     }
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------- */
+/* ---- all decorations ----------------------------------------------------------------------------------------- */
 
 void draw_block(sheet &s, const block &b)
 {

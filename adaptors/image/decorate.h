@@ -1,4 +1,4 @@
-/* A picture's background, lines, colour bars, axes and words. */
+/* Draws a picture's background, lines, colour bars, axes and text. */
 #ifndef ADAPTORS_DECORATE_H
 #define ADAPTORS_DECORATE_H
 
@@ -6,10 +6,10 @@
 
 #include "insitu/image_output.h"
 
-/* Puts the image's background under rgba, a copy of its pixels, and its decorations over it. */
+/* Blends the image's background behind rgba, which is a copy of its pixels, and draws its decorations over them. */
 void decorate(const insitu_image &image, std::vector<float> &rgba);
 
-/* Finds what decorate() leaves out or draws otherwise than it is given. */
+/* Reports text that decorate() leaves out or draws differently: missing fonts, missing glyphs, or lack of space. */
 void check_words(const insitu_image &image, insitu_word_faults &out);
 
 #endif

@@ -1,4 +1,4 @@
-/* Samples are handed to OpenImageIO in bands of rows, to avoid a second copy of the picture. */
+/* Samples are passed to OpenImageIO in bands of rows, to avoid a second copy of the whole picture. */
 #include "deep_exr.h"
 
 #include <OpenImageIO/deepdata.h>
@@ -20,7 +20,7 @@ namespace
 
 enum { CHANNELS = 6, BAND_ROWS = 16 };
 
-/* Some rows of an image, from y on. */
+/* A band of consecutive rows of an image, beginning at row y. */
 struct band {
     int y, rows;
     std::size_t first, pixels;
@@ -40,7 +40,7 @@ std::size_t sample_count(const insitu_deep &deep, std::size_t first, std::size_t
     return count;
 }
 
-/* Deep EXR files allow only compressions of single rows. The level is that of flat files. */
+/* Deep EXR files allow only compression methods of single rows. The compression level is the same as for flat files. */
 OIIO::ImageSpec describe(int width, int height)
 {
     OIIO::ImageSpec spec(width, height, CHANNELS, OIIO::TypeDesc::FLOAT);
@@ -53,7 +53,7 @@ OIIO::ImageSpec describe(int width, int height)
     return spec;
 }
 
-/* A sample's channels have the order of the file's description. */
+/* Copies the samples of the band. Their channels are in the order of describe(). */
 void fill(const insitu_deep &deep, const band &b, OIIO::DeepData &data)
 {
     static_assert(sizeof(insitu_deep_sample) == CHANNELS * sizeof(float), "samples have no gaps");
@@ -68,7 +68,7 @@ void fill(const insitu_deep &deep, const band &b, OIIO::DeepData &data)
     }
 }
 
-/* A file without a name, in memory. */
+/* An unnamed file in memory, for libraries that require a path. */
 class memory_file
 {
   public:
@@ -83,11 +83,8 @@ class memory_file
         if (bytes_ != MAP_FAILED) munmap(bytes_, size_);
         close(descriptor_);
     }
-    std::string path() const
-    {
-        return "/proc/self/fd/" + std::to_string(descriptor_);
-    }
-    /* The bytes written so far; valid until the file is destroyed. */
+    std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+    /* Returns the bytes written so far; the pointer is valid until the file is destroyed. */
     const unsigned char *bytes()
     {
         const off_t end = lseek(descriptor_, 0, SEEK_END);
@@ -97,10 +94,7 @@ class memory_file
         if (bytes_ == MAP_FAILED) fail();
         return static_cast<const unsigned char *>(bytes_);
     }
-    std::size_t size() const
-    {
-        return size_;
-    }
+    std::size_t size() const { return size_; }
 
   private:
     [[noreturn]] static void fail()
@@ -128,7 +122,7 @@ void encode(int width, int height, const insitu_deep &deep, const std::string &p
     file.finish();
 }
 
-/* Bytes that a band takes when it is handed over and compressed. */
+/* Returns the largest number of bytes that OpenImageIO needs to store and compress a band. */
 std::size_t largest_band_bytes(int width, int height, const insitu_deep &deep)
 {
     std::size_t most = 0;

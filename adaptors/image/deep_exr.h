@@ -1,4 +1,4 @@
-/* Deep EXR files. */
+/* Writes deep EXR files. */
 #ifndef ADAPTORS_DEEP_EXR_H
 #define ADAPTORS_DEEP_EXR_H
 
@@ -6,7 +6,7 @@
 
 #include "insitu/image_output.h"
 
-/* Write a file of the image's samples to path, as write_picture_file() does. Throws. */
+/* Writes the image's samples to path in the way of write_picture_file(). Throws std::bad_alloc or io_error. */
 void write_deep_exr(int width, int height, const insitu_deep &deep, const std::string &path);
 
 #endif

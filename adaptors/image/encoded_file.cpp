@@ -11,7 +11,7 @@
 namespace
 {
 
-/* Only the words of a C library's message tell that it lacked memory. */
+/* Throws an exception for a message of a C library. The text is the only way to recognize a lack of memory. */
 [[noreturn]] void fail_with(std::string what)
 {
     for (const char *words : {"memory", "bad_alloc"})
@@ -20,13 +20,13 @@ namespace
     throw io_error(what);
 }
 
-/* A file's bytes. */
+/* The contents of a file. */
 struct file_bytes {
     const unsigned char *at;
     std::size_t size;
 };
 
-/* Reads a number of so many bytes, the least significant first. */
+/* Reads a little-endian number of this many bytes. */
 std::uint64_t number_at(const file_bytes &file, std::size_t at, int bytes)
 {
     std::uint64_t number = 0;
@@ -34,8 +34,9 @@ std::uint64_t number_at(const file_bytes &file, std::size_t at, int bytes)
     return number;
 }
 
-/* The attributes (name, type, size and value each) are followed by a table of blocks of rows, in which the place of a
- * lost block is 0. The files made here have one part, and so one list of attributes. */
+/* Checks an EXR file. Its attributes (name, type, size and value each) are followed by a table with the file position
+ * of each block of rows; the position of a missing block is 0. The files written here have one part, and therefore one
+ * list of attributes. */
 bool has_all_rows(const file_bytes &file, int height, int block_rows)
 {
     enum { VERSION = 4, VERSION_END = 8, SIZE_BYTES = 4, PLACE_BYTES = 8, HAS_PARTS = 0x1000 };
@@ -71,7 +72,7 @@ encoded_file::encoded_file(const char *name, const OIIO::ImageSpec &spec, const 
 void encoded_file::open(const char *name, const OIIO::ImageSpec &spec, const std::string &path)
 {
     OIIO::attribute("threads", 1);
-    OIIO::attribute("exr_threads", -1); /* the caller's thread only */
+    OIIO::attribute("exr_threads", -1); /* uses only the caller's thread */
     output_ = OIIO::ImageOutput::create(name, memory_.get());
     if (!output_) fail_with(OIIO::geterror());
     output_->threads(1);

@@ -1,5 +1,5 @@
-/* Makes a picture's file by OpenImageIO, in memory because its PNG writer does not notice a full disk. OpenEXR's writer
- * of deep files does not report what it cannot write when it closes one. */
+/* Encodes a picture with OpenImageIO, in memory, because its PNG writer does not report a full disk. OpenEXR's writer
+ * of deep files does not report write errors when the file is closed. */
 #ifndef ADAPTORS_ENCODED_FILE_H
 #define ADAPTORS_ENCODED_FILE_H
 
@@ -11,19 +11,16 @@
 #include <string>
 #include <vector>
 
-/* Uses the caller's thread only. Every call may throw std::bad_alloc, or io_error (picture_file.h). */
+/* An encoder that uses only the caller's thread. Every member may throw std::bad_alloc or io_error (picture_file.h). */
 class encoded_file
 {
   public:
-    /* The ending of name selects the format. */
+    /* Encodes into bytes; the extension of name selects the format. */
     encoded_file(const char *name, const OIIO::ImageSpec &spec, std::vector<unsigned char> &bytes);
-    /* Writes to a file of that path: OpenImageIO 2.4 knows no other place for deep images. */
+    /* Encodes into a file at the path. OpenImageIO 2.4 cannot write deep images to memory. */
     encoded_file(const char *name, const OIIO::ImageSpec &spec, const std::string &path);
-    OIIO::ImageOutput &output()
-    {
-        return *output_;
-    }
-    [[noreturn]] void fail(); /* throws the output's message */
+    OIIO::ImageOutput &output() { return *output_; }
+    [[noreturn]] void fail(); /* throws an exception with the output's error message */
     void finish();
 
   private:
@@ -35,8 +32,8 @@ class encoded_file
 
 enum { EXR_ZIP_ROWS = 16, EXR_ZIPS_ROWS = 1 };
 
-/* OpenEXR may silently lose rows that its compressor has no memory for. Throws std::bad_alloc where a block of
- * block_rows rows, flat or deep, is missing in the file. */
+/* Checks an EXR file, flat or deep, from which OpenEXR may silently drop rows if its compressor runs out of memory.
+ * Throws std::bad_alloc if a block of block_rows rows is missing. */
 void check_exr_rows(const unsigned char *file, std::size_t size, int height, int block_rows);
 
 #endif

@@ -1,7 +1,7 @@
-/* insitu_image_write() by OpenImageIO: the one place that knows image formats.
+/* Implements insitu_image_write() with OpenImageIO. Only this adaptor depends on image formats.
  *
- * libinsitu loads this file by dlopen() inside someone's run, so it throws nothing out, starts no threads, and returns
- * errors as messages. */
+ * libinsitu loads this library by dlopen() in the simulation's process. No exception leaves it, no threads are started,
+ * and errors are returned as messages. */
 #include "insitu/image_output.h"
 
 #include <OpenImageIO/imageio.h>
@@ -37,7 +37,7 @@ double srgb_from_linear(double linear)
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-/* The nearest code of [0, 1]; NaN is 0. */
+/* Returns the nearest code of a value in [0, 1]; NaN becomes 0. */
 template <typename code> code code_of(double value)
 {
     const double largest = static_cast<double>(static_cast<code>(~code{0}));
@@ -53,8 +53,9 @@ bool is_opaque(const insitu_image &image)
     return true;
 }
 
-/* Looks up the codes of linear values from 0 to 1 without computing a power for each. From bin to bin the code rises by
- * at most one: a bin is 1/4096 wide, a code at least 1 / (255 * 12.92) = 1/3295. */
+/* Converts linear values from 0 to 1 to sRGB codes by table lookup instead of computing a power each time. A bin of the
+ * table is narrower than any code (1/4096 compared with 1 / (255 * 12.92) = 1/3295), so that a bin contains at most two
+ * codes. */
 class srgb_codes
 {
   public:
@@ -78,7 +79,7 @@ class srgb_codes
   private:
     static constexpr int CODES = 256, BINS = 4096;
 
-    /* The least number that has the code, by bisection until no number lies between. */
+    /* Returns the smallest number with the code, found by bisection down to adjacent doubles. */
     static double least_of(int code)
     {
         double below = 0, least = 1;
@@ -87,7 +88,7 @@ class srgb_codes
         return least;
     }
 
-    std::array<double, CODES + 1> begin_{}; /* the least value of each code */
+    std::array<double, CODES + 1> begin_{}; /* smallest value of each code */
     std::array<std::uint8_t, BINS + 1> first_{};
 };
 
@@ -112,15 +113,15 @@ template <typename code> void encode_pixel(const float *pixel, std::size_t chann
     if (channels == 4) out[3] = code_of<code>(alpha);
 }
 
-/* Encodes to straight sRGB codes, with alpha where channels is 4. Neighbouring pixels are often equal, above all in the
- * background. */
+/* Encodes to sRGB codes that are not premultiplied, with alpha if channels is 4. Equal neighbouring pixels, which are
+ * frequent in the background, are encoded once. */
 template <typename code> std::vector<code> encode(const insitu_image &image, std::size_t channels)
 {
     std::vector<code> codes(pixel_count(image) * channels);
     for (std::size_t i = 0; i < pixel_count(image); i++) {
         const float *pixel = image.rgba + 4 * i;
         code *out = &codes[channels * i];
-        // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): equal bits are what is asked for
+        //  NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bitwise equality is intended
         if (i > 0 && std::memcmp(pixel, pixel - 4, 4 * sizeof *pixel) == 0)
             std::copy_n(out - channels, channels, out);
         else
@@ -150,20 +151,20 @@ std::vector<float> with_channels(const insitu_image &image)
 struct layout {
     int channels;
     OIIO::TypeDesc type;
-    const char *file_name; /* its ending tells OpenImageIO the format */
+    const char *file_name; /* the extension selects OpenImageIO's format */
     OIIO::ImageSpec (*describe)(const insitu_image &, const layout &);
 };
 
-/* The simulation waits while a picture is compressed. So PNG uses differences to the pixel on the left (libpng's
- * PNG_FILTER_SUB) and the lowest level: a quarter to a tenth of the time of libpng's defaults, for files larger by 28
- * to 48 %. */
+/* Optimizes PNG for speed, because the simulation may have to wait for the compression: the filter is the difference to
+ * the pixel on the left (PNG_FILTER_SUB) and the compression level is the lowest. Compared with libpng's defaults this
+ * takes a tenth to a quarter of the time, for files that are 28 to 48 % larger. */
 OIIO::ImageSpec describe_png(const insitu_image &image, const layout &l)
 {
     OIIO::ImageSpec spec(image.width, image.height, l.channels, l.type);
     spec.attribute("png:compressionLevel", 1);
     spec.attribute("png:filter", 0x10);
     spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("oiio:UnassociatedAlpha", 1); /* the codes are straight already */
+    spec.attribute("oiio:UnassociatedAlpha", 1); /* the codes are not premultiplied */
     return spec;
 }
 
@@ -176,11 +177,11 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
     spec.alpha_channel = 3;
     spec.z_channel = image.depth ? 4 : -1;
     spec.attribute("oiio:ColorSpace", "Linear");
-    spec.attribute("compression", "zip:1"); /* takes 0.64 of the time of zlib's usual level, and 1.08 of the bytes */
+    spec.attribute("compression", "zip:1"); /* takes 0.64 of the time of zlib's default level, and 1.08 of the bytes */
     return spec;
 }
 
-/* Makes the file by OpenImageIO, in memory because its PNG writer does not notice a full disk. */
+/* Encodes the file in memory, because OpenImageIO's PNG writer does not report a full disk. */
 void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixels, std::vector<unsigned char> &bytes)
 {
     encoded_file file(name, spec, bytes);
@@ -188,8 +189,8 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
     file.finish();
 }
 
-/* Large blocks are allocated first, so that the reserve is left to OpenImageIO and the libraries below it, for tables
- * that they fill at the first picture, a few rows, and the compressors' room. */
+/* Large blocks are allocated before the reserve, so that the reserve is available to OpenImageIO and the libraries that
+ * it uses: for tables that they create with the first picture, for a few rows, and for compressors. */
 void write_pixels(const insitu_image &image, const layout &l, const void *pixels, const std::string &path)
 {
     enum { ROWS = 128, TABLES = 16 << 20, ADDED = 1 << 20 };
@@ -197,7 +198,7 @@ void write_pixels(const insitu_image &image, const layout &l, const void *pixels
         static_cast<std::size_t>(image.width) * static_cast<std::size_t>(l.channels) * l.type.size();
     const std::size_t raw = row * static_cast<std::size_t>(image.height);
     std::vector<unsigned char> bytes;
-    bytes.reserve(raw + raw / 8 + ADDED); /* noise does not compress, and formats add to it */
+    bytes.reserve(raw + raw / 8 + ADDED); /* random data does not compress, and formats add headers */
     const memory_reserve reserve(TABLES + ROWS * row);
     encode_file(l.file_name, l.describe(image, l), pixels, bytes);
     if (l.describe == describe_exr) check_exr_rows(bytes.data(), bytes.size(), image.height, EXR_ZIP_ROWS);

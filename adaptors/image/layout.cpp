@@ -1,6 +1,6 @@
-/* Words at the top and the bottom come first, since they need their borders most. Bars share what these leave of their
- * side. All else takes the free place that is nearest to its own: its corners are at edges of other blocks, so that few
- * places have to be tried, and their number has a bound. */
+/* Text at the top and the bottom is placed first, because it depends most on the borders. Colour bars share the
+ * remaining height of their side. Every other block takes the free position nearest to its own. Candidate positions
+ * align with edges of the blocks already placed, so that their number is small and bounded. */
 #include "layout.h"
 
 #include <algorithm>
@@ -9,18 +9,18 @@
 namespace
 {
 
-/* Shares of the size of words. */
+/* Lengths relative to the size of the text. */
 const double border = 0.55, pad = 0.15, line_height = 1.2, baseline = 0.95, thickness = 0.9;
 const double label_width = 7, foot = 0.5, shortest_bar = 4, tick_distance = 1.2, column_gap = 0.5;
 const double shrinking[] = {1, 0.85, 0.7, 0.55, 0.45};
-enum { SMALLEST = 6, MOST_LINES = 3, MOST_LABEL_LINES = 4 }; /* letters of 6 pixels can just be read */
+enum { SMALLEST = 6, MOST_LINES = 3, MOST_LABEL_LINES = 4 }; /* text of 6 pixels is the smallest that is legible */
 
 struct sheet {
     const insitu_image &image;
     const insitu_decorations &what;
     const word_measure &measure;
     int size;
-    double x0, y0, x1, y1; /* the picture within its border */
+    double x0, y0, x1, y1; /* the picture without its border, in pixels */
     layout out;
 };
 
@@ -29,7 +29,8 @@ double pixels(double share, int size)
     return std::ceil(share * size);
 }
 
-/* The sizes that are tried, from the given one on; none is too small to be read unless that one is. */
+/* Returns the text sizes to try, from the given one down. None is below the legible minimum, unless the given one
+ * is. */
 std::vector<int> sizes_from(double size)
 {
     std::vector<int> out;
@@ -41,7 +42,7 @@ std::vector<int> sizes_from(double size)
     return out;
 }
 
-/* ---- free places ----------------------------------------------------------------------------------------------- */
+/* ---- free positions -------------------------------------------------------------------------------------------- */
 
 bool are_apart(const area &a, const area &b)
 {
@@ -79,8 +80,8 @@ area room_at(const sheet &s, insitu_anchor at, double width, double height)
     return {x, y, x + width, y + height};
 }
 
-/* Finds the free place for a room of this size that is nearest to its anchor; a step aside counts thrice, so that
- * blocks of one anchor stack. */
+/* Finds the free position of a rectangle of this size that is nearest to its anchor. Horizontal distances count three
+ * times, so that blocks with the same anchor are stacked. */
 bool find_room(const sheet &s, insitu_anchor at, double width, double height, area &room)
 {
     const area wanted = room_at(s, at, width, height);
@@ -100,9 +101,10 @@ bool find_room(const sheet &s, insitu_anchor at, double width, double height, ar
     return least < HUGE_VAL;
 }
 
-/* ---- lines of words -------------------------------------------------------------------------------------------- */
+/* ---- lines of text --------------------------------------------------------------------------------------------- */
 
-/* Returns how many bytes of a word's begin fit, at whole characters, at least one. */
+/* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters count, and
+ * at least one is returned. */
 std::size_t bytes_that_fit(const sheet &s, const std::string &word, int size, double room)
 {
     const double width = s.measure(word, size);
@@ -114,7 +116,7 @@ std::size_t bytes_that_fit(const sheet &s, const std::string &word, int size, do
     return bytes;
 }
 
-/* Breaks text at blanks, and words that are wider than the room within, where no blank helps. */
+/* Wraps text at blanks. A word that is wider than the available width is split. */
 std::vector<std::string> wrap(const sheet &s, const std::string &text, int size, double room)
 {
     std::vector<std::string> lines;
@@ -132,7 +134,7 @@ std::vector<std::string> wrap(const sheet &s, const std::string &text, int size,
             continue;
         }
         if (!line.empty()) lines.push_back(line);
-        while (s.measure(word, size) > room && !word.empty()) { /* each turn takes a character at least */
+        while (s.measure(word, size) > room && !word.empty()) { /* each iteration removes at least one character */
             const std::size_t bytes = bytes_that_fit(s, word, size, room);
             lines.push_back(word.substr(0, bytes));
             word.erase(0, bytes);
@@ -150,7 +152,7 @@ double width_of(const sheet &s, const std::vector<std::string> &lines, int size)
     return width;
 }
 
-/* Tells whether blanks alone broke the text. */
+/* Checks whether the text was wrapped only at blanks. */
 bool is_whole(const std::string &text, const std::vector<std::string> &lines)
 {
     std::string joined;
@@ -158,7 +160,7 @@ bool is_whole(const std::string &text, const std::vector<std::string> &lines)
     return joined == text || lines.size() == 1;
 }
 
-/* Puts lines into the block's room, at the side of the anchor. */
+/* Adds lines to the block, aligned to the side of the anchor. */
 void put_lines(const sheet &s, const std::vector<std::string> &lines, insitu_anchor at, block &b)
 {
     double y = b.room.y0 + pixels(pad, b.size) + baseline * b.size;
@@ -194,14 +196,15 @@ bool place_words(sheet &s, int index)
 
 /* ---- colour bars ----------------------------------------------------------------------------------------------- */
 
-/* The bars of a side, in letters of one size. All are as wide as the widest, and have labels as high as the highest. */
+/* The colour bars of a side with text of one size. All have the width of the widest bar, and leave space for the
+ * highest label. */
 struct bar_group {
     std::vector<int> bars;
     insitu_anchor at;
     int size;
     double width, head;
     std::vector<std::vector<std::string>> labels;
-    bool is_readable; /* labels have few lines and whole words */
+    bool is_readable; /* labels have few lines and no split words */
 };
 
 bar_group make_group(const sheet &s, const std::vector<int> &bars, insitu_anchor at, int size)
@@ -225,8 +228,8 @@ bar_group make_group(const sheet &s, const std::vector<int> &bars, insitu_anchor
     return g;
 }
 
-/* Chooses every so many ticks that their numbers do not touch; of such choices the one with the shortest numbers, which
- * are the roundest. */
+/* Chooses every n-th tick, with the smallest n for which the numbers do not overlap. Among the possible first ticks,
+ * the one with the shortest numbers is chosen, because these are the roundest. */
 std::vector<int> choose_ticks(const insitu_colour_bar &bar, double length, int size)
 {
     for (int every = 1; every < bar.tick_count; every++) {
@@ -259,8 +262,7 @@ block make_bar(const sheet &s, const bar_group &g, std::size_t n, const area &ro
     put_lines(s, g.labels[n], INSITU_LEFT, b);
     const double spare = std::floor(g.head - pixels(pad, g.size) - 0.5 * g.size -
                                     line_height * g.size * static_cast<double>(b.lines.size()));
-    for (placed_line &line : b.lines)
-        line.baseline += spare; /* labels of fewer lines than the highest stand at the bar */
+    for (placed_line &line : b.lines) line.baseline += spare; /* labels with fewer lines are aligned to the bar */
     b.gradient = {left, room.y0 + g.head, left + thickness * g.size, room.y1 - edge};
     b.ticks = choose_ticks(bar, b.gradient.y1 - b.gradient.y0, g.size);
     for (const int i : b.ticks)
@@ -269,7 +271,7 @@ block make_bar(const sheet &s, const bar_group &g, std::size_t n, const area &ro
     return b;
 }
 
-/* Finds what other blocks leave of the strip's height, from its middle on. */
+/* Finds the part of a vertical strip's height that other blocks leave free, around the middle of the picture. */
 void free_height(const sheet &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;
@@ -282,7 +284,7 @@ void free_height(const sheet &s, double x0, double x1, double &top, double &bott
     }
 }
 
-/* Stacks the group's bars from `first` on in the column. False: they would be too short. */
+/* Stacks `count` bars of the group, from `first` on, in the column. Returns false if they would be too short. */
 bool fill_column(const sheet &s, const bar_group &g, std::size_t first, std::size_t count, int column,
                  std::vector<block> &out)
 {
@@ -304,8 +306,8 @@ bool fill_column(const sheet &s, const bar_group &g, std::size_t first, std::siz
     return true;
 }
 
-/* Places all bars of the group in as few columns as they can stand in, over half of the picture's width at most, but
- * in one column over all of it. */
+/* Places all bars of the group in the smallest number of columns in which they fit. Several columns may cover at most
+ * half of the picture's width, a single one all of it. */
 bool place_group(sheet &s, const bar_group &g)
 {
     const std::size_t count = g.bars.size();
@@ -315,7 +317,7 @@ bool place_group(sheet &s, const bar_group &g)
         const std::size_t rows = (count + columns - 1) / columns;
         bool is_placed = true;
         const std::size_t used = (count + rows - 1) / rows;
-        for (std::size_t i = 0; i < used && is_placed; i++) { /* the first column is the one at the left */
+        for (std::size_t i = 0; i < used && is_placed; i++) { /* the first column is the leftmost */
             const std::size_t column = g.at == INSITU_LEFT ? i : used - 1 - i;
             is_placed = fill_column(s, g, i * rows, std::min(rows, count - i * rows), static_cast<int>(column), bars);
         }
@@ -343,13 +345,13 @@ std::string named(const char *what, const char *text)
     if (name.size() > NAMED) {
         name.erase(std::size_t{NAMED});
         while (!name.empty() && (static_cast<unsigned char>(name.back()) & 0xC0) == 0x80) name.pop_back();
-        if (!name.empty()) name.pop_back(); /* its begin, or one letter */
+        if (!name.empty()) name.pop_back(); /* removes the first byte of the cut character, or the last letter */
         name += "...";
     }
     return std::string(what) + " \"" + name + "\"";
 }
 
-/* Leaves out the last bars of a side that has no room for all. */
+/* Places the bars of a side. If there is not enough space for all, the last ones are left out. */
 void place_bars(sheet &s, insitu_anchor at)
 {
     std::vector<int> bars;
@@ -361,7 +363,7 @@ void place_bars(sheet &s, insitu_anchor at)
     }
 }
 
-/* ---- the others ------------------------------------------------------------------------------------------------ */
+/* ---- other decorations ----------------------------------------------------------------------------------------- */
 
 bool place_scale_bar(sheet &s)
 {
@@ -389,7 +391,8 @@ bool place_axes(sheet &s)
     return false;
 }
 
-/* The middle of the words is placed so that their box is a gap away from the point. */
+/* Places a label so that the box of its text has the given distance from its point. The label is omitted if the place
+ * is occupied. */
 void place_label(sheet &s, int index)
 {
     const insitu_label &label = s.what.labels[index];

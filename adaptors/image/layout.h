@@ -1,9 +1,9 @@
-/* Where decorations stand in a picture. Only rectangles and lines of words are computed here, no pixels: a function of
- * the decorations, the picture's size, and how wide words are.
+/* Computes the positions of decorations in a picture. Only rectangles and lines of text are computed, no pixels; the
+ * result depends on the decorations, the picture's size, and the widths of text.
  *
- * Rooms of blocks are whole pixels, lie within the picture and overlap nowhere. What is too wide is wrapped, then made
- * smaller; bars share the height of their side, then stand in more columns. What finds no room at all is left out and
- * named. */
+ * The rectangles of blocks have integer coordinates, lie within the picture and do not overlap. Text that is too wide
+ * is wrapped, and then made smaller. Colour bars share the height of their side, and then use more columns. Decorations
+ * for which there is still not enough space are left out and listed. */
 #ifndef ADAPTORS_LAYOUT_H
 #define ADAPTORS_LAYOUT_H
 
@@ -13,14 +13,14 @@
 
 #include "insitu/image_output.h"
 
-/* A rectangle of the picture in pixels, x to the right and y down. */
+/* A rectangle of the picture in pixels; x points to the right and y down. */
 struct area {
     double x0, y0, x1, y1;
 };
 
 enum class block_kind { words, bar, scale_bar, axes, label };
 
-/* One line of words, from the left end of its baseline. */
+/* One line of text; x and baseline are the left end of its baseline. */
 struct placed_line {
     std::string text;
     double x, baseline;
@@ -28,28 +28,28 @@ struct placed_line {
 
 struct block {
     block_kind kind;
-    int index; /* the decoration's number among those of its kind */
-    int size;  /* the height of its words, pixels */
+    int index; /* index of the decoration among those of its kind */
+    int size;  /* height of its text in pixels */
     area room;
     std::vector<placed_line> lines;
-    area gradient;          /* a bar's colours */
-    std::vector<int> ticks; /* the ticks of a bar whose numbers have room, in rising order */
+    area gradient;          /* rectangle of a bar's colours */
+    std::vector<int> ticks; /* indices of the bar's ticks whose numbers are drawn, in ascending order */
 };
 
 struct layout {
     std::vector<block> blocks;
-    std::vector<std::string> left_out; /* "the axes"; labels that do not fit are not named */
+    std::vector<std::string> left_out; /* for example "the axes"; labels that do not fit are not listed */
 };
 
-/* The width of words in letters of this size, pixels. */
+/* Returns the width in pixels of text with letters of this height. */
 using word_measure = std::function<int(const std::string &text, int size)>;
 
 layout make_layout(const insitu_image &image, const word_measure &measure);
 
-/* The height of words, pixels. */
+/* Returns the height of the text in pixels. */
 int word_size(const insitu_image &image);
 
-/* The row of a bar's tick. */
+/* Returns the y coordinate of a bar's tick. */
 double tick_row(const insitu_tick &tick, const area &gradient);
 
 #endif

@@ -10,10 +10,10 @@ namespace
 
 std::atomic<void *> reserve;
 std::atomic<std::new_handler> handler_before;
-std::mutex lock; /* one holds a reserve at a time */
+std::mutex lock; /* held as long as a reserve exists */
 
-/* Bytes left free beside the reserve for allocations without operator new: the loader ends the process where it finds
- * no room for a thread's variables, and compressors give up. */
+/* Number of bytes left free in addition to the reserve, for allocations that do not use operator new: the loader
+ * terminates the process if it has no memory for a thread's variables, and compressors fail. */
 enum { SPARE_BYTES = 4 << 20 };
 
 void give_back()

@@ -1,13 +1,14 @@
-/* Memory set aside for code that cannot cope with failed allocations.
+/* Memory reserved for code that cannot handle failed allocations.
  *
- * OpenImageIO, OpenEXR and the C++ library have functions that may not throw and yet allocate (an image's channel
- * names, an attribute, the next name in a folder), and lists that they register once and leave half done if that fails.
- * A failed allocation there ends the process or spoils all later pictures. These allocations are small and made by
- * operator new. So a reserve is held while such code runs; when operator new first fails, it is given back to the heap,
- * and operator new tries again. Failing to get the reserve counts as lack of memory.
+ * OpenImageIO, OpenEXR and the C++ library contain functions that are noexcept but allocate (an image's channel names,
+ * an attribute, the next entry of a directory), and lists that are registered once and stay incomplete if an allocation
+ * fails. A failed allocation there terminates the process or corrupts all later pictures. These allocations are small
+ * and use operator new. A reserve is therefore held while such code runs. The first time operator new fails, the
+ * reserve is freed and operator new tries again. If the reserve itself cannot be allocated, this counts as lack of
+ * memory.
  *
- * The new-handler belongs to the process: another thread may spend the reserve while it is held. When the reserve is
- * gone, the handler from before is called. */
+ * The new-handler is global to the process, so another thread may use up the reserve. When the reserve is used up, the
+ * previous handler is called. */
 #ifndef ADAPTORS_MEMORY_RESERVE_H
 #define ADAPTORS_MEMORY_RESERVE_H
 
@@ -16,7 +17,7 @@
 class memory_reserve
 {
   public:
-    /* Throws std::bad_alloc. */
+    /* Throws std::bad_alloc if the memory cannot be reserved. */
     explicit memory_reserve(std::size_t bytes);
     ~memory_reserve();
     memory_reserve(const memory_reserve &) = delete;

@@ -34,7 +34,7 @@ class descriptor
     descriptor &operator=(const descriptor &) = delete;
     ~descriptor() { close(); }
     int number() const { return number_; }
-    /* Returns 0, or the errno that tells why not all was written. */
+    /* Closes the file. Returns 0, or the errno of a write that failed only at this point. */
     int close()
     {
         const int number = std::exchange(number_, -1);
@@ -47,7 +47,7 @@ class descriptor
 
 /* ---- names ---- */
 
-/* A name so short that it is accepted wherever the picture's own name is. */
+/* Returns a random name. It is short enough for any file system that accepts the picture's own name. */
 std::string random_name()
 {
     static std::random_device source;
@@ -66,9 +66,9 @@ bool is_temporary(const char *name)
            std::strcmp(name + begin + random_digits, name_end) == 0;
 }
 
-/* ---- what killed runs left ---- */
+/* ---- temporary files of killed runs ---- */
 
-/* Removes a temporary file of this user's if nobody has locked it, since its writer would have. */
+/* Removes a temporary file of this user if it is not locked. A running writer would hold a lock on it. */
 void remove_if_left(int folder, const char *name)
 {
     const descriptor file(openat(folder, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
@@ -90,7 +90,7 @@ void remove_left_files(int folder)
     }
 }
 
-/* Tidies each folder once a process: with many pictures a folder takes long to read. */
+/* Removes old temporary files of a folder, once per process, because reading a folder with many pictures is slow. */
 void tidy(int folder)
 {
     static std::set<std::pair<dev_t, ino_t>> tidied;
@@ -106,14 +106,14 @@ void tidy(int folder)
 
 /* ---- the temporary file ---- */
 
-/* A file of a temporary name that is gone again unless keep() renames it. */
+/* A temporary file that is deleted by the destructor, unless keep() has renamed it. */
 class temporary_file
 {
   public:
     explicit temporary_file(int folder) : folder_(folder), name_(random_name()), file_(make())
     {
-        /* Another process that tidies the folder may have come first. On file systems without locks nobody removes
-         * anything. */
+        /* Another process that cleans the folder may have removed the file before it was locked. On file systems
+         * without locks no files are removed. */
         struct stat made;
         is_lost_ = flock(file_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
         is_lost_ = is_lost_ || fstat(file_.number(), &made) != 0 || made.st_nlink == 0;
@@ -153,8 +153,8 @@ void temporary_file::write(const unsigned char *bytes, std::size_t size)
     }
 }
 
-/* False where the file is not there any more. Closing releases the lock; some file systems report a full disk only
- * then. */
+/* Closes the file and renames it. Returns false if it no longer exists. Closing releases the lock; some file systems
+ * report a full disk only when a file is closed. */
 bool temporary_file::keep(const std::string &name)
 {
     const int code = file_.close();
@@ -178,7 +178,8 @@ int open_folder(const std::filesystem::path &folder)
     return number;
 }
 
-/* A rename would put a picture in the place of a pipe or a device. */
+/* Throws unless the name is free, a regular file or a link: renaming would replace a pipe or a device by the
+ * picture. */
 void check_place(int folder, const std::string &name)
 {
     struct stat found;
@@ -210,8 +211,8 @@ void write_picture_file(const std::string &path, const unsigned char *bytes, std
     const descriptor folder(open_folder(target.parent_path()));
     check_place(folder.number(), name);
     tidy(folder.number());
-    /* Another process that tidies the folder may take the file for one that a killed run left: before it is locked, or
-     * where locks do not reach from node to node. */
+    /* Another process that cleans the folder may remove the temporary file as one of a killed run: before the file is
+     * locked, or if locks do not work across nodes. */
     enum { TRIES = 8 };
     for (int i = 0; i < TRIES; i++)
         if (try_to_write(folder.number(), name, bytes, size)) return;

@@ -1,8 +1,8 @@
-/* A picture's file: it appears whole or not at all.
+/* Writes a picture's file atomically: it appears complete or not at all.
  *
- * Bytes go to a temporary file in the picture's own folder, which is then renamed to the picture. Nobody else can have
- * made the temporary file: it has a random name and is opened only if there was none. It is locked as long as its
- * writer lives, and so files that killed runs left are told from those being written. */
+ * The bytes are written to a temporary file in the picture's folder, which is then renamed. The temporary file cannot
+ * belong to another process, because it has a random name and is created exclusively. It is locked while its writer
+ * runs, so that temporary files of killed runs can be distinguished from those being written. */
 #ifndef ADAPTORS_PICTURE_FILE_H
 #define ADAPTORS_PICTURE_FILE_H
 
@@ -14,8 +14,8 @@ struct io_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/* Write size bytes to path; missing folders are made. If it throws io_error, a file that path named before is
- * untouched. */
+/* Writes size bytes to path, and creates missing folders. If it throws io_error, an existing file of that path does not
+ * change. */
 void write_picture_file(const std::string &path, const unsigned char *bytes, std::size_t size);
 
 #endif

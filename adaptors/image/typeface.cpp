@@ -1,5 +1,5 @@
-/* FreeType reports missing memory by codes, which become std::bad_alloc. Glyphs are hinted, so that they stand on whole
- * pixels and are sharp in small sizes. */
+/* FreeType reports a lack of memory by error codes, which are converted to std::bad_alloc. Glyphs are hinted, so that
+ * they align with pixels and are sharp in small sizes. */
 #include "typeface.h"
 
 #include <ft2build.h>
@@ -21,7 +21,7 @@ namespace
 const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans", "DroidSans"};
 const char32_t replacement = 0xFFFD;
 
-/* Throws where memory ran out. */
+/* Returns whether the call succeeded; throws std::bad_alloc if memory ran out. */
 bool is_done(FT_Error code)
 {
     if (code == FT_Err_Out_Of_Memory) throw std::bad_alloc();
@@ -30,8 +30,8 @@ bool is_done(FT_Error code)
 
 /* ---- finding a font ---- */
 
-/* Returns the files of this font in the folder and those three levels below it. Uses glob(), because the C++ library's
- * walk through folders ends the process where it finds no memory. */
+/* Returns the files of this font in the folder and up to three levels below. Uses glob(), because the directory
+ * iterators of the C++ library terminate the process if memory runs out. */
 std::vector<std::string> find_files(const std::string &folder, const std::string &font)
 {
     std::vector<std::string> out;
@@ -50,7 +50,7 @@ std::string own_folders()
     return own ? own : "";
 }
 
-/* Folders stand between colons or semicolons. */
+/* Splits a list of folders at colons and semicolons. */
 std::vector<std::string> split_folders(const std::string &list)
 {
     std::vector<std::string> out;
@@ -97,7 +97,7 @@ std::string usual_fonts()
 
 /* ---- characters ---- */
 
-/* Reads one character at `at` and steps over it; replacement where there is none. */
+/* Decodes the character at `at` and advances `at` behind it. Returns the replacement character for invalid UTF-8. */
 char32_t next_character(const std::string &text, std::size_t &at)
 {
     static const char32_t least[] = {0, 0x80, 0x800, 0x10000};
@@ -117,14 +117,14 @@ char32_t next_character(const std::string &text, std::size_t &at)
     return out;
 }
 
-/* Control characters are blanks: a line is one line. */
+/* Returns the glyph of a character. Control characters are drawn as blanks, because the text is a single line. */
 FT_UInt glyph_of(FT_Face face, char32_t character)
 {
     const bool is_control = character < 0x20 || (character >= 0x7F && character < 0xA0);
     return FT_Get_Char_Index(face, is_control ? ' ' : character);
 }
 
-/* Returns how far the pen steps back or on between two glyphs, in pixels. */
+/* Returns the kerning between two glyphs in pixels, positive to the right. */
 int kerning(FT_Face face, FT_UInt before, FT_UInt glyph)
 {
     FT_Vector step = {0, 0};
@@ -143,7 +143,7 @@ int advance_of_loaded(FT_Face face)
     return static_cast<int>((face->glyph->advance.x + 32) >> 6);
 }
 
-/* Calls visit(x) with each glyph loaded, x being where the pen is; returns where it ends. */
+/* Loads each glyph and calls visit(x) with the pen's position; returns the position behind the last glyph. */
 template <typename visitor>
 int walk(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int32 flags, visitor visit)
 {
@@ -171,7 +171,7 @@ void cover_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &co
         }
 }
 
-/* Covers the loaded glyph's outline and all that is within the stroker's radius of it. */
+/* Covers the pixels within the stroker's radius of the loaded glyph. */
 void cover_widened(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
 {
     FT_Glyph glyph = nullptr;
@@ -231,7 +231,7 @@ int typeface::width_of(const std::string &text, int size) const
     return x;
 }
 
-/* The size is set. */
+/* Returns the advance of a glyph in pixels. The size must be set already. */
 int typeface::advance_of(unsigned glyph, int size) const
 {
     const auto known = advances_.find({size, glyph});

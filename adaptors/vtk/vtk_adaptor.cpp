@@ -1,7 +1,7 @@
-/* The face of the VTK adaptor: it decides which meshes a data object makes, from which arrays, and how long these must
- * live. A session reads borrowed arrays during a step, so everything a mesh was built from (references to VTK's arrays,
- * conversions) stays in one `part` under the mesh's name until the session has taken a new mesh of that name or has
- * been told that there is none. */
+/* The public functions of the VTK adaptor. They determine which meshes a data object contains, which arrays these use,
+ * and how long the arrays must live. A session reads borrowed arrays during a step. Everything that a mesh uses
+ * (references to VTK's arrays, conversions) is therefore kept in one part under the mesh's name, until a new mesh of
+ * that name has been set on the session or the mesh has been removed from it. */
 #include "insitu/vtk.h"
 
 #include <exception>
@@ -37,35 +37,36 @@ using namespace insitu_vtk;
 namespace
 {
 
-/* One mesh as it is handed over. Field names live in VTK's arrays, and the session copies them. */
+/* One mesh as it is set on the session, with the memory that it uses. The names of the fields belong to VTK's arrays;
+ * the session copies them. */
 struct part {
     hold held;
     insitu_mesh mesh;
-    std::unique_ptr<insitu_lattice> lattice; // what mesh.lattice points to, if the data set is structured
+    std::unique_ptr<insitu_lattice> lattice; // mesh.lattice points to it, if the data set is structured
     std::vector<insitu_field> fields;
 };
 
-/* A failure on its way to the C face. */
+/* An error as an exception within the adaptor. The C functions convert it to a status and a message. */
 struct failure {
     insitu_status status;
     std::string message;
 };
 
-/* The result over all leaves of one insitu_vtk_set(). */
+/* The accumulated result over all leaves of one insitu_vtk_set(). */
 struct outcome {
     tally count;
     cell_counts cells;
     int64_t cells_set = 0;
     int meshes = 0;
     int fields = 0;
-    std::set<std::string> names; // of the meshes set
+    std::set<std::string> names; // names of the meshes that were set
 };
 
 } // namespace
 
 struct insitu_vtk_adaptor {
     insitu_session *session = nullptr;
-    std::map<std::string, std::map<std::string, part>> parts; // by the name of the call, then of the mesh
+    std::map<std::string, std::map<std::string, part>> parts; // by the name given to insitu_vtk_set(), then by mesh
     std::string error, copied_why, cells_why, warnings;
 };
 
@@ -75,8 +76,8 @@ namespace
 constexpr unsigned char ghosts_not_drawn =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
 
-/* Ghost flags: VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array serves where it
- * holds only the former, and none is needed where nothing is hidden. */
+/* Sets the ghost flags. VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array is used if
+ * it contains only the former, and no array is set if nothing is hidden. */
 void set_ghosts(vtkDataSet *grid, const vtkSmartPointer<vtkUnsignedCharArray> &ghosts, const cell_list &cells,
                 const std::string &what, tally &count, part &p)
 {
@@ -124,8 +125,8 @@ bool has_field(const part &p, const std::string &name)
     return false;
 }
 
-/* Tells whether an array becomes a field: it is numeric, has a name and the right length, and is no flag of VTK's own.
- */
+/* Checks whether an array becomes a field: it must be numeric, have a name and the right length, and not be VTK's ghost
+ * flags. */
 bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, tally &count)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
@@ -172,7 +173,7 @@ void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string
     }
 }
 
-/* Fill p from grid. p.mesh.cell_count stays 0 where there is nothing to draw. */
+/* Fills p from grid. If there is nothing to draw, p.mesh.cell_count is 0. */
 void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out, part &p)
 {
     const std::string what = "mesh '" + name + "'";
@@ -205,7 +206,7 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     out.cells_set += cells.count;
 }
 
-/* Fill p from a structured data set. False, with p as it was, where it is none. */
+/* Fills p from a structured data set. Returns false if data is not structured. */
 bool make_lattice_part(vtkDataSet *data, const std::string &name, outcome &out, part &p)
 {
     const std::string what = "mesh '" + name + "'";
@@ -251,7 +252,7 @@ void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     set_part(adaptor, parts, name, std::move(fresh), out);
 }
 
-/* Count in bytes what insitu_vtk_make_grid() made for data: the lists that are not data's own. */
+/* Reports the bytes of the lists that insitu_vtk_make_grid() allocated for data. */
 void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, tally &count)
 {
     if (grid->GetNumberOfCells() == 0) return;
@@ -272,7 +273,7 @@ void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::
         count.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
 }
 
-/* Set a data set that is no unstructured grid as one, with other ghost flags than its own, if given. */
+/* Sets a data set that is not an unstructured grid. flags, unless null, replace its ghost flags. */
 void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                vtkDataSet *data, vtkUnsignedCharArray *flags, outcome &out)
 {
@@ -295,7 +296,7 @@ void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, 
     set_leaf(adaptor, parts, name, grid, out);
 }
 
-/* Set the leaf of a composite at the iterator. */
+/* Sets the leaf of a composite at the iterator, unless it is an unstructured grid. */
 void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                     vtkCompositeDataSet *composite, vtkCompositeDataIterator *it, outcome &out)
 {
@@ -309,7 +310,7 @@ void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &pa
     set_other(adaptor, parts, name, data, flags, out);
 }
 
-/* Set every leaf. Empty ones are counted too, so that a leaf has the same number on all ranks. */
+/* Sets every leaf. Empty leaves are counted, so that a leaf has the same number on all ranks. */
 void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                 vtkCompositeDataSet *composite, outcome &out)
 {
@@ -344,7 +345,7 @@ void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
                                                  " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
-/* Take away what an earlier call set and this one did not. */
+/* Removes the meshes that an earlier call set and this one did not. */
 void remove_others(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::set<std::string> &names)
 {
     for (auto it = parts.begin(); it != parts.end();) {
@@ -389,7 +390,7 @@ void fill_report(insitu_vtk_adaptor *adaptor, outcome &out, insitu_vtk_report *r
                adaptor->warnings.c_str()};
 }
 
-/* Run body and turn whatever it throws into a status and a message. */
+/* Calls body and converts any exception to a status and a message. */
 template <typename Body> insitu_status guarded(insitu_vtk_adaptor *adaptor, Body body) noexcept
 {
     try {

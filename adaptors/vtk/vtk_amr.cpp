@@ -1,6 +1,6 @@
-/* Every rank has the boxes of all levels, also of those whose data other ranks hold. A box counts cells of its level,
- * from one origin; divided by the ratio of the levels it is a box of the coarser level, whose cells within are
- * refined. */
+/* Every rank has the boxes of all levels, including those whose data are on other ranks. A box is a range of cell
+ * indices of its level, counted from a common origin. Divided by the refinement ratio, it is a box of the coarser
+ * level; the cells in it are refined. */
 #include "vtk_amr.h"
 
 #include "insitu/vtk_grids.h"
@@ -23,7 +23,7 @@ namespace insitu_vtk
 namespace
 {
 
-/* Cells low to high - 1 along each axis. The axis that a flat AMR lacks has one cell. */
+/* The cells from low to high - 1 along each axis. An axis without extent counts as one cell. */
 struct box {
     std::array<int64_t, 3> low{}, high{};
 
@@ -37,7 +37,7 @@ int64_t rounded_down(int64_t a, int64_t b)
     return a / b - (a % b < 0 ? 1 : 0);
 }
 
-/* Empty where the box was never set. */
+/* Converts an AMR box, divided by the refinement ratio. The result is empty if the box was never set. */
 box cells_of(const vtkAMRBox &of, int64_t ratio)
 {
     box b;
@@ -62,7 +62,7 @@ box common(const box &a, const box &b)
     return c;
 }
 
-/* How many cells of the next level a cell is wide; 0 where neither spacings nor ratios are given. */
+/* Returns the refinement ratio to the next level, or 0 if neither spacings nor ratios are set. */
 int64_t ratio_to_next(vtkOverlappingAMR *amr, unsigned level)
 {
     vtkAMRInformation *information = amr->GetAMRInfo();
@@ -70,7 +70,8 @@ int64_t ratio_to_next(vtkOverlappingAMR *amr, unsigned level)
         double coarse[3], fine[3];
         information->GetSpacing(level, coarse);
         information->GetSpacing(level + 1, fine);
-        int64_t ratio = 0; /* an axis of flat data may have one spacing on all levels */
+        int64_t ratio =
+            0; /* the largest over the axes: flat data may have the same spacing on all levels along one axis */
         for (int axis = 0; axis < 3; axis++)
             if (fine[axis] > 0 && coarse[axis] >= fine[axis])
                 ratio = std::max<int64_t>(ratio, std::llround(coarse[axis] / fine[axis]));
@@ -79,7 +80,7 @@ int64_t ratio_to_next(vtkOverlappingAMR *amr, unsigned level)
     return information->HasRefinementRatio() ? information->GetRefinementRatio(level) : 0;
 }
 
-/* data's own flags, or zeros. */
+/* Returns a copy of data's ghost flags, or zeros if there are none. */
 vtkSmartPointer<vtkUnsignedCharArray> copied_flags(vtkDataSet *data)
 {
     const auto own = vtkSmartPointer<vtkUnsignedCharArray>::Take(
@@ -91,7 +92,7 @@ vtkSmartPointer<vtkUnsignedCharArray> copied_flags(vtkDataSet *data)
     return flags;
 }
 
-/* Flag the cells of `in` that lie within `part` of it; i runs fastest. */
+/* Sets REFINEDCELL for the cells of box `in` that lie in `part`. In the array i varies fastest. */
 void mark(const box &in, const box &part, vtkUnsignedCharArray *flags)
 {
     for (int64_t k = part.low[2]; k < part.high[2]; k++)

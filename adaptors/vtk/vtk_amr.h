@@ -1,4 +1,4 @@
-/* Finds the cells of overlapping AMR that finer levels replace, by the boxes of the levels. */
+/* Finds the cells of overlapping AMR that are covered by finer levels, from the boxes of the levels. */
 #ifndef VTK_AMR_H
 #define VTK_AMR_H
 
@@ -15,9 +15,9 @@ class vtkUnsignedCharArray;
 namespace insitu_vtk
 {
 
-/* The ghost flags of data, which is the number-th of its level, with REFINEDCELL where a box of the next level lies, as
- * vtkAMRUtilities::BlankCells() would set them. Null where no such box lies. count gets a warning where the boxes and
- * data contradict each other. amr and data are not changed. */
+/* Returns the ghost flags of data, the grid with this number in its level, with REFINEDCELL set in cells that a box of
+ * the next level covers, as vtkAMRUtilities::BlankCells() does. Returns null if no box covers any. If the boxes do not
+ * match data, adds a warning to count. amr and data do not change. */
 vtkSmartPointer<vtkUnsignedCharArray> refined_flags(vtkOverlappingAMR *amr, unsigned level, unsigned number,
                                                     vtkDataSet *data, const std::string &what, tally &count);
 

@@ -1,13 +1,13 @@
-/* VTK has many array classes, but almost all data come in two of them: AOS (tuples one after another) and SOA (one
- * block a component). libinsitu reads both by pointers and strides, for the element types it knows:
+/* VTK has many array classes, but almost all data use two of them: AOS (one tuple after the other) and SOA (one block
+ * per component). libinsitu reads both by pointers and strides, if it supports the element type:
  *
- *     AOS   x0 y0 z0 x1 y1 z1 ...       tuple stride 3 elements, component stride 1
- *     SOA   x0 x1 ... | y0 y1 ... | z0 z1 ...    tuple stride 1, component stride the distance between blocks
+ *     AOS   x0 y0 z0 x1 y1 z1 ...                tuple stride 3 elements, component stride 1
+ *     SOA   x0 x1 ... | y0 y1 ... | z0 z1 ...    tuple stride 1, component stride is the distance between blocks
  *
- * A field has one component stride, so the blocks of an SOA array must lie evenly in memory to be borrowed; coordinates
- * are three arrays of their own, and may lie anywhere. All others (shorts, characters, unsigned integers, bits, arrays
- * computed on access) are copied: integers to an integer type that holds every value, if there is one, else to double.
- */
+ * A field has a single component stride, so the blocks of an SOA array can be borrowed only if they are equally spaced
+ * in memory. Coordinates are three separate arrays, whose blocks may be anywhere. All other arrays (shorts, characters,
+ * unsigned integers, bits, arrays computed on access) are copied: integers to an integer type that represents every
+ * value, if there is one, otherwise to double. */
 #include "vtk_arrays.h"
 
 #include <cstring>
@@ -23,7 +23,7 @@ namespace insitu_vtk
 namespace
 {
 
-/* long and long long are both 64 bits wide, but different types to VTK. */
+/* Returns the insitu_type of T. VTK treats long and long long as different types, although both have 64 bits. */
 template <typename T> constexpr insitu_type element_type()
 {
     if constexpr (std::is_integral_v<T>)
@@ -52,7 +52,7 @@ template <typename T> bool borrow_aos(vtkDataArray *array, array_view &view)
     return true;
 }
 
-/* The bytes from one block to the next where all blocks lie evenly and rising, else 0. */
+/* Returns the distance in bytes between blocks if they are equally spaced in ascending order, otherwise 0. */
 template <typename T> int64_t even_stride(vtkSOADataArrayTemplate<T> *array)
 {
     auto address = [array](int c) { return reinterpret_cast<uintptr_t>(array->GetComponentArrayPointer(c)); };
@@ -83,7 +83,7 @@ template <typename T> bool borrow(vtkDataArray *array, array_view &view)
     return borrow_aos<T>(array, view) || borrow_soa<T>(array, view);
 }
 
-/* Copy values of VTK's type From as To, a type that holds them all. */
+/* Copies values of VTK's type From to type To, which must represent them all. */
 template <typename From, typename To> bool convert(vtkDataArray *array, hold &held, array_view &view)
 {
     auto *typed = vtkAOSDataArrayTemplate<From>::FastDownCast(array);
@@ -97,7 +97,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, hold &he
     return true;
 }
 
-/* Copies any array, through VTK's own access by double. */
+/* Copies an array of any class, through VTK's access by double. */
 template <typename To> array_view convert_any(vtkDataArray *array, hold &held)
 {
     array_view view = shape_of(array, element_type<To>());
@@ -125,7 +125,7 @@ int64_t bytes_of(const array_view &view)
     return view.tuple_count * view.component_count * type_size(view.type);
 }
 
-/* Tells whether the elements have a type that the library knows, in a layout that cannot be borrowed. */
+/* Checks whether libinsitu supports the type of the elements, so that only the layout prevents borrowing. */
 bool is_known_type(vtkDataArray *array)
 {
     const int type = array->GetDataType();

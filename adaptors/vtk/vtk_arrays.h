@@ -1,4 +1,4 @@
-/* Makes VTK's data arrays readable for libinsitu: borrowed where the layout allows, else copied. */
+/* Makes VTK's data arrays readable for libinsitu: they are borrowed if their layout allows it, otherwise copied. */
 #ifndef VTK_ARRAYS_H
 #define VTK_ARRAYS_H
 
@@ -18,8 +18,8 @@ class vtkObject;
 namespace insitu_vtk
 {
 
-/* Objects that one mesh keeps alive while the session may read it: VTK's arrays by reference, and conversions. Moving a
- * hold leaves the memory where it is. */
+/* The memory that one mesh keeps alive while the session may read it: references to VTK's arrays, and conversions.
+ * Moving a hold does not move this memory. */
 struct hold {
     std::vector<vtkSmartPointer<vtkObject>> objects;
     std::vector<std::unique_ptr<std::byte[]>> copies;
@@ -27,7 +27,7 @@ struct hold {
     std::byte *allocate(size_t bytes);
 };
 
-/* Counts of what was borrowed and copied, and warnings, over one insitu_vtk_set(). */
+/* Counts of what was borrowed and copied during one insitu_vtk_set(), and its warnings. */
 struct tally {
     int64_t bytes_borrowed = 0;
     int64_t bytes_copied = 0;
@@ -41,7 +41,7 @@ struct tally {
     void add(const tally &other);
 };
 
-/* A data array of tuple_count × component_count elements in memory. */
+/* An array in memory with tuple_count × component_count elements. */
 struct array_view {
     const void *data = nullptr;
     insitu_type type = INSITU_FLOAT64;
@@ -56,14 +56,14 @@ struct array_view {
 
 int64_t type_size(insitu_type type);
 
-/* Returns the array as a field's values. They are borrowed, or copied if VTK's type or layout has no counterpart here.
- * what is the array's name in the tally. */
+/* Returns the array as a field's values: borrowed, or copied if libinsitu does not support VTK's type or layout. `what`
+ * is the name of the array in reports. */
 array_view view_array(vtkDataArray *array, const std::string &what, hold &held, tally &count);
 
-/* The three coordinate arrays of points: borrowed (AOS, or SOA with components wherever they lie) or copied. */
+/* Describes the coordinates of points as three arrays: borrowed if they are AOS or SOA, otherwise copied. */
 void view_points(vtkDataArray *points, const std::string &what, hold &held, tally &count, insitu_array coordinates[3]);
 
-/* The tuples source[0], source[1], ... of a view, packed in a copy that held owns. */
+/* Copies the tuples source[0], source[1], ... of a view to a packed array, which `held` owns. */
 array_view gather(const array_view &view, const std::vector<int64_t> &source, hold &held);
 
 } // namespace insitu_vtk

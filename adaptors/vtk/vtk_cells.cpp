@@ -1,10 +1,10 @@
-/* For each VTK cell type that libinsitu draws, a recipe says which linear cells stand for it and which of its points
- * are their vertices. Where all cells of a grid stand for themselves (tets, hexes, wedges, pyramids), VTK's arrays are
- * handed over untouched; a single other cell makes a new list of all.
+/* For each VTK cell type that libinsitu draws, a recipe contains the linear cell that represents it, and which of its
+ * points are the linear cell's vertices. If all cells of a grid are supported as they are (tets, hexes, wedges,
+ * pyramids), VTK's arrays are used unchanged; if a single cell is not, all cells are copied to a new list.
  *
- * A voxel differs from a hexahedron by the order of its points. Polyhedra and prisms of five and six sides are
- * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Higher-order cells list their corners first, in the
- * order of the linear cell. */
+ * A voxel differs from a hexahedron only in the order of its points. Polyhedra and prisms of five and six sides become
+ * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). The corners of higher-order cells are their first
+ * points, in the order of the linear cell. */
 #include "vtk_cells.h"
 
 #include "vtk_faces.h"
@@ -27,7 +27,7 @@ enum class kind { not_drawn, flat, as_it_is, polygon, reordered, faces, linear }
 struct piece {
     uint8_t type;
     uint8_t vertex_count;
-    std::array<uint8_t, 8> vertices; // of the cell's points
+    std::array<uint8_t, 8> vertices; // indices into the cell's points
 };
 
 struct recipe {
@@ -95,7 +95,7 @@ const recipe_table &recipes()
     return table;
 }
 
-/* Pointers to VTK's arrays of one grid. */
+/* Pointers to the cell arrays of one VTK grid. */
 template <typename Id> struct raw_cells {
     const uint8_t *types;
     const Id *offsets;
@@ -103,21 +103,21 @@ template <typename Id> struct raw_cells {
     int64_t count;
 
     int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
-    /* How many of the cell's points its linear cell has. */
+    /* Returns the number of points of the linear cell that represents the cell. */
     int64_t linear_size(int64_t cell, const recipe &r) const
     {
         return r.what == kind::polygon ? size(cell) : r.part.vertex_count;
     }
 };
 
-/* The sizes of the new list, and the reasons for it. */
+/* The sizes of the new lists, and whether each cell corresponds to VTK's cell of the same index. */
 struct new_size {
     int64_t cells = 0;
     int64_t vertices = 0;
     bool is_one_to_one = true;
 };
 
-/* The cells with faces, in their order: has[i] tells that VTK's cell i is one, with all its faces. */
+/* The cells with faces, in their order. has[i] is true if VTK's cell i is one of them and all its faces are valid. */
 struct faced_cells {
     face_list faces;
     std::vector<bool> has;
@@ -182,7 +182,7 @@ void fill_new(const raw_cells<Id> &raw, const faced_cells &faced, uint8_t *types
     *offsets = at;
 }
 
-/* Names the conversions of the cells there are, as in "voxels reordered, faces of polyhedra shared". */
+/* Names the conversions that the cells need, for example "voxels reordered, faces of polyhedra shared". */
 std::string why_converted(const std::array<int64_t, 256> &by_type)
 {
     const char *const reasons[] = {"some cells not drawn",
@@ -231,8 +231,8 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
                           face_bytes);
 }
 
-/* All cells are drawn as they are, from VTK's arrays; if all are of one type and size, neither types nor offsets are
- * needed. */
+/* Borrows VTK's arrays; all cells must be supported as they are. If all have the same type and size, types and offsets
+ * are not needed. */
 template <typename Id>
 void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::array<int64_t, 256> &by_type,
                   int64_t connectivity_count, const cells_view &view)

@@ -1,5 +1,5 @@
-/* Faces of neighbouring cells are matched by their set of points: each face is made once, from the first cell that has
- * it. */
+/* Faces of neighbouring cells are matched by their set of points. Each face is stored once, in the orientation of the
+ * first cell that has it. */
 #include "vtk_faces.h"
 
 #include <algorithm>
@@ -35,8 +35,8 @@ int64_t face_list::face(const int64_t *points, size_t count)
     return made;
 }
 
-/* Reads VTK's stream of the cell: [number of faces, number of the first one's points, its points, number of the second
- * one's points, ...]. */
+/* Reads the face stream of a cell: the number of faces, and for each face its number of points and its points. Returns
+ * false if the stream is not valid. */
 bool face_list::add_stream(vtkUnstructuredGrid *grid, int64_t cell)
 {
     vtkIdTypeArray *stream = grid->GetFaces(), *places = grid->GetFaceLocations();
@@ -56,7 +56,7 @@ bool face_list::add_stream(vtkUnstructuredGrid *grid, int64_t cell)
     return faces >= 4;
 }
 
-/* Adds a prism whose points go around one base, then the other. */
+/* Adds the faces of a prism. Its points go around one base, then around the other. */
 void face_list::add_prism(const int64_t *points, int sides)
 {
     cells.push_back(face(points, static_cast<size_t>(sides)));

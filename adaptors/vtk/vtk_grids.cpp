@@ -1,6 +1,6 @@
-/* The points of curvilinear grids, the polygons of polygonal data and all arrays are VTK's own, by reference. The way
- * through unstructured grids costs a list of hexahedra, 37 bytes a cell with offset and type, and for images and
- * rectilinear grids a list of points, 24 bytes each. */
+/* The points of curvilinear grids, the polygons of polygonal data and all arrays are shared with VTK's data set. The
+ * conversion to an unstructured grid allocates a list of hexahedra with 37 bytes per cell including offset and type,
+ * and for images and rectilinear grids a list of points with 24 bytes each. */
 #include "insitu/vtk_grids.h"
 
 #include <cstdint>
@@ -28,7 +28,7 @@
 namespace
 {
 
-/* The numbers of points along the axes with more than one: three axes, or two for a flat grid. */
+/* The number of points along each axis that has more than one: three axes, or two for a flat grid. */
 struct lattice {
     int64_t line = 1, rows = 1, layers = 1;
 
@@ -38,7 +38,7 @@ struct lattice {
     int64_t cells() const { return (line - 1) * (rows - 1) * (is_flat() ? 1 : layers - 1); }
 };
 
-/* False for data without such axes, or with fewer than two of them. */
+/* Returns false if data is not a structured data set with at least two such axes. */
 bool get_lattice(vtkDataSet *data, lattice &l)
 {
     int64_t cells[3], axes[3] = {1, 1, 1};
@@ -50,7 +50,7 @@ bool get_lattice(vtkDataSet *data, lattice &l)
     return true;
 }
 
-/* Lists the cells in VTK's order, hidden ones too. */
+/* Lists the cells in VTK's order, including hidden ones. */
 template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice &l)
 {
     using id = typename Array::ValueType;
@@ -75,13 +75,13 @@ template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice
 
 void set_lattice(const lattice &l, vtkUnstructuredGrid *grid)
 {
-    /* Offsets go up to eight times the number of cells, which is less than that of points. */
+    /* The largest offset is eight times the number of cells, which is smaller than the number of points. */
     const bool is_small = l.points() < std::numeric_limits<int32_t>::max() / 8;
     grid->SetCells(l.is_flat() ? VTK_QUAD : VTK_HEXAHEDRON,
                    is_small ? list_cells<vtkTypeInt32Array>(l) : list_cells<vtkTypeInt64Array>(l));
 }
 
-/* Borrows the list of polygons; false where there are other cells too. */
+/* Shares the list of polygons; returns false if data contains other cells. */
 bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
 {
     if (!data || data->GetNumberOfVerts() > 0 || data->GetNumberOfLines() > 0 || data->GetNumberOfStrips() > 0)
@@ -97,7 +97,7 @@ bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
     return true;
 }
 
-/* Lists the cells of any other data set, one by one. */
+/* Lists the cells of any other data set one by one. */
 void set_cells(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkIdList> points;
@@ -132,7 +132,7 @@ void set_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
     grid->SetPoints(points);
 }
 
-/* A structured grid may hide cells by their points; a flag of the cell then says the same. */
+/* Flags cells with a hidden point as hidden. In structured grids VTK hides such cells without a flag of their own. */
 void hide_cells_of_hidden_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
     insitu_lattice lattice = {};

@@ -20,7 +20,8 @@ namespace insitu_vtk
 namespace
 {
 
-/* VTK's point along an axis is spacing * i + origin, with i counted in the whole extent, if the axes are not turned. */
+/* Sets origin, spacing and first index of an image. The coordinate along an axis is spacing * i + origin, where i is
+ * counted in the whole extent. Returns false if the axes are rotated or a spacing is 0. */
 bool set_uniform(vtkImageData *image, insitu_lattice &lattice)
 {
     if (!image || !image->GetDirectionMatrix()->IsIdentity()) return false;
@@ -54,7 +55,7 @@ bool set_axes(vtkRectilinearGrid *grid, const std::string &what, hold &held, tal
     return true;
 }
 
-/* The points of turned images, one by one. */
+/* Lists the points of an image whose axes are rotated or have no spacing. */
 void list_points(vtkDataSet *data, const std::string &what, hold &held, tally &count, insitu_mesh &mesh)
 {
     const vtkIdType points = data->GetNumberOfPoints();

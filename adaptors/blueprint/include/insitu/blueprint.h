@@ -1,34 +1,36 @@
-/* Draw what a simulation describes as a Conduit node that follows the Mesh Blueprint: the arrays are borrowed where the
- * node has them. For codes that have such nodes already, as those with an Ascent adaptor; codes with a Catalyst 2
- * adaptor need nothing of this (docs/catalyst.md).
+/* Draws the mesh that a simulation describes as a Conduit node by the Mesh Blueprint. The node's arrays are borrowed if
+ * libinsitu can read them. This header is for codes that create such nodes already, for example with an Ascent adaptor;
+ * codes with a Catalyst 2 adaptor do not need it (docs/catalyst.md).
  *
  *     #include <conduit.h>
  *     #include "insitu/blueprint.h"
  *     #include "insitu/conduit.h"
  *
- *     insitu_blueprint *door = NULL;
- *     insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &door);
- *     insitu_blueprint_set(door, "", node);
- *     insitu_blueprint_step(door, NULL, NULL);
+ *     insitu_blueprint *adaptor = NULL;
+ *     insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor);
+ *     insitu_blueprint_set(adaptor, "", node);
+ *     insitu_blueprint_step(adaptor, NULL, NULL);
  *     ...
- *     insitu_blueprint_destroy(&door);
+ *     insitu_blueprint_destroy(&adaptor);
  *     insitu_destroy(&session);
  *
- * This library links no Conduit: it calls the one that the code is linked to, by a table of functions.
+ * This library does not link Conduit. It calls the Conduit that the code is linked with, through a table of functions.
  *
- * A topology "T" of a node given as "name" becomes the mesh "name/T", or "T" if name is "". If the node has several
- * domains, their topologies become "name/T/0", "name/T/1", ... by the domain's number on this rank, and the session
- * joins them as it does all meshes. Taken are uniform, rectilinear, structured and unstructured topologies of 2 and 3
- * dimensions: shapes tri, quad, polygonal, tet, hex, wedge, pyramid, polyhedral and mixed; lattices (insitu_lattice)
- * come of the first three. Fields at vertices and elements, of any numeric type, with components in one allocation or
- * several. Ghosts are the element fields ascent_ghosts and vtkGhostType, and those that state/metadata/vtk_fields calls
- * "Ghosts". Cells that windows of a nestset give to a child are not drawn, as the child's are.
+ * A topology "T" of a node that is set as "name" becomes the mesh "name/T", or "T" if name is "". If the node has
+ * several domains, their topologies become "name/T/0", "name/T/1", ..., numbered by the domain's index on this rank;
+ * the session joins them like any other meshes. The adaptor reads uniform, rectilinear, structured and unstructured
+ * topologies of two and three dimensions, with the shapes tri, quad, polygonal, tet, hex, wedge, pyramid, polyhedral
+ * and mixed. The first three types of topologies become lattices (insitu_lattice). Fields at vertices and elements may
+ * have any numeric type, and their components may be in one allocation or several. Ghost flags are the element fields
+ * ascent_ghosts and vtkGhostType, and those that state/metadata/vtk_fields declares as "Ghosts". Cells that a nestset's
+ * windows assign to a child domain are not drawn, because the child's cells are drawn instead.
  *
- * Left out, and named in the report: points and lines, the old stream of element_types, coordinates r, theta and phi,
- * fields by a basis or with values of materials alone, ghosts at vertices, fields of structured topologies with other
- * strides than the topology or than the other element fields, and windows that are not within their domain.
+ * The following is left out, and named in the report: points and lines, the old stream of element_types, the
+ * coordinates r, theta and phi, fields that are given by a basis or have only values per material, ghost flags at
+ * vertices, fields of structured topologies whose strides differ from those of the topology or of the other element
+ * fields, and windows that are not within their domain.
  *
- * The arrays must stay until insitu_blueprint_step() returns; the node may go before. */
+ * The arrays must stay valid until insitu_blueprint_step() returns; the node may be destroyed earlier. */
 #ifndef INSITU_BLUEPRINT_H
 #define INSITU_BLUEPRINT_H
 
@@ -38,68 +40,70 @@
 extern "C" {
 #endif
 
-/* The functions of Conduit's C API that are called; insitu/conduit.h makes a table of them. Each takes a conduit_node
- * and does what Conduit's of that name does: conduit_node_child() and so on, and from id on those of the node's
- * conduit_datatype. */
+/* The functions of Conduit's C API that the adaptor calls; insitu/conduit.h defines such a table. Each function takes a
+ * conduit_node and does the same as Conduit's function of that name (conduit_node_child() and so on); those from id on
+ * correspond to functions of the node's conduit_datatype. */
 typedef struct insitu_conduit {
     int64_t (*number_of_children)(const void *node);
     void *(*child)(const void *node, int64_t number);
-    char *(*name)(const void *node); /* given back by free() */
+    char *(*name)(const void *node); /* the result is freed by free() */
     int (*has_path)(const void *node, const char *path);
-    void *(*fetch_existing)(const void *node, const char *path); /* called only for paths that there are */
+    void *(*fetch_existing)(const void *node, const char *path); /* called only for existing paths */
     void *(*element_ptr)(const void *node, int64_t number);
-    char *(*as_char8_str)(const void *node); /* called only for strings; not given back */
+    char *(*as_char8_str)(const void *node); /* called only for strings; the result is not freed */
     int64_t (*id)(const void *node);
     int64_t (*number_of_elements)(const void *node);
-    int64_t (*stride)(const void *node); /* bytes */
+    int64_t (*stride)(const void *node); /* in bytes */
     int (*is_string)(const void *node);
 } insitu_conduit;
 
 typedef struct insitu_blueprint insitu_blueprint;
 
-/* Report of the last step on this rank. */
+/* The report of the last step on this rank. */
 typedef struct insitu_blueprint_report {
-    int meshes;             /* handed over: one a topology of a domain */
-    int fields;             /* handed over, over all meshes */
-    int64_t cells;          /* handed over, ghosts included */
-    int64_t bytes_copied;   /* held in arrays that the door made, for the reasons in copied_why */
-    const char *copied_why; /* "" or one "path: what (bytes)" a line; valid until the next insitu_blueprint_set() */
-    const char *left_out;   /* "" or one "path: why" a line: what is not drawn; valid as long */
+    int meshes;             /* number of meshes set: one per topology of a domain */
+    int fields;             /* number of fields set, over all meshes */
+    int64_t cells;          /* number of cells set, including ghosts */
+    int64_t bytes_copied;   /* size of arrays that the adaptor allocated, for the reasons in copied_why */
+    const char *copied_why; /* "", or lines of "path: what (bytes)"; valid until the next insitu_blueprint_set() */
+    const char *left_out;   /* "", or lines of "path: why" about what is not drawn; valid as long as copied_why */
 } insitu_blueprint_report;
 
-/* A door for a session, which must outlive it, on the session's ranks; comm is duplicated. The table of functions must
- * stay. On an error *out is NULL. Collective. */
+/* Creates an adaptor for the session, which must outlive it. comm has the session's ranks and is duplicated. The table
+ * of functions must stay valid. On an error *out is NULL. Collective. */
 INSITU_API insitu_status insitu_blueprint_create(insitu_session *session, const insitu_conduit *conduit, MPI_Comm comm,
                                                  insitu_blueprint **out);
 
-/* Set the meshes and fields of a Blueprint mesh of one or several domains, a `conduit_node *`, under a name, which may
- * be "". May be called several times before a step, for nodes of different names; what is not set again before the next
- * step is taken away by it. An empty node, as of a rank without domains, is fine, and so is NULL. Local.
+/* Sets the meshes and fields of a Blueprint mesh with one or several domains. `node` is a `conduit_node *`; the name
+ * may be "". The function may be called several times before a step, for nodes with different names; meshes that are
+ * not set again before the next step are removed by it. An empty node (as on a rank without domains) and NULL are
+ * allowed. Local.
  *
- * What has changed since the last step is found by a hash of the coordinates, connectivity and ghosts, unless the
- * domain says it in state/insitu_changed: "nothing", "geometry" or "all".
+ * Changes since the last step are detected by hashes of the coordinates, connectivity and ghost flags, unless the
+ * domain states them in state/insitu_changed: "nothing", "geometry" or "all".
  *
- * INSITU_ERROR_MESH or INSITU_ERROR_FIELD: the node is wrong; the message has its path. The next step then returns
- * this on all ranks and draws nothing. Other errors are those of insitu_set_mesh() and insitu_set_field(). */
+ * If the node is invalid, returns INSITU_ERROR_MESH or INSITU_ERROR_FIELD, with the path in the message. The next step
+ * then returns this error on all ranks and draws nothing. Other errors are those of insitu_set_mesh() and
+ * insitu_set_field(). */
 INSITU_API insitu_status insitu_blueprint_set(insitu_blueprint *door, const char *name, const void *node);
 
-/* Refuse the next step for a reason of the caller's own, as if a node were wrong: it returns this on all ranks. The
- * first reason counts. Local. */
+/* Makes the next step fail for a reason of the caller's own, as if a node were invalid: the step returns this status on
+ * all ranks. If there are several reasons, the first one counts. Local. */
 INSITU_API void insitu_blueprint_refuse(insitu_blueprint *door, insitu_status status, const char *message);
 
-/* Take a step of the session with what has been set. cycle, time: NULL: state/cycle and state/time of the domains, the
- * greatest over all ranks; where no domain has them, one more than the last cycle, and the cycle. Collective; the same
- * status on all ranks. */
+/* Performs a step of the session with the meshes and fields that have been set. If cycle or time is NULL, the largest
+ * state/cycle or state/time of all domains on all ranks is used; if no domain has them, the cycle is one more than the
+ * last one, and the time equals the cycle. Collective; returns the same status on all ranks. */
 INSITU_API insitu_status insitu_blueprint_step(insitu_blueprint *door, const int64_t *cycle, const double *time);
 
-/* The report of the last step. Local. */
+/* Returns the report of the last step. Local. */
 INSITU_API const insitu_blueprint_report *insitu_blueprint_last_report(const insitu_blueprint *door);
 
-/* The message of the last call on the door that failed, "" if none did. Valid until the next call. Local. For NULL:
- * that of this thread's last insitu_blueprint_create() that failed. */
+/* Returns the message of the last call that failed on this adaptor, or "" if none did. It is valid until the next call.
+ * For NULL, returns the message of this thread's last insitu_blueprint_create() that failed. Local. */
 INSITU_API const char *insitu_blueprint_error(const insitu_blueprint *door);
 
-/* Take the meshes away from the session and set *door to NULL. Collective. NULL, or a pointer to NULL, is fine. */
+/* Removes the meshes from the session and sets *adaptor to NULL. NULL and a pointer to NULL are allowed. Collective. */
 INSITU_API void insitu_blueprint_destroy(insitu_blueprint **door);
 
 #ifdef __cplusplus

@@ -1,5 +1,6 @@
-/* insitu_conduit_functions, the table of Conduit's functions for insitu/blueprint.h. Include Conduit's own header
- * before: conduit.h, or Catalyst's catalyst.h, whose functions have other names; without one there is no table. */
+/* Defines insitu_conduit_functions, the table of Conduit's functions for insitu/blueprint.h. Conduit's own header must
+ * be included first: conduit.h, or Catalyst's catalyst.h, which renames the functions. Without it the table is not
+ * defined. */
 #ifndef INSITU_CONDUIT_H
 #define INSITU_CONDUIT_H
 
@@ -7,7 +8,7 @@
 
 #ifdef CONDUIT_NODE_H
 
-/* Conduit's C API takes nodes that are read as if they were written. */
+/* Removes const, because Conduit's C API takes non-const pointers even for nodes that are only read. */
 static inline conduit_node *insitu_conduit_node(const void *node)
 {
     return (conduit_node *)(uintptr_t)node;
