@@ -1,5 +1,5 @@
-/* Values are packed, sent to and received from each linked rank, and unpacked. They are moved as 4 or 8 bytes, so that
- * float and double share the code. */
+/* Values are packed, exchanged with each linked rank, and unpacked. They are copied as 4 or 8 bytes, so that float and
+ * double use the same code. */
 #include "wave_halo.h"
 
 #include <stdlib.h>

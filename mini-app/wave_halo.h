@@ -1,4 +1,4 @@
-/* The exchange of halo cells' values between ranks. */
+/* Exchanges the values of halo cells between ranks. */
 #ifndef WAVE_HALO_H
 #define WAVE_HALO_H
 
@@ -9,19 +9,19 @@
 enum { WAVE_TAG_HALO = 1 };
 
 typedef struct wave_halo {
-    const wave_mesh *mesh; /* borrowed */
-    MPI_Comm comm;         /* borrowed */
-    int value_bytes;       /* 4 or 8 */
+    const wave_mesh *mesh; /* borrowed from the solver */
+    MPI_Comm comm;         /* borrowed from the solver */
+    int value_bytes;       /* size of a value: 4 or 8 */
     char *send, *receive;
     MPI_Request *requests;
 } wave_halo;
 
-/* Makes an exchange of values with four components a cell, of value_bytes each. False where memory ran out. Local. */
+/* Prepares exchanges of four components per cell, with value_bytes each. Returns false if memory ran out. Local. */
 bool wave_halo_create(const wave_mesh *mesh, MPI_Comm comm, int value_bytes, wave_halo *halo);
 void wave_halo_free(wave_halo *halo);
 
-/* Give every halo cell its owner's values: component k of cell c is element c * cell_stride + k * component_stride.
- * Collective. */
+/* Sets the values of every halo cell to those of its owner. Component k of cell c is element c * cell_stride + k *
+ * component_stride. Collective. */
 void wave_halo_exchange(wave_halo *halo, void *values, int64_t cell_stride, int64_t component_stride);
 
 #endif

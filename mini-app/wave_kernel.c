@@ -1,24 +1,24 @@
-/* Godunov's scheme for acoustics on any cells, of second order by values at vertices.
+/* Godunov's scheme for acoustics on cells of any shape, made second order by values at vertices.
  *
  *     p_t = -K div u        p' = p - dt K/V sum_f A_f u*_f        over the faces f of a cell
  *     u_t = -1/rho grad p   u' = u - dt/(rho V) sum_f A_f n_f p*_f
  *
- * p* and u* solve Riemann's problem between the two sides a, b of a face, each with its own impedance Z = rho c:
+ * p* and u* solve the Riemann problem between the two sides a, b of a face, each with its own impedance Z = rho c:
  *
  *     p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
  *
- * The reconstruction needs no gradients. Let P_v be the state at a vertex, from the cells around it, P_f and P_c its
- * means over a face's and a cell's vertices. The linear function through them, moved to the cell's own mean q, is at
- * the face
+ * The reconstruction needs no gradients. Let P_v be the state at a vertex, averaged from the cells around it, and let
+ * P_f and P_c be its means over the vertices of a face and of a cell. The linear function through these values, shifted
+ * to the cell's own mean q, has at the face the value
  *
  *     q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
  *
- * (q_t from Green's theorem with P_f: the step from the old time to the middle of the new). P_f is common to both
- * sides, so ranks exchange four jumps a cell and nothing else. In one dimension this is Fromm's scheme. In the scheme
- * of first order, j = q and P = 0.
+ * where q_t, from Green's theorem with P_f, advances the value to the middle of the time step. P_f is the same on both
+ * sides, so ranks exchange only the four jumps of each cell. In one dimension this is Fromm's scheme. In the
+ * first-order scheme, j = q and P = 0.
  *
- * Every cell gathers over its own faces. Each flux is computed twice, but nothing is written twice, and each sum has
- * the cell's own order, so that each cell's result has the same bits on any partition. */
+ * Each cell loops over its own faces, so every flux is computed twice, but no two cells write to the same place. Each
+ * sum is in the order of the cell's faces, so that every cell's result has the same bits on any partition. */
 #include "wave_kernel.h"
 
 #include <stddef.h>
@@ -27,7 +27,7 @@
 #error "WAVE_REAL, WAVE_INDEX and WAVE_TABLE say what to compile"
 #endif
 
-/* Inlined wherever the shape is a constant: the loops over a cell's faces and vertices unroll. */
+/* Inlined for each constant shape, so that the loops over a cell's faces and vertices are unrolled. */
 #define INLINE static inline __attribute__((always_inline))
 
 typedef WAVE_REAL real;
@@ -35,14 +35,14 @@ typedef WAVE_INDEX local_index;
 
 typedef struct layer_table {
     real modulus[WAVE_LAYERS_MAX], inverse_density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];
-    real inverse_sum[WAVE_LAYERS_MAX][WAVE_LAYERS_MAX]; /* 1 / (Za + Zb) */
+    real inverse_sum[WAVE_LAYERS_MAX][WAVE_LAYERS_MAX]; /* 1 / (Za + Zb) of two layers */
 } layer_table;
 
 typedef struct cell_view {
     const wave_cell_shape *shape;
     const local_index *vertex;
-    const real *face;         /* normal and area of each */
-    const int32_t *neighbour; /* the neighbour across each face */
+    const real *face;         /* normal and area of each face */
+    const int32_t *neighbour; /* neighbour across each face */
 } cell_view;
 
 static layer_table make_layers(const wave_grid *grid)
@@ -93,7 +93,7 @@ static void to_vertices(const wave_grid *grid)
     }
 }
 
-/* The vertex states of a cell. */
+/* Loads the states at the cell's vertices. */
 INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8][4])
 {
     const real *values = grid->vertex_state.values;
@@ -104,7 +104,8 @@ INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8
     }
 }
 
-/* Opposite vertices of a quad are summed first: the mean then rounds alike on both sides. */
+/* Computes the mean over a face's vertices. Opposite vertices of a quad are summed first, so that the mean is rounded
+ * in the same way for both of its cells. */
 INLINE void face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
 {
     const int8_t *v = shape->face[f];
@@ -115,7 +116,7 @@ INLINE void face_mean(const wave_cell_shape *shape, int f, const real p[8][4], r
     }
 }
 
-/* Integrals over the cell's surface of u.n and of p n. */
+/* Computes the integrals of u.n and of p n over the cell's surface. */
 INLINE void integrate_faces(const cell_view *view, const real p[8][4], real integral[4])
 {
     for (int k = 0; k < 4; ++k) integral[k] = 0;
@@ -128,7 +129,7 @@ INLINE void integrate_faces(const cell_view *view, const real p[8][4], real inte
     }
 }
 
-/* Call pass(grid, shape, layers, step, cell) for every own cell, compiled for each shape. */
+/* Calls pass(grid, shape, layers, step, cell) for every own cell, with a constant shape. */
 #define FOR_EACH_CELL(grid, pass, layers, step)                                                                        \
     for (int32_t c = 0; c < (grid)->own_cells; ++c) {                                                                  \
         switch ((grid)->types ? (grid)->types[c] : (grid)->uniform_type) {                                             \
@@ -171,7 +172,7 @@ static void find_jumps(const wave_grid *grid, double time_step)
     }
 }
 
-/* One side of a face: the cell's jump over the face's mean, NULL beyond a wall, and its layer. */
+/* One side of a face: the cell's jump relative to the face's mean (NULL behind a wall), and its layer. */
 typedef struct face_side {
     const real *jump;
     int layer;
@@ -183,7 +184,7 @@ INLINE face_side side_of(const wave_grid *grid, int32_t cell)
                     : (face_side){(const real *)grid->jump + 4 * (int64_t)cell, grid->layers[cell]};
 }
 
-/* p* and u* of a face with normal n, whose two sides have the mean in common. */
+/* Computes p* and u* of a face with normal n. Both sides have the same mean. */
 INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
                           face_side near, face_side far, real star[2])
 {
@@ -191,7 +192,7 @@ INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, cons
     real za = layers->impedance[near.layer], pa = mean[0] + a[0];
     real ua = n[0] * (mean[1] + a[1]) + n[1] * (mean[2] + a[2]) + n[2] * (mean[3] + a[3]);
     if (!b) {
-        /* A rigid wall mirrors the state; behind an absorbing wall there is silence. */
+        /* A rigid wall reflects the wave; behind an absorbing wall the state is zero. */
         star[0] = grid->reflecting ? pa + za * ua : (pa + za * ua) * (real)0.5;
         star[1] = grid->reflecting ? 0 : star[0] * (2 * layers->inverse_sum[near.layer][near.layer]);
         return;

@@ -1,5 +1,5 @@
-/* The passes of a time step over a rank's arrays. wave_kernel.c is compiled once for each pair of float or double and
- * int32 or int64; each object exports one table of its passes. */
+/* The passes of a time step over a rank's arrays. wave_kernel.c is compiled once for each combination of float or
+ * double with int32 or int64; each object exports one table of its passes. */
 #ifndef WAVE_KERNEL_H
 #define WAVE_KERNEL_H
 
@@ -8,13 +8,15 @@
 
 #include "wave_medium.h"
 
-/* Component k of element i is values[i * stride + k * component_stride]: interleaved (AoS) or apart (SoA). */
+/* Component k of element i is values[i * stride + k * component_stride]: interleaved (AoS) or in separate arrays
+ * (SoA). */
 typedef struct wave_values {
     void *values;
     int64_t stride, component_stride;
 } wave_values;
 
-/* Arrays marked real are float or double, those marked index int32 or int64, as the table used wants them. */
+/* The arrays on which the passes work. Those marked "real" are float or double and those marked "index" are int32 or
+ * int64, depending on the table of passes. */
 typedef struct wave_grid {
     int32_t own_cells, own_vertices;
     uint8_t uniform_type;
@@ -25,27 +27,28 @@ typedef struct wave_grid {
     const int64_t *around_offsets;
     const int32_t *around;
     const uint8_t *walls;
-    const uint8_t *layers;      /* cells: layer of the medium */
-    const void *around_weights; /* real, as around: weight of each cell in the value at the vertex */
-    const void *faces;          /* real, own faces x 4: outward unit normal, area */
-    const void *inverse_volume; /* real, own_cells */
-    wave_values state;          /* cells: pressure, velocity */
-    wave_values vertex_state;   /* vertices: the same; values NULL for a scheme of first order */
-    wave_values coordinates;    /* vertices: x, y, z as drawn */
-    void *jump;                 /* real, cells x 4, interleaved: cell state less its mean over the cell's vertices */
+    const uint8_t *layers;      /* for each cell: layer of the medium */
+    const void *around_weights; /* real; for each entry of around: weight of the cell in the value at the vertex */
+    const void *faces;          /* real; for each own face: outward unit normal, area */
+    const void *inverse_volume; /* real; 1 / volume of each own cell */
+    wave_values state;          /* for each cell: pressure, velocity */
+    wave_values vertex_state;   /* for each vertex: pressure, velocity; values is NULL in the first-order scheme */
+    wave_values coordinates;    /* for each vertex: x, y, z, displaced if the drawing is */
+    void
+        *jump; /* real, interleaved; for each cell: 4 components of its state minus its mean over the cell's vertices */
     double modulus[WAVE_LAYERS_MAX], density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];
-    bool second_order; /* vertex_state is used to reconstruct */
-    bool reflecting;   /* walls; else absorbing */
+    bool second_order; /* vertex_state is used for the reconstruction */
+    bool reflecting;   /* walls reflect; otherwise they absorb */
 } wave_grid;
 
 typedef struct wave_kernel {
-    /* Computes vertex_state from the state of the cells around. */
+    /* Computes vertex_state from the states of the cells around each vertex. */
     void (*to_vertices)(const wave_grid *grid);
-    /* Computes the jumps of own cells, half a time step ahead. */
+    /* Computes the jumps of own cells at the middle of the time step. */
     void (*find_jumps)(const wave_grid *grid, double time_step);
-    /* Moves the state of own cells a time step ahead, by the jumps of all cells. */
+    /* Advances the state of own cells by a time step, from the jumps of all cells. */
     void (*apply_fluxes)(const wave_grid *grid, double time_step);
-    /* Moves the coordinates of own vertices by scale * their velocity. */
+    /* Adds scale * velocity to the coordinates of own vertices. */
     void (*move_vertices)(const wave_grid *grid, double scale);
 } wave_kernel;
 

@@ -1,5 +1,6 @@
-/* The mini-app: options, mesh, solver, and a loop that steps the wave and then the pictures. Every error that one rank
- * alone can meet (memory) is agreed on before the next collective call, so that all end together. */
+/* The mini-app reads the options, creates the mesh and the solver, and alternates between time steps of the wave and in
+ * situ pictures. Errors that may occur on a single rank (lack of memory) are agreed on before the next collective call,
+ * so that all ranks stop together. */
 #include <stdio.h>
 
 #include "wave_mesh_create.h"

@@ -1,5 +1,5 @@
-/* A small earthquake: the source is at depth under slower and lighter layers, so that the wave bends towards the
- * surface and each interface reflects a part of it. */
+/* A small earthquake: the source is below slower and lighter layers, so that the wave is refracted towards the surface
+ * and partially reflected at each interface. */
 #include "wave_medium.h"
 
 #include <math.h>
@@ -36,8 +36,8 @@ wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *
                           .strength = 1};
     int layer = wave_medium_layer(medium, source.position[2]);
     source.amplitude = 4 * pi * 0.5 / medium->density[layer];
-    /* The radius is a ninth of a wavelength where cells resolve that, and never less than a cube, so that sampling
-     * finds the ball. */
+    /* The radius is a ninth of a wavelength, but at least the edge of a cube, so that the ball contains cell
+     * centroids. */
     source.radius = fmax(medium->speed[layer] / source.frequency / 9, lattice->edge);
     return source;
 }

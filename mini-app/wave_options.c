@@ -1,4 +1,5 @@
-/* getopt_long() finds options and their values; each is a row of a table: a flag, or a reader of its value. */
+/* Options are parsed by getopt_long(). Each option is a row of a table, and is either a flag or has a function that
+ * reads its value. */
 #include "wave_options.h"
 
 #include <errno.h>
@@ -44,10 +45,10 @@ const char *wave_options_help(void)
 typedef struct option_row option_row;
 struct option_row {
     const char *name;
-    bool (*read)(const option_row *row, const char *value, void *field); /* NULL: a flag */
+    bool (*read)(const option_row *row, const char *value, void *field); /* NULL for a flag */
     size_t offset;
-    const char *expected; /* for messages; for a choice, its words divided by '|' */
-    const int *choice;    /* what each word stands for; NULL: 0, 1, 2, ... */
+    const char *expected; /* for messages; the words of a choice are separated by '|' */
+    const int *choice;    /* value of each word; NULL means 0, 1, 2, ... */
     double low, high;
 };
 
@@ -114,7 +115,7 @@ static bool read_text(const option_row *row, const char *value, void *field)
 static const int of_bytes[] = {4, 8};
 static const int of_order[] = {1, 2};
 
-/* Choices are stored through int pointers here; enums and bools are set from them afterwards. */
+/* The values as they are parsed. Choices are stored as int, and converted to enums and bools afterwards. */
 typedef struct raw_options {
     int cells, partition, real_bytes, index_bytes, apart, reflecting, order, at_vertices, steps, size[3];
     double jitter, swell;
@@ -147,7 +148,7 @@ static const option_row rows[] = {
 
 enum { ROW_COUNT = sizeof rows / sizeof *rows };
 
-/* getopt_long() returns i + 1 for row i, as it returns 0 for no row. */
+/* Fills getopt_long()'s table. Row i returns i + 1, because getopt_long() uses 0 for other purposes. */
 static void list_options(struct option list[ROW_COUNT + 1])
 {
     for (int i = 0; i < ROW_COUNT; ++i)
@@ -167,10 +168,10 @@ static bool read_option(const option_row *row, raw_options *raw, char *message, 
     return true;
 }
 
-/* Describes what is wrong with an option that getopt_long() rejects; optopt is its row, if known. */
+/* Writes a message about an option that getopt_long() rejects; optopt is the row plus 1 if the option is known. */
 static void tell_fault(int found, const char *argument, char *message, size_t size)
 {
-    if (optopt > ROW_COUNT) /* a letter of "-abc" */
+    if (optopt > ROW_COUNT) /* an unknown letter, as in "-abc" */
         snprintf(message, size, "-%c: no such option; --help lists them", optopt);
     else if (optopt < 1)
         snprintf(message, size, "%s: no such option; --help lists them", argument);
@@ -180,13 +181,13 @@ static void tell_fault(int found, const char *argument, char *message, size_t si
         snprintf(message, size, "--%s takes no value", rows[optopt - 1].name);
 }
 
-/* Reads the options. getopt_long() prints no messages, since each would come from every rank. */
+/* Parses the options. getopt_long() must not print messages, because every rank would print them. */
 static bool read_options(int argc, char **argv, raw_options *raw, char *message, size_t size)
 {
     struct option list[ROW_COUNT + 1];
     list_options(list);
     opterr = 0;
-    optind = 0; /* getopt_long() begins anew, even if it was used before */
+    optind = 0; /* resets getopt_long() in case it was used before */
     int found;
     while ((found = getopt_long(argc, argv, ":", list, NULL)) != -1) {
         if (found == ':' || found == '?') {

@@ -1,4 +1,4 @@
-/* The command line. */
+/* Parses the command line. */
 #ifndef WAVE_OPTIONS_H
 #define WAVE_OPTIONS_H
 
@@ -9,7 +9,7 @@ typedef struct wave_options {
     int size[3];
     int steps;
     int real_bytes, index_bytes;
-    bool apart; /* SoA */
+    bool apart; /* separate arrays for components (SoA) */
     wave_partition_kind partition;
     bool reflecting;
     int order;
@@ -18,12 +18,13 @@ typedef struct wave_options {
     double swell;
     bool ghosts;
     bool ids;
-    bool at_vertices;  /* pressure and velocity are handed over at vertices */
-    const char *scene; /* NULL: no pictures */
+    bool at_vertices;  /* pressure and velocity are passed as fields at vertices */
+    const char *scene; /* NULL if no pictures are drawn */
     bool help;
 } wave_options;
 
-/* Every rank has the same arguments, and so gets the same result. False with a message (one line, no newline). */
+/* Parses the arguments, which are the same on every rank, and so is the result. Returns false and a message (one line
+ * without newline) if an option is wrong. */
 bool wave_options_parse(int argc, char **argv, wave_options *options, char *message, int message_size);
 
 const char *wave_options_help(void);

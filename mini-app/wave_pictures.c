@@ -1,4 +1,4 @@
-/* Nothing is converted or copied: libinsitu reads the arrays that the solver computes on. */
+/* Nothing is converted or copied: libinsitu reads the arrays on which the solver computes. */
 #include "wave_pictures.h"
 
 #include <stdio.h>
@@ -7,7 +7,7 @@
 
 static const char mesh_name[] = "ground";
 
-/* Show a message on stderr the first time it comes. */
+/* Prints a message to stderr, unless it has been printed before. */
 static void show_once(wave_pictures *p, const char *what, const char *message)
 {
     uint64_t hash = 0;
@@ -129,7 +129,7 @@ void wave_pictures_steer(wave_pictures *p, wave_source *source)
     source->strength = 1;
     source->period = 0;
     if (!p->session) return;
-    insitu_parameter(p->session, "strength", &source->strength); /* stays 1 where the scene has none */
+    insitu_parameter(p->session, "strength", &source->strength); /* stays 1 if the scene has no such parameter */
     insitu_parameter(p->session, "period", &source->period);
 }
 

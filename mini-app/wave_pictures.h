@@ -1,4 +1,5 @@
-/* Hands the wave's arrays to libinsitu, and tells what it did. Read this part of the mini-app for an example. */
+/* Passes the wave's arrays to libinsitu and prints its messages. This part of the mini-app is an example for other
+ * codes. */
 #ifndef WAVE_PICTURES_H
 #define WAVE_PICTURES_H
 
@@ -10,30 +11,31 @@
 enum { WAVE_MESSAGES_MAX = 64 };
 
 typedef struct wave_pictures {
-    insitu_session *session; /* NULL: none wanted, or it could not be opened */
+    insitu_session *session; /* NULL if no pictures are drawn, or if the session could not be opened */
     const wave_options *options;
     const wave_mesh *mesh;
     const wave_solver *solver;
     int rank;
-    uint8_t *ghosts;   /* one a cell, where they are handed over */
-    bool handed_over;  /* the mesh has been handed over once */
-    int images;        /* drawn so far */
-    int message_count; /* errors and warnings shown so far, by hash */
+    uint8_t *ghosts;   /* one flag per cell; NULL unless ghost cells are passed */
+    bool handed_over;  /* the mesh has been passed once */
+    int images;        /* number of images drawn so far */
+    int message_count; /* number of errors and warnings printed so far, which are stored as hashes */
     uint64_t messages[WAVE_MESSAGES_MAX];
 } wave_pictures;
 
-/* Open a session. Without one the simulation runs all the same, and the reason has been shown. Collective. */
+/* Opens a session. If it cannot be opened, prints the reason; the simulation then runs without pictures. Collective. */
 void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, const wave_solver *solver, MPI_Comm comm,
                         wave_pictures *pictures);
 
-/* Take the source's strength and period from the scene's parameters; 1 and 0 (one pulse) where it has none. Local. */
+/* Sets the source's strength and period from the scene's parameters, or to 1 and 0 (a single pulse) if the scene has
+ * none. Local. */
 void wave_pictures_steer(wave_pictures *pictures, wave_source *source);
 
-/* Hand the arrays over and draw the images that are due. Returns this rank's report, all zero without a session.
+/* Passes the arrays and draws the images that are due. Returns this rank's report, which is zero without a session.
  * Collective. */
 insitu_report wave_pictures_step(wave_pictures *pictures, int64_t cycle, double time);
 
-/* Collective. */
+/* Closes the session. Collective. */
 void wave_pictures_close(wave_pictures *pictures);
 
 #endif

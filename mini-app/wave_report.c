@@ -1,5 +1,5 @@
-/* Each column shows the slowest or largest rank, so the phases of one line may come from different ranks and need not
- * add up to the whole. */
+/* Each column shows the maximum over all ranks. The times in a line may therefore belong to different ranks, and need
+ * not add up to the total. */
 #include "wave_report.h"
 
 #include <stdio.h>
@@ -63,8 +63,8 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
     fflush(stdout);
 }
 
-/* Cut text at the end of the YAML scalar that it begins with: at its closing quote, or before a comma, a blank or a
- * closing brace that it did not open itself (as "{cycle}" does). */
+/* Terminates the text behind its leading YAML scalar: at the closing quote, or before a comma, a blank or a closing
+ * brace that was not opened in the scalar ("{cycle}" contains both braces). */
 static void cut_scalar(char *text)
 {
     char quote = *text == '"' || *text == '\'' ? *text : 0;
@@ -78,8 +78,8 @@ static void cut_scalar(char *text)
     *text = 0;
 }
 
-/* Shows the scene's output paths and databases as they are written there, since the public functions do not tell where
- * pictures go. A camera's path is a list, and not shown. */
+/* Prints the output paths and databases as they are written in the scene, because libinsitu's public functions do not
+ * return them. A camera's path is a list and is not printed. */
 static void show_paths(const char *scene)
 {
     char line[1024];

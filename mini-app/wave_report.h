@@ -1,4 +1,4 @@
-/* A line per step and a summary, on rank 0's stdout. */
+/* Prints a line per step and a summary to rank 0's stdout. */
 #ifndef WAVE_REPORT_H
 #define WAVE_REPORT_H
 
@@ -10,20 +10,20 @@
 typedef struct wave_report {
     MPI_Comm comm;
     int rank;
-    double memory_before;            /* bytes resident before libinsitu was opened, on this rank */
-    double simulation_ms, insitu_ms; /* so far, the slowest rank of each step */
-    double bytes_peak, bytes_grown;  /* the most so far, of any rank */
+    double memory_before;            /* this rank's resident memory in bytes before libinsitu was opened */
+    double simulation_ms, insitu_ms; /* sums so far; each step counts the slowest rank */
+    double bytes_peak, bytes_grown;  /* maximum so far over all ranks */
 } wave_report;
 
-/* Collective; prints what is about to run. */
+/* Prints what will run. Collective. */
 void wave_report_begin(MPI_Comm comm, const wave_options *options, const wave_mesh *mesh, const wave_solver *solver,
                        wave_report *report);
 
-/* One step: the worst of all ranks in each column. Collective. */
+/* Prints the line of one step, with the maximum over all ranks in each column. Collective. */
 void wave_report_step(wave_report *report, int64_t cycle, double time, double simulation_ms, double insitu_ms,
                       const insitu_report *insitu);
 
-/* Collective. images < 0: there was no session. */
+/* Prints the summary. images < 0 means that there was no session. Collective. */
 void wave_report_end(const wave_report *report, const wave_options *options, const wave_solver *solver, int images);
 
 #endif

@@ -1,6 +1,6 @@
-/* A step computes jumps of own cells and exchanges them, applies fluxes and source, exchanges states, and updates
- * vertices. It computes on the mesh at rest, by the equations of small displacements. Where vertices move, only the
- * drawing does: each moves with the velocity there, exaggerated, as the ground does in an earthquake. */
+/* A step computes the jumps of own cells and exchanges them, applies fluxes and the source, exchanges states, and
+ * updates vertices. The computation uses the mesh at rest and the equations of small displacements. If vertices move,
+ * only the drawn mesh does: each vertex moves with its velocity, exaggerated, as the ground does in an earthquake. */
 #include "wave_solver.h"
 
 #include <math.h>
@@ -100,7 +100,7 @@ static void measure(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out
     wave_cell_measure(shape, (const double(*)[3])position, id, out);
 }
 
-/* Stores the faces and volume of an own cell; returns the time step that it allows. */
+/* Stores the faces and volume of an own cell; returns the largest stable time step for it. */
 static double measure_own(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
 {
     int bytes = s->setup.real_bytes, count = wave_cell_shape_of(wave_mesh_type(s->mesh, cell))->face_count;

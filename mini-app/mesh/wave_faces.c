@@ -1,13 +1,14 @@
-/* Finds the cell beyond each face. Faces are hashed by their vertex ids, and every face of an own cell must have
- * exactly one other cell, or lie on a wall of the box. The table holds (cell, face) of faces seen once. The second cell
- * is joined to the first, and the entry stays, marked, so that a third is noticed. */
+/* Finds the neighbour across each face. Faces are hashed by their vertex ids. Every face of an own cell must be shared
+ * with exactly one other cell, or lie on a wall of the box. The table stores the first cell and face of each key. When
+ * the second cell is found, the two become neighbours; the entry remains and is marked, so that a third cell with the
+ * same face is detected. */
 #include "wave_faces.h"
 
 #include <stdlib.h>
 
 typedef struct face_entry {
     uint64_t hash;
-    int32_t cell; /* -1: free */
+    int32_t cell; /* -1 if the entry is free */
     int8_t face, met;
 } face_entry;
 
@@ -17,7 +18,7 @@ typedef struct face_table {
     int64_t mask;
 } face_table;
 
-/* The vertex ids of a face, rising; -1 first for a triangle. */
+/* Computes the key of a face: its vertex ids in ascending order, with -1 in front for a triangle. */
 static void face_key(const wave_mesh *mesh, int32_t cell, int face, int64_t key[4])
 {
     int32_t v[8];
@@ -48,7 +49,7 @@ static bool same_key(const face_table *table, const face_entry *entry, const int
     return true;
 }
 
-/* The entry of this key, or the free one where it belongs. */
+/* Returns the entry with this key, or the free entry in which to store it. */
 static face_entry *find_entry(const face_table *table, const int64_t key[4], uint64_t hash)
 {
     for (int64_t at = (int64_t)hash & table->mask;; at = (at + 1) & table->mask) {
@@ -57,7 +58,7 @@ static face_entry *find_entry(const face_table *table, const int64_t key[4], uin
     }
 }
 
-/* Tells whether all vertices of the face lie on one side of the lattice. */
+/* Checks whether all vertices of the face lie on the same wall of the box. */
 static bool on_a_wall(const wave_mesh *mesh, int32_t cell, int face)
 {
     const wave_lattice *lattice = &mesh->partition.lattice;
@@ -90,7 +91,7 @@ static void meet_faces(wave_mesh *mesh, face_table *table, int32_t cell)
         uint64_t hash = key_hash(key);
         face_entry *e = find_entry(table, key, hash);
         if (e->cell < 0) {
-            /* Only own cells' faces are looked for; they all come before the halo's. */
+            /* Only faces of own cells are stored; own cells precede halo cells. */
             if (cell < mesh->own_cells) *e = (face_entry){hash, cell, (int8_t)f, 0};
         } else if (e->met++) {
             mesh->unmatched++;
@@ -106,7 +107,7 @@ static void count_unmatched(wave_mesh *mesh)
         int64_t first = wave_mesh_first_face(mesh, c);
         int faces = wave_cell_shape_of(wave_mesh_type(mesh, c))->face_count;
         for (int f = 0; f < faces; ++f) {
-            /* A face has a cell beyond it exactly when it is not on a wall. */
+            /* A face must have a neighbour if and only if it is not on a wall. */
             mesh->unmatched += (mesh->neighbours[first + f] < 0) != on_a_wall(mesh, c, f);
         }
     }

@@ -1,6 +1,7 @@
-/* Quads are bilinear patches. Their area vector is half the cross product of the diagonals, whatever the warp. Their
- * part of a volume is the mean over the two ways to split them into triangles, which is exact for the patch. So the
- * volumes of cells that share faces add up to the box, and the areas around a cell to zero. */
+/* Quads are bilinear patches. Their area vector is half the cross product of the diagonals, even if they are warped.
+ * Their contribution to a volume is the mean over the two ways to split them into triangles, which is exact for the
+ * patch. Therefore the volumes of all cells add up to that of the box, and the area vectors of a cell add up to
+ * zero. */
 #include "wave_geometry.h"
 
 static void difference(const double a[3], const double b[3], double out[3])
@@ -36,7 +37,7 @@ static void face_area(const double p[4][3], int size, double area[3])
     for (int i = 0; i < 3; ++i) area[i] *= 0.5;
 }
 
-/* Returns the volume of the cone from the origin to the face. */
+/* Returns the volume of the pyramid between the origin and the face. */
 static double face_volume(const double p[4][3], int size)
 {
     if (size == 3) return determinant(p[0], p[1], p[2]) / 6;
@@ -45,7 +46,8 @@ static double face_volume(const double p[4][3], int size)
            12;
 }
 
-/* Gets a face's vertices relative to origin, from the one of least id on, so that its two cells round alike. */
+/* Computes a face's vertices relative to origin, beginning with the vertex with the smallest id, so that rounding is
+ * the same for both of its cells. */
 static void face_points(const wave_cell_shape *shape, int face, const double position[8][3], const int64_t id[8],
                         const double origin[3], double p[4][3])
 {

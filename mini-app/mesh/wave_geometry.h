@@ -1,4 +1,4 @@
-/* Volumes, centroids and face areas of cells, in double. */
+/* Computes volumes, centroids and face areas of cells in double precision. */
 #ifndef WAVE_GEOMETRY_H
 #define WAVE_GEOMETRY_H
 
@@ -7,10 +7,10 @@
 typedef struct wave_cell_geometry {
     double volume;
     double centroid[3];
-    double area[6][3]; /* outward area vectors; exactly opposite seen from the two cells of a face */
+    double area[6][3]; /* outward area vectors; those of the two cells of a face are exactly opposite */
 } wave_cell_geometry;
 
-/* position and id are those of the shape's vertices; ids are the same on every rank. */
+/* Measures a cell. position and id are those of the shape's vertices; ids must be the same on every rank. */
 void wave_cell_measure(const wave_cell_shape *shape, const double position[8][3], const int64_t id[8],
                        wave_cell_geometry *out);
 

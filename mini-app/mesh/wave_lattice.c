@@ -1,14 +1,13 @@
-/* Cubes are cut so that the cells of neighbours always share whole faces:
+/* Cubes are split so that the cells of neighbouring cubes always share whole faces:
  *
- *   tets      six around the diagonal 000-111 (Kuhn): every face of the cube is split from its least to its greatest
- *             corner
- *   hex       one: no face is split
- *   wedges    two, extruded along z: the z faces are split as Kuhn's are, the x and y faces are whole
- *   pyramids  six around a vertex in the centre. A face that a neighbour wants split becomes two tets with that
- *             diagonal instead: these cubes are the transition between all others.
+ *   tets      six around the diagonal 000-111 (Kuhn): every face of the cube is split along the diagonal from its
+ * lowest to its highest corner hex       one: no face is split wedges    two, extruded along z: the z faces are split
+ * as Kuhn's are, the x and y faces are not split pyramids  six around a vertex in the centre. A face that must be split
+ * for the neighbour becomes two tets instead: these cubes are the transition between all other kinds.
  *
- * Mixed, from below: hexes, one layer of pyramid cubes, tets, wedges (their z faces meet split as both want), another
- * layer of pyramid cubes, hexes; a third of the hexes are pyramid cubes too. */
+ * A mixed lattice contains, from below: hexes, one layer of pyramid cubes, tets, wedges (both need the same split of
+ * the z faces between them), another layer of pyramid cubes, and hexes. A third of the hexes are replaced by pyramid
+ * cubes. */
 #include "wave_lattice.h"
 
 #include <stddef.h>
@@ -16,7 +15,7 @@
 static const int8_t corner_offset[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                            {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* The faces of a cube, outward, with the axis and side that each lies on. */
+/* The outward faces of a cube, each with its axis and side. */
 static const struct {
     int8_t corner[4];
     int8_t axis, step;
@@ -96,7 +95,7 @@ static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3],
 
 static int cut_tets(const int64_t v[8], wave_cell *cells)
 {
-    /* Each path goes from corner 0 to corner 6 along the axes, in one of six orders; odd orders are mirrored. */
+    /* Each path leads from corner 0 to corner 6 along the axes, in one of six orders; odd orders are mirrored. */
     static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
     for (int t = 0; t < 6; ++t) {
         cells[t] = (wave_cell){WAVE_TYPE_TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};
@@ -116,7 +115,7 @@ static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int
 {
     int count = 0;
     for (int f = 0; f < 6; ++f) {
-        /* The table's faces begin at their least or greatest corner or at neither; the ids tell which. */
+        /* The diagonal must begin at the corner with the smallest id, which differs between the faces of the table. */
         int64_t q[4];
         int least = 0;
         for (int i = 0; i < 4; ++i) {

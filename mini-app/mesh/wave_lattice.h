@@ -1,6 +1,6 @@
-/* The lattice of cubes that the mesh is cut from. It is index arithmetic alone: nothing is stored per cube, so that any
- * rank can make any part of the mesh. Cube (i, j, k) has id i + nx (j + ny k); i, j, k go along x, y, z. z = 0 is the
- * surface of the ground, z falls with depth; x and y are centred on 0. */
+/* The lattice of cubes from which the mesh is made. It uses only index arithmetic and stores nothing per cube, so that
+ * any rank can compute any part of the mesh. Cube (i, j, k) has the id i + nx (j + ny k), where i, j, k are along x, y,
+ * z. The surface of the ground is at z = 0, and z decreases with depth; x and y are centred on 0. */
 #ifndef WAVE_LATTICE_H
 #define WAVE_LATTICE_H
 
@@ -12,18 +12,20 @@
 typedef enum wave_cells { WAVE_TETS, WAVE_HEXES, WAVE_WEDGES, WAVE_PYRAMIDS, WAVE_MIXED } wave_cells;
 
 typedef struct wave_lattice {
-    int size[3];      /* cubes along x, y, z; each >= 1 */
-    wave_cells cells; /* what the cubes are cut into */
-    double jitter;    /* inner vertices move by up to this times the edge, per axis; 0 .. 0.3 */
-    double edge;      /* edge of a cube; the longest side of the box is 2 */
-    double origin[3]; /* the corner of least x, y, z */
+    int size[3];      /* number of cubes along x, y, z; each at least 1 */
+    wave_cells cells; /* kind of cells into which cubes are split */
+    double jitter;    /* maximum displacement of inner vertices along each axis, relative to the edge; 0 to 0.3 */
+    double edge;      /* edge length of a cube; the longest side of the box is 2 */
+    double origin[3]; /* corner with the smallest x, y, z */
 } wave_lattice;
 
-enum { WAVE_CELLS_PER_CUBE = 12 }; /* the most there are: cell ids are cube id * 12 + number in the cube */
+enum {
+    WAVE_CELLS_PER_CUBE = 12
+}; /* maximum number of cells per cube; a cell's id is cube id * 12 + index in the cube */
 
 typedef struct wave_cell {
-    uint8_t type;      /* WAVE_TYPE_* */
-    int64_t vertex[8]; /* ids: of lattice vertices, then of cube centres */
+    uint8_t type;      /* one of WAVE_TYPE_* */
+    int64_t vertex[8]; /* ids; those of lattice vertices come before those of cube centres */
 } wave_cell;
 
 wave_lattice wave_lattice_make(const int size[3], wave_cells cells, double jitter);
@@ -33,20 +35,20 @@ int64_t wave_lattice_cube(const wave_lattice *lattice, const int ijk[3]);
 void wave_lattice_cube_ijk(const wave_lattice *lattice, int64_t cube, int ijk[3]);
 bool wave_lattice_holds(const wave_lattice *lattice, const int ijk[3]);
 
-/* The cells of a cube, in an order that depends on the cube alone. Returns their number. */
+/* Computes the cells of a cube, in an order that depends only on the cube. Returns their number. */
 int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cells[WAVE_CELLS_PER_CUBE]);
 
-/* The type of all cells, or 0 where they are mixed. */
+/* Returns the type of all cells, or 0 if they are mixed. */
 uint8_t wave_lattice_uniform_type(const wave_lattice *lattice);
 
-/* Finds a vertex's place in the lattice. Returns false, and the cube's ijk, for a vertex at a cube's centre. */
+/* Computes the indices of a vertex. For a vertex at the centre of a cube, returns false and the cube's indices. */
 bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ijk[3]);
 void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz[3]);
 
-/* Bits 1, 2, 4: the vertex lies on a wall across x, y, z. */
+/* Returns the walls on which the vertex lies: bit 1, 2 or 4 for a wall perpendicular to x, y or z. */
 uint8_t wave_lattice_walls(const wave_lattice *lattice, int64_t vertex);
 
-/* A fixed hash of 64 bits (the finalizer of splitmix64). */
+/* Returns a 64-bit hash (the finalizer of splitmix64). */
 static inline uint64_t wave_hash(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;

@@ -1,4 +1,5 @@
-/* The mesh is made from ids that any rank can compute; the solver's arrays need small local numbers. */
+/* The mesh is computed from global ids, which are the same on every rank; the solver's arrays need small local
+ * indices. */
 #include "wave_map.h"
 
 #include <stdlib.h>

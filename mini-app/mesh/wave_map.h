@@ -1,4 +1,4 @@
-/* A map from ids (>= 0) to local numbers: open addressing, grown at two thirds. */
+/* A hash map from ids (>= 0) to local indices. It uses open addressing, and grows when it is two thirds full. */
 #ifndef WAVE_MAP_H
 #define WAVE_MAP_H
 
@@ -6,15 +6,16 @@
 #include <stdint.h>
 
 typedef struct wave_map {
-    int64_t *keys; /* -1: free */
+    int64_t *keys; /* -1 if the entry is free */
     int32_t *values;
     int64_t capacity, count;
 } wave_map;
 
-/* Value of key, or -1. */
+/* Returns the value of the key, or -1 if it is not in the map. */
 int32_t wave_map_find(const wave_map *map, int64_t key);
 
-/* Value of key; where it had none, this value is put there. -1 where memory ran out. */
+/* Returns the value of the key. A key that is not in the map is inserted with this value. Returns -1 if memory ran
+ * out. */
 int32_t wave_map_insert(wave_map *map, int64_t key, int32_t value);
 
 void wave_map_free(wave_map *map);

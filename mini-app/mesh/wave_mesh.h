@@ -1,6 +1,6 @@
-/* One rank's part of the mesh: its own cells, and then the halo, which is the cells of other ranks that share a vertex
- * with one of its own. Everything follows from the partition by index arithmetic, so both sides of every exchange make
- * the same lists without talking to each other. */
+/* One rank's part of the mesh: its own cells, followed by the halo, which consists of the cells of other ranks that
+ * share a vertex with one of its own. Everything is computed from the partition by index arithmetic, so both sides of
+ * every exchange compute the same lists without communication. */
 #ifndef WAVE_MESH_H
 #define WAVE_MESH_H
 
@@ -9,36 +9,37 @@
 #include "wave_map.h"
 #include "wave_partition.h"
 
-/* Cells exchanged with one other rank. */
+/* The cells that are exchanged with one other rank. */
 typedef struct wave_link {
     int rank;
-    int32_t send_begin, send_end;       /* the part of wave_mesh.sends */
-    int32_t receive_begin, receive_end; /* halo cells */
+    int32_t send_begin, send_end;       /* range in wave_mesh.sends */
+    int32_t receive_begin, receive_end; /* range of halo cells */
 } wave_link;
 
 typedef struct wave_mesh {
     wave_partition partition;
     int rank;
-    int32_t own_cells, cells;       /* own ones first; cells counts the halo too */
-    int32_t own_vertices, vertices; /* own cells' first, then those of halo cells alone */
-    int64_t *cell_ids;              /* cells */
-    int64_t *vertex_ids;            /* vertices */
-    uint8_t *walls;                 /* vertices: wave_lattice_walls() */
-    uint8_t uniform_type;           /* 0: mixed */
-    uint8_t *types;                 /* cells; NULL where uniform */
-    int index_bytes;                /* 4 or 8: of connectivity and offsets */
-    void *connectivity;             /* the cells' vertices, one cell after the other */
-    void *offsets;                  /* cells + 1; NULL where uniform */
+    int32_t own_cells, cells;       /* own cells come first; cells includes the halo */
+    int32_t own_vertices, vertices; /* vertices of own cells come first, then those that only halo cells use */
+    int64_t *cell_ids;              /* global id of each cell */
+    int64_t *vertex_ids;            /* global id of each vertex */
+    uint8_t *walls;                 /* for each vertex: wave_lattice_walls() */
+    uint8_t uniform_type;           /* type of all cells; 0 if they are mixed */
+    uint8_t *types;                 /* type of each cell; NULL if uniform */
+    int index_bytes;                /* size of the integers in connectivity and offsets: 4 or 8 */
+    void *connectivity;             /* vertices of all cells, cell by cell */
+    void *offsets;                  /* cells + 1 entries; NULL if uniform */
     int64_t connectivity_count;
-    int64_t *face_offsets; /* own_cells + 1; NULL where uniform: faces of a cell are those of its shape, in order */
-    int32_t *neighbours;   /* for each face of each own cell, the cell beyond, or -1 at a wall */
-    int64_t face_count;    /* the faces of own cells, each cell counting its own */
-    int64_t unmatched;     /* faces of own cells that lack their other cell, or have two: 0 for a mesh that conforms */
-    int64_t *around_offsets; /* own_vertices + 1 */
-    int32_t *around;         /* the cells around each vertex of an own cell, by rising cell id */
+    int64_t
+        *face_offsets;   /* own_cells + 1 entries; NULL if uniform. The faces of a cell are in the order of its shape */
+    int32_t *neighbours; /* for each face of each own cell: the neighbour across it, or -1 at a wall */
+    int64_t face_count;  /* number of faces of own cells; a face between two of them counts twice */
+    int64_t unmatched;   /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
+    int64_t *around_offsets; /* own_vertices + 1 entries */
+    int32_t *around;         /* cells around each vertex of an own cell, in ascending order of cell id */
     int link_count;
-    wave_link *links; /* by rising rank */
-    int32_t *sends;   /* own cells */
+    wave_link *links; /* in ascending order of rank */
+    int32_t *sends;   /* own cells to send, link by link */
     int32_t send_count;
 } wave_mesh;
 
@@ -54,10 +55,10 @@ static inline int64_t wave_mesh_index(const wave_mesh *mesh, const void *array, 
     return mesh->index_bytes == 8 ? ((const int64_t *)array)[at] : ((const int32_t *)array)[at];
 }
 
-/* The local vertices of a cell; returns its shape. */
+/* Returns the shape of a cell, and its vertices as local indices. */
 const wave_cell_shape *wave_mesh_cell(const wave_mesh *mesh, int32_t cell, int32_t vertex[8]);
 
-/* Where the faces of an own cell begin in neighbours. */
+/* Returns the index in neighbours of an own cell's first face. */
 static inline int64_t wave_mesh_first_face(const wave_mesh *mesh, int32_t cell)
 {
     if (mesh->face_offsets) return mesh->face_offsets[cell];

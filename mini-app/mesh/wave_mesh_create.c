@@ -1,12 +1,12 @@
-/* Makes one rank's part.
+/* Creates one rank's part of the mesh.
  *
- *     own cubes ──> own cells ──> own vertices          (by rising cube id)
+ *     own cubes ──> own cells ──> own vertices          (in ascending order of cube id)
  *     the 26 cubes around each ──> foreign cubes, by (owner, cube) ──> those of their cells that touch an own vertex
- *     own cells with a corner that a foreign cube has too ──> sends to its owner, by (owner, cell)
+ *     own cells that share a corner with a foreign cube ──> sends to its owner, by (owner, cell)
  *
- * Every corner of a cube is a vertex of one of its cells, whatever they are, so "shares a corner with a cube of rank B"
- * is "shares a vertex with a cell of rank B", and A's list of sends to B is B's list of receives from A, in the same
- * order of cell ids. */
+ * Every corner of a cube is a vertex of one of its cells, whatever their type. Sharing a corner with a cube of rank B
+ * is therefore the same as sharing a vertex with a cell of rank B. A's list of sends to B equals B's list of receives
+ * from A, in the same order of cell ids. */
 #include "wave_mesh_create.h"
 
 #include <stdlib.h>
@@ -79,7 +79,8 @@ static bool find_own_cubes(maker *m)
     return true;
 }
 
-/* The owners of a cube and of the 26 around it, -1 outside the lattice. True where any is another rank. */
+/* Computes the owners of a cube and of the 26 cubes around it, -1 outside the lattice. Returns true if any of them is
+ * another rank. */
 static bool owners_around(const wave_mesh *mesh, int64_t cube, int owner[3][3][3])
 {
     const wave_lattice *lattice = &mesh->partition.lattice;
@@ -109,7 +110,8 @@ static bool add_foreign_cubes(maker *m, int64_t cube, int owner[3][3][3])
     return true;
 }
 
-/* Add a send, unless there is one of this cell to the rank; this cell's are the last ones in the list. */
+/* Adds a send of the cell to the rank, unless the list contains it. Earlier sends of the same cell are at the end of
+ * the list. */
 static bool add_send(maker *m, int rank, int32_t cell)
 {
     for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
@@ -118,7 +120,7 @@ static bool add_send(maker *m, int rank, int32_t cell)
     return list_add(&m->sends, rank, cell);
 }
 
-/* Every rank with a cube at one of the cell's lattice vertices needs the cell. */
+/* Adds a send to every rank that has a cube at one of the cell's lattice vertices. */
 static bool add_sends(maker *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;
@@ -286,7 +288,7 @@ static void sort_by_id(const wave_mesh *mesh, int32_t *cells, int64_t count)
     }
 }
 
-/* Lists the cells around the own vertices. Each vertex's are sorted by cell id, so that sums over them round alike on
+/* Lists the cells around each own vertex, sorted by cell id, so that sums over them are rounded in the same way on
  * every rank that has the vertex. */
 static bool make_around(wave_mesh *mesh)
 {

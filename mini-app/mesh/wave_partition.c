@@ -1,5 +1,6 @@
-/* Partitions. The width of a lattice is rarely a power of two, so a cube's place on the Morton curve is not its Morton
- * code, but the number of the lattice's cubes before it, counted octant by octant from the top. */
+/* Partitions of the lattice. The width of a lattice is rarely a power of two. The position of a cube on the Morton
+ * curve is therefore not its Morton code but the number of cubes of the lattice that precede it; this number is counted
+ * octant by octant, from the largest down. */
 #include "wave_partition.h"
 
 static double block_surface(const wave_lattice *lattice, const int blocks[3])
@@ -9,7 +10,7 @@ static double block_surface(const wave_lattice *lattice, const int blocks[3])
     return s[0] * s[1] + s[1] * s[2] + s[2] * s[0];
 }
 
-/* Chooses the factors of ranks that leave the least surface between blocks. */
+/* Chooses the factors of the number of ranks for which the surface between blocks is smallest. */
 static void choose_blocks(const wave_lattice *lattice, int ranks, int best[3])
 {
     best[0] = ranks;
@@ -32,7 +33,7 @@ wave_partition wave_partition_make(const wave_lattice *lattice, wave_partition_k
     return partition;
 }
 
-/* Counts the cubes of the lattice in the box of this edge at low. */
+/* Returns the number of cubes of the lattice in the box that begins at low and has this edge length. */
 static int64_t cubes_within(const wave_lattice *lattice, const int low[3], int edge)
 {
     int64_t count = 1;
@@ -69,7 +70,7 @@ int wave_partition_owner(const wave_partition *partition, const int ijk[3])
     int64_t ranks = partition->ranks;
     switch (partition->kind) {
     case WAVE_MORTON: {
-        /* position * ranks stays far below 2^63: at most 2^40 cubes and 2^20 ranks */
+        /* position * ranks is far below 2^63: there are at most 2^40 cubes and 2^20 ranks */
         return (int)(morton_position(lattice, ijk) * ranks / wave_lattice_cube_count(lattice));
     }
     case WAVE_RANDOM: return (int)(wave_hash((uint64_t)wave_lattice_cube(lattice, ijk)) % (uint64_t)ranks);
@@ -87,7 +88,7 @@ void wave_partition_box(const wave_partition *partition, int rank, int low[3], i
     for (int a = 0; a < 3; ++a) {
         int64_t size = partition->lattice.size[a], blocks = partition->blocks[a], block = at % blocks;
         at /= (int)blocks;
-        /* i * blocks / size == block, for the least and past the greatest i; all of it when blocks is 1 */
+        /* low is the smallest i for which i * blocks / size == block, and high is one more than the largest. */
         low[a] = (int)((block * size + blocks - 1) / blocks);
         high[a] = (int)(((block + 1) * size + blocks - 1) / blocks);
     }

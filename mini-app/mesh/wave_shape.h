@@ -1,4 +1,4 @@
-/* The four cell types: VTK's ids and vertex orders. The tables stand in the header so that loops over a cell's faces
+/* The four cell types, with VTK's ids and vertex orders. The tables are in the header so that loops over a cell's faces
  * can be compiled for each type. */
 #ifndef WAVE_SHAPE_H
 #define WAVE_SHAPE_H
@@ -8,12 +8,12 @@
 
 enum { WAVE_TYPE_TET = 10, WAVE_TYPE_HEX = 12, WAVE_TYPE_WEDGE = 13, WAVE_TYPE_PYRAMID = 14 };
 
-/* Vertices and faces of a cell type. Faces are listed outward for cells of positive volume. */
+/* The vertices and faces of a cell type. The faces are oriented outward for cells of positive volume. */
 typedef struct wave_cell_shape {
     int vertex_count, face_count;
-    int face_size[6];  /* 3 or 4 */
-    int8_t face[6][4]; /* the cell's vertices around each face */
-    double centre[8];  /* weights of the vertices in the centroid: exact for affine images of the regular cell */
+    int face_size[6];  /* number of vertices of each face: 3 or 4 */
+    int8_t face[6][4]; /* indices of the cell's vertices around each face */
+    double centre[8];  /* weight of each vertex in the centroid, which is exact for affine images of the regular cell */
 } wave_cell_shape;
 
 static const wave_cell_shape wave_tet_shape = {
@@ -35,7 +35,7 @@ static const wave_cell_shape wave_pyramid_shape = {5,
                                                    {{0, 3, 2, 1}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}},
                                                    {0.1875, 0.1875, 0.1875, 0.1875, 0.25}};
 
-/* NULL for a type that is none of the four. */
+/* Returns NULL for any other type. */
 static inline const wave_cell_shape *wave_cell_shape_of(int type)
 {
     switch (type) {

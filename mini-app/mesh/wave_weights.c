@@ -1,6 +1,7 @@
-/* Least squares: value(x) = mean + g.(x - m), m the mean of the centroids r_i, g = M^-1 sum (r_i - m) f_i with
- * M = sum (r_i - m)(r_i - m)^T. So weight i at the vertex v is 1/n + (v - m).M^-1 (r_i - m). M is singular when the
- * cells do not span space; a trace's 1e-9 on its diagonal then leaves those directions without slope. */
+/* Least squares: value(x) = mean + g.(x - m), where m is the mean of the centroids r_i, and g = M^-1 sum (r_i - m) f_i
+ * with M = sum (r_i - m)(r_i - m)^T. The weight of cell i at the vertex v is therefore 1/n + (v - m).M^-1 (r_i - m). M
+ * is singular if the centroids do not span space. To regularize it, 1e-9 of its trace is added to the diagonal, which
+ * makes the slope zero in the undetermined directions. */
 #include "wave_weights.h"
 
 static void solve_symmetric(const double m[3][3], const double b[3], double x[3])
