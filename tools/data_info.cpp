@@ -1,5 +1,5 @@
-/* Counts and ranges are taken over all leaves of a composite, so that a field of every block is one line. Values in
- * hidden cells are often junk, so they do not count. */
+/* Counts and ranges cover all leaves of a composite, so that a field of several blocks is printed as one line. Values
+ * in hidden cells are often meaningless and do not count. */
 #include "data_info.h"
 
 #include <algorithm>
@@ -34,17 +34,17 @@ struct field_info {
     int components = 1;
     int leaves = 0;
     bool is_finite = true;
-    std::vector<std::pair<double, double>> ranges; // of each component, then of the magnitude
+    std::vector<std::pair<double, double>> ranges; // range of each component, then of the magnitude
 };
 
 struct data_summary {
-    std::map<int, int64_t> cells; // that are shown, by type
+    std::map<int, int64_t> cells; // number of visible cells by type
     int64_t hidden_cells = 0;
     int64_t points = 0;
     int leaves = 0;
     std::string point_type;
     vtkBoundingBox bounds;
-    std::map<std::string, field_info> fields[2]; // of the points, of the cells
+    std::map<std::string, field_info> fields[2]; // of points; of cells
 };
 
 void add_value(std::pair<double, double> &range, double value, bool &is_finite)
@@ -57,7 +57,7 @@ void add_value(std::pair<double, double> &range, double value, bool &is_finite)
     range.second = std::max(range.second, value);
 }
 
-/* The cells of a grid that are shown, and their points; both empty where all are. */
+/* Flags of the visible cells of a grid and of their points. Both are empty if all are visible. */
 struct selection {
     std::vector<bool> cells, points;
 };
@@ -159,7 +159,7 @@ data_summary summarize(vtkDataObject *data)
     return all;
 }
 
-/* The name "QuadraticTetra" for "vtkQuadraticTetra". VTK 9.1 names types from 60 on as others. */
+/* Converts "vtkQuadraticTetra" to "QuadraticTetra". VTK 9.1 has wrong class names for types from 60 on. */
 std::string cell_name(int type)
 {
     static const char *const orders[] = {"Lagrange", "Bezier"};

@@ -1,4 +1,4 @@
-/* Describes a file's content for a person: insitu-render --info. */
+/* Prints a summary of a file's contents, for insitu-render --info. */
 #ifndef DATA_INFO_H
 #define DATA_INFO_H
 
@@ -10,23 +10,22 @@ class vtkDataObject;
 namespace render_tool
 {
 
-/* Print the cells by type, bounds, fields with centring, type, components and ranges, and times to stdout, after a line
- * that begins with title. data has unstructured grids only (grids_of.h). Cells that are not drawn, being hidden or
- * ghosts, have a line of their own; they, and points that no other cell has, do not count otherwise. */
+/* Prints the number of cells by type, bounds, fields (centring, type, components, ranges) and times to stdout, after a
+ * line that begins with title. data must contain only unstructured grids (grids_of.h). Cells that are not drawn (hidden
+ * or ghosts) are counted on a line of their own; they, and points that only they use, are otherwise ignored. */
 void print_info(const std::string &title, vtkDataObject *data, const std::vector<double> &times);
 
-/* What a series spans: the bounds of its points, and the least and greatest value of a field, a vector's by magnitude.
- * Empty where the first number is greater than the second. */
+/* The extent of a series: the bounds of its points, and the smallest and largest value of a field (the magnitude of a
+ * vector). It is empty if low is greater than high. */
 struct data_extent {
-    double low[4], high[4]; // x, y, z, the field
+    double low[4], high[4]; // x, y, z, field value
 
     data_extent();
     bool has_bounds() const { return low[0] <= high[0]; }
     bool has_range() const { return low[3] < high[3]; }
 };
 
-/* Widens the extent by data, of which hidden cells do not count. Without a field of the name at points, that of the
- * cells counts. */
+/* Extends the extent by the visible cells of data. If there is no point field of this name, the cell field is used. */
 void add_extent(vtkDataObject *data, const std::string &field, data_extent &extent);
 
 } // namespace render_tool

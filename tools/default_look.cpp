@@ -1,7 +1,7 @@
-/* How much the outside shows is measured on the faces that look towards the eye, each by the area that is seen of it:
- * between the values that 5 and 95 hundredths of that area lie below, as a share of the field's whole range. Grids of
- * which one would draw the inside have 0.07 to 0.32 of it (a heated disk, a wind tunnel, a blood vessel), those whose
- * outside tells their story 0.44 and more. */
+/* Estimates how much of a field the outer surface shows. Considered are the faces that point to the viewer, weighted by
+ * their projected area. The measure is the interval between the 5th and 95th percentile of their values, relative to
+ * the field's whole range. It is 0.07 to 0.32 for grids whose interior is of interest (a heated disk, a wind tunnel, a
+ * blood vessel), and at least 0.44 for those whose surface shows the result. */
 #include "default_look.h"
 
 #include <algorithm>
@@ -37,7 +37,7 @@ namespace
 using vector = std::array<double, 3>;
 
 constexpr vector usual_direction = {1, 0.8, 1.2};
-constexpr double little = 0.35; // of the field's range
+constexpr double little = 0.35; // fraction of the field's range below which the interior is shown
 
 using grid_list = std::vector<vtkUnstructuredGrid *>;
 
@@ -59,7 +59,7 @@ grid_list grids_in(vtkDataObject *data)
     return grids;
 }
 
-/* Arrays of ids, and VTK's own flags, are no fields to look at. */
+/* Checks whether an array is a field to display. Arrays of ids and VTK's own flags are not. */
 bool is_field(vtkDataArray *array)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
@@ -84,7 +84,7 @@ std::string first_field_of(const grid_list &grids)
     return at_points.empty() ? in_cells : at_points;
 }
 
-/* A field's scalar: its magnitude if it has several components. */
+/* Returns a tuple's value, or its magnitude if there are several components. */
 double value_of(vtkDataArray *array, vtkIdType i)
 {
     const int components = array->GetNumberOfComponents();
@@ -101,7 +101,7 @@ vtkDataArray *array_of(vtkDataSet *data, const std::string &field, bool &is_at_p
     return array ? array : data->GetCellData()->GetArray(field.c_str());
 }
 
-/* The dimension of the cells with the highest. */
+/* Returns the highest dimension of the grid's cells. */
 int dimension_of(vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkCellTypes> types;
@@ -118,7 +118,7 @@ struct seen_value {
     double value, area;
 };
 
-/* Twice the area of a face as it is seen from that direction; below 0 if it looks away. */
+/* Returns twice the projected area of a face in the viewing direction; negative if it points away from the viewer. */
 double seen_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, const vector &towards)
 {
     vector first{}, last{};
@@ -137,7 +137,7 @@ double seen_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, c
     return area;
 }
 
-/* Adds the faces of a grid's outside that look towards the eye. */
+/* Adds the faces of a grid's outer surface that point to the viewer. */
 void add_seen(vtkUnstructuredGrid *grid, const std::string &field, const vector &towards, std::vector<seen_value> &seen)
 {
     vtkNew<vtkDataSetSurfaceFilter> filter;
@@ -159,7 +159,7 @@ void add_seen(vtkUnstructuredGrid *grid, const std::string &field, const vector 
     }
 }
 
-/* The share of the field's range that the outside shows; 1 where nothing can be said. */
+/* Returns the fraction of the field's range that is visible on the outer surface; 1 if it cannot be computed. */
 double seen_share(const grid_list &grids, const std::string &field, const vector &towards)
 {
     double low = std::numeric_limits<double>::infinity(), high = -low, area = 0, below = 0;
@@ -187,7 +187,7 @@ double seen_share(const grid_list &grids, const std::string &field, const vector
     return (last - first) / (high - low);
 }
 
-/* The axis, turned to the eye, across which a cut shows the most. */
+/* Returns the axis, with the sign towards the viewer, perpendicular to which a cut has the largest projected area. */
 std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &towards)
 {
     std::array<int, 3> cut = {0, 0, 0};

@@ -1,4 +1,4 @@
-/* What the default picture of a file shows of it, and from where. */
+/* Chooses the field, camera and cut of a file's default picture. */
 #ifndef DEFAULT_LOOK_H
 #define DEFAULT_LOOK_H
 
@@ -11,18 +11,18 @@ namespace render_tool
 {
 
 struct default_look {
-    std::string field;                  // "": the file has none
-    int flat_axis = -1;                 // the axis at right angles to a flat mesh; -1: it is none
-    std::array<int, 3> cut = {0, 0, 0}; // the normal of a plane through the middle; the side it points to is cut away
+    std::string field;                  // "" if the file has no field
+    int flat_axis = -1;                 // axis perpendicular to a flat mesh; -1 if the mesh is not flat
+    std::array<int, 3> cut = {0, 0, 0}; // normal of a plane through the centre; the side to which it points is cut away
     bool is_cut() const { return cut[0] || cut[1] || cut[2]; }
 };
 
-/* Chooses the look by the first step of the first file. The field is the one that the options name, else the first, at
- * points before cells. A solid is cut open where its outside, seen from the eye, shows little of the field's range.
- * Throws std::runtime_error. */
+/* Chooses the look from the first step of the first file. The field is the one named in the options, otherwise the
+ * first point field, otherwise the first cell field. A solid is cut open if its outer surface, seen from the viewer,
+ * shows only a small part of the field's range. Throws std::runtime_error. */
 default_look choose_look(const options &o);
 
-/* The direction from a solid to the eye, the options' or the usual one, and the direction that is up. */
+/* Return the direction from the data to the viewer, which is that of the options or a default, and the up direction. */
 std::array<double, 3> eye_direction(const options &o);
 std::array<double, 3> up_direction(const options &o);
 

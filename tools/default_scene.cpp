@@ -16,7 +16,7 @@ namespace render_tool
 namespace
 {
 
-/* A double-quoted scalar of YAML. */
+/* Returns the text as a double-quoted scalar of YAML. */
 std::string quoted(const std::string &text)
 {
     std::string out = "\"";
@@ -41,8 +41,8 @@ std::string list_of(const std::array<double, 3> &v)
     return text.str();
 }
 
-/* The session's own camera, placed by the box around all steps where that is known, so that it stands still. A flat
- * mesh is seen from the front unless the options say otherwise. */
+/* Returns the camera. If the extent of all steps is known, it determines the position, so that the camera does not move
+ * between steps. A flat mesh is viewed from the front unless the options specify a direction. */
 std::string camera_of(const options &o, const default_look &look, const data_extent *e)
 {
     std::string automatic = "fit: box", up;
@@ -56,7 +56,7 @@ std::string camera_of(const options &o, const default_look &look, const data_ext
     return "{automatic: {" + automatic + "}" + up + "}";
 }
 
-/* Eight hexadecimal digits of a text (FNV-1a). */
+/* Returns a hash of the text as eight hexadecimal digits (FNV-1a). */
 std::string digits_of(const std::string &text)
 {
     uint32_t hash = 0x811c9dc5U;
@@ -66,7 +66,7 @@ std::string digits_of(const std::string &text)
     return digits;
 }
 
-/* Tells whether another file of data in the folder would give its pictures this name. */
+/* Checks whether pictures of another data file in the folder would get the same name. */
 bool is_shared_name(const std::filesystem::path &file, const std::string &name)
 {
     std::error_code code;
@@ -78,8 +78,9 @@ bool is_shared_name(const std::filesystem::path &file, const std::string &name)
     return false;
 }
 
-/* The name that pictures of a file begin with, of at most 60 bytes. It is the file's without its ending, where that is
- * no other file's. Digits of the ending, of a folder other than the working one, or of a long name tell files apart. */
+/* Returns the name with which pictures of a file begin, at most 60 bytes long: the file's name without its extension if
+ * that is unique. Otherwise a hash of the extension, of a folder other than the working directory, or of a long name is
+ * appended. */
 std::string picture_name(const std::filesystem::path &file)
 {
     std::error_code code;

@@ -1,4 +1,4 @@
-/* The scene for files where the caller gives none. */
+/* Writes the scene for files if the user gives none. */
 #ifndef DEFAULT_SCENE_H
 #define DEFAULT_SCENE_H
 
@@ -11,9 +11,9 @@
 namespace render_tool
 {
 
-/* A scene of the data's outer surface, coloured by the look's field unless that is "", cut open if the look is, with
- * the plane of the cut; flat meshes are seen from the front and not lit. With an extent, that of all steps, the scale
- * of colours and the camera are the same at every step. */
+/* Returns a scene of the data's outer surface. It is coloured by the look's field unless that is "", and cut open if
+ * the look is, with a slice in the plane of the cut. Flat meshes are viewed from the front without lighting. If an
+ * extent of all steps is given, the colour range and the camera are the same for every step. */
 std::string default_scene(const options &o, const default_look &look, const data_extent *extent);
 
 } // namespace render_tool

@@ -1,9 +1,9 @@
-/* insitu-render draws files by libinsitu. A simulation that has already run is played back to a session: each step is
- * read, dealt out, handed over by the VTK adaptor and drawn.
+/* insitu-render draws files with libinsitu. The steps of a finished simulation are replayed to a session: each step is
+ * read, distributed to ranks, passed through the VTK adaptor and drawn.
  *
- * One rank may fail where others do not, as on a file that only it cannot read. So after each local part all ranks
- * agree that none failed before anything collective follows; if one did, all throw its message, and rank 0 prints it.
- */
+ * An error may occur on a single rank, for example if only that rank cannot read a file. After each local part all
+ * ranks therefore agree on errors before the next collective call. If there is one, all ranks throw its message, and
+ * rank 0 prints it. */
 #include <chrono>
 #include <climits>
 #include <cstdio>
@@ -47,7 +47,7 @@ struct world {
     bool is_root() const { return rank == 0; }
 };
 
-/* Collective: throw the message of the lowest rank that has one, on all. */
+/* Throws the message of the lowest rank that has one, on all ranks. Collective. */
 void agree(const world &w, const std::string &message)
 {
     int failing = message.empty() ? INT_MAX : w.rank;
@@ -61,7 +61,7 @@ void agree(const world &w, const std::string &message)
     throw std::runtime_error(text);
 }
 
-/* Collective: run something local on every rank, and throw on all if it throws on one. */
+/* Runs a local function on every rank; if it throws on one rank, throws on all. Collective. */
 template <typename Body> void all_do(const world &w, Body body)
 {
     std::string message;
@@ -73,11 +73,11 @@ template <typename Body> void all_do(const world &w, Body body)
     agree(w, message);
 }
 
-/* A session and its adaptor, closed in the right order. */
+/* A session and its adaptor. The destructor closes both in the right order. */
 class stage
 {
   public:
-    /* scene is a file's name, or the scene itself, which rank 0 alone needs to have. */
+    /* scene is a file name, or the text of a scene if is_text; only rank 0 needs the text. */
     stage(const world &w, const std::string &scene, bool is_text)
     {
         const auto create = is_text ? insitu_create_from_text : insitu_create;
@@ -90,7 +90,7 @@ class stage
         (void)insitu_destroy(&session_);
     }
 
-    /* Collective: waits until all pictures are written; throws if one cannot be. */
+    /* Waits until all pictures are written; throws if a picture cannot be written. Collective. */
     void close()
     {
         insitu_vtk_destroy(&adaptor_);
@@ -99,7 +99,8 @@ class stage
     stage(const stage &) = delete;
     stage &operator=(const stage &) = delete;
 
-    /* It is no error here that nothing of a part can be drawn: the rest of the data may lie on other ranks. */
+    /* Sets this rank's part. A part without drawable cells is not an error, because the rest of the data may be on
+     * other ranks. */
     insitu_vtk_report set(vtkDataObject *data)
     {
         insitu_vtk_report report;
@@ -109,7 +110,8 @@ class stage
         return report;
     }
 
-    /* Images that want a field which the step has not are left out, and missing says why. */
+    /* Performs a step. Images that need a field which the step lacks are left out, and `missing` receives the
+     * reason. */
     const insitu_report &step(int64_t cycle, double time, std::string &missing)
     {
         const insitu_status status = insitu_step(session_, cycle, time);
@@ -125,7 +127,7 @@ class stage
     insitu_vtk_adaptor *adaptor_ = nullptr;
 };
 
-/* Collective: on rank 0, the lines of all ranks' texts without those that it has seen already. */
+/* Returns, on rank 0, the lines in the texts of all ranks that are not in `seen` yet. Collective. */
 std::vector<std::string> new_lines(const world &w, const std::string &text, std::set<std::string> &seen)
 {
     int length = static_cast<int>(text.size());
@@ -145,13 +147,13 @@ std::vector<std::string> new_lines(const world &w, const std::string &text, std:
     return fresh;
 }
 
-/* The warnings that a run has shown, the number of its images, and of its steps that had all fields. */
+/* The warnings printed so far, the number of images, and the number of steps that had all fields. */
 struct run_state {
     const options &given;
     std::set<std::string> said;
     int images = 0;
     int whole_steps = 0;
-    std::string missing; // why the last step that lacked a field was not drawn whole
+    std::string missing; // reason why the last incomplete step was not drawn completely
 };
 
 constexpr size_t warnings_at_once = 8;
@@ -164,7 +166,7 @@ void show_warnings(const world &w, const std::string &text, run_state &run, prog
         bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
 }
 
-/* The warnings about cells, counted over all ranks; the adaptor counts only its rank's. */
+/* Returns the warnings about cells, counted over all ranks; the adaptor counts only those of its own rank. */
 std::string cell_warnings(const int64_t sums[4])
 {
     std::string text;
@@ -176,7 +178,7 @@ std::string cell_warnings(const int64_t sums[4])
     return text;
 }
 
-/* Collective: throw where no rank has a cell to draw; return what is worth a warning. */
+/* Throws if no rank has a cell to draw; otherwise returns warnings about cells. Collective. */
 std::string check_cells(const world &w, const insitu_vtk_report &report, const std::string &name)
 {
     int64_t sums[4] = {report.cells, report.cells_linear, report.cells_flat, report.cells_not_drawn};
@@ -195,7 +197,8 @@ std::string milliseconds(double ms)
     return text;
 }
 
-/* Collective: the line about the step. Cells are summed over ranks, times are the slowest rank's. */
+/* Returns the line that describes the step: cells are summed over ranks, and times are the maximum over ranks.
+ * Collective. */
 std::string step_line(const world &w, const insitu_report &r, const std::string &name, double time, double read_ms)
 {
     const char *const names[] = {"prepare", "build", "refit", "surface", "volume", "composite", "write"};
@@ -217,7 +220,7 @@ std::string step_line(const world &w, const insitu_report &r, const std::string 
     return line.str();
 }
 
-/* The reason for which a step lacks a field, by the option that names it where there is no scene file. */
+/* If there is no scene file, replaces the message about a missing field by one that names the option --field. */
 std::string by_option(const options &o, const std::string &missing)
 {
     const size_t reason = missing.find("no mesh has the field");
@@ -238,7 +241,7 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
         report = on.set(part.data);
     });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
-    /* All ranks take rank 0's time, as some may have read a part without one. */
+    /* All ranks use rank 0's time, because some may have read a part without a time. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
     std::string warnings = part.warnings + check_cells(w, report, name) + report.warnings + "\n", missing;
     const insitu_report &done = on.step(source.cycle(index), part.time, missing);
@@ -260,7 +263,7 @@ std::string working_folder()
     return getcwd(path, sizeof path) ? path : ".";
 }
 
-/* Collective: what all steps of the source span, on every rank. */
+/* Returns the extent of all steps of the source, on every rank. Collective. */
 data_extent extent_of(const world &w, step_source &source, const std::string &field)
 {
     data_extent extent;
@@ -273,8 +276,8 @@ data_extent extent_of(const world &w, step_source &source, const std::string &fi
     return extent;
 }
 
-/* Collective: the text of the default scene, on rank 0. All steps are read ahead, so that one range and one camera
- * serve them. */
+/* Returns the text of the default scene, on rank 0. All steps are read in advance, so that the colour range and the
+ * camera are the same for all of them. Collective. */
 std::string text_of_default(const world &w, const options &o, step_source &source)
 {
     default_look look;

@@ -1,5 +1,5 @@
-/* Options are read by CLI11, which throws and does not print: every rank reads the same line, and one tells what is
- * wrong with it. */
+/* Options are parsed with CLI11, which throws exceptions and does not print: every rank parses the same command line,
+ * and only one prints an error. */
 #include "render_options.h"
 
 #include <CLI/CLI.hpp>
@@ -66,7 +66,7 @@ void parse_camera(const std::string &text, options &o)
     o.direction = direction;
 }
 
-/* A name's runs of digits, and the name with '#' for each run. */
+/* A name in which each sequence of digits is replaced by '#', and these sequences. */
 struct numbered_name {
     std::string path, shape;
     std::vector<std::string> numbers; // without leading zeros
@@ -107,7 +107,7 @@ void order_by_number(std::vector<std::string> &files)
     for (size_t i = 0; i < files.size(); i++) files[i] = sorted[i].path;
 }
 
-/* Leaves one of the files of a parallel run's Exodus output, any of which stands for all. */
+/* Keeps one file of each parallel run's Exodus output, because any of its files represents all of them. */
 void leave_one_of_each_run(options &o)
 {
     std::set<std::string> runs;
@@ -143,10 +143,10 @@ struct help_formatter : CLI::Formatter {
     {
         return option->get_type_size() ? " " + option->get_type_name() : "";
     }
-    std::string make_positionals(const CLI::App *) const override { return ""; } // the usage has them
+    std::string make_positionals(const CLI::App *) const override { return ""; } // the usage line lists them already
 };
 
-/* The number of letters to insert, remove or replace that makes one word the other. */
+/* Returns the edit distance of two words (insertions, deletions and replacements of letters). */
 size_t count_edits(const std::string &a, const std::string &b)
 {
     std::vector<size_t> row(b.size() + 1);
@@ -162,7 +162,7 @@ size_t count_edits(const std::string &a, const std::string &b)
     return row.back();
 }
 
-/* What to do instead of options that other programs have; "" for other names. */
+/* Returns a hint for options of other programs that this program lacks; "" for other names. */
 std::string instead_of(const std::string &name)
 {
     static const std::vector<std::pair<std::set<std::string>, const char *>> known = {
@@ -194,7 +194,7 @@ std::string instead_of(const std::string &name)
 
 using value_reader = void (*)(const std::string &text, options &o);
 
-/* Adds an option; if it is given twice, the last value counts. */
+/* Adds an option with a value. If it is given several times, the last value is used. */
 void add_value(CLI::App &app, options &o, const char *name, const char *type, value_reader read, const char *meaning)
 {
     app.add_option_function<std::string>(
@@ -223,11 +223,12 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
     app.add_flag("--whole", o.whole, "without a scene: solids whose outside shows little are not cut open");
     app.add_flag("--version", o.version, "print the version");
     app.add_flag("--help", o.help, "print this");
-    app.add_flag("-h", o.help)->group(""); // not listed
+    app.add_flag("-h", o.help)->group(""); // not listed in the help
     app.add_option("file", names);
 }
 
-/* Takes the scene, if there is one, out of the names: the one with a scene's ending, or a first one that is no data. */
+/* Removes the scene, if there is one, from the names: the name with a scene's extension, or a first name that is not
+ * data. */
 void take_scene(std::vector<std::string> &names, options &o)
 {
     if (names.empty()) throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");

@@ -1,4 +1,4 @@
-/* The command line of insitu-render. */
+/* Parses the command line of insitu-render. */
 #ifndef RENDER_OPTIONS_H
 #define RENDER_OPTIONS_H
 
@@ -16,20 +16,20 @@ struct options {
     bool help = false;
     bool version = false;
     bool info = false;
-    bool pieces = false; // the files are pieces of one step, not steps
+    bool pieces = false; // the files are pieces of one step instead of steps
     int64_t first_step = 0;
     int64_t last_step = std::numeric_limits<int64_t>::max();
     partition how = partition::block;
-    std::string scene; // "": the default scene, of the five below
+    std::string scene; // "" for the default scene, to which the five options below apply
     int width = 1280, height = 720;
-    std::string field;     // "": the first
-    std::string direction; // towards the eye; "": by the data
-    bool whole = false;    // not cut open
+    std::string field;     // "" for the first field
+    std::string direction; // direction to the viewer; "" to choose it from the data
+    bool whole = false;    // solids are not cut open
     std::vector<std::string> files;
 };
 
-/* Throws std::runtime_error with what is wrong. Files whose names differ only in numbers are sorted by these, so that
- * file_2 comes before file_10, unlike in a shell's order. */
+/* Throws std::runtime_error if an option is wrong. Files whose names differ only in numbers are sorted by these
+ * numbers, so that file_2 comes before file_10, unlike in the order of a shell. */
 options parse_options(int argc, char **argv);
 
 std::string help_text();

@@ -1,4 +1,4 @@
-/* A carriage return draws the bar over itself; it is cleared before every line that stays, and at the end. */
+/* The bar is redrawn in place with a carriage return. It is cleared before every permanent line, and at the end. */
 #include "render_progress.h"
 
 #include <cstdio>

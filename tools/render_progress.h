@@ -1,4 +1,4 @@
-/* Shows how far a run is: a line a step on stdout, and on a terminal a bar below it on stderr. */
+/* Shows the progress of a run: a line per step on stdout, and on a terminal a progress bar below it on stderr. */
 #ifndef RENDER_PROGRESS_H
 #define RENDER_PROGRESS_H
 
@@ -11,15 +11,15 @@ namespace render_tool
 class progress
 {
   public:
-    /* Silent where is_shown is false: ranks other than 0. */
+    /* Prints nothing if is_shown is false, as on ranks other than 0. */
     progress(bool is_shown, size_t steps);
     ~progress();
     progress(const progress &) = delete;
     progress &operator=(const progress &) = delete;
 
-    void begin(size_t step, const std::string &name); /* the bar says what is at work */
-    void line(const std::string &text);               /* a line that stays */
-    void note(const std::string &text);               /* the same on stderr: warnings */
+    void begin(size_t step, const std::string &name); /* shows the step in the bar */
+    void line(const std::string &text);               /* prints a permanent line */
+    void note(const std::string &text);               /* prints a permanent line to stderr, for warnings */
 
   private:
     void clear();

@@ -1,6 +1,6 @@
-/* Where files have at least as many parts (the pieces of a .pvtu, the blocks of a .vtm, the files of --pieces) as there
- * are ranks, each rank reads some parts whole. Otherwise, and for any other partition than blocks, every rank reads all
- * and keeps its cells. */
+/* If a step has at least as many parts (the pieces of a .pvtu, the blocks of a .vtm, the files of --pieces) as there
+ * are ranks, each rank reads some parts completely. Otherwise, and for any partition other than blocks, every rank
+ * reads everything and keeps its own cells. */
 #include "step_source.h"
 
 #include <algorithm>
@@ -24,7 +24,8 @@ std::string file_name(const std::string &path)
     return path.substr(path.find_last_of('/') + 1);
 }
 
-/* A warning where a run whose mesh changes goes on in a file beside this one (run.e-s002) that is not given, or "". */
+/* Returns a warning if a run whose mesh changes continues in a file next to this one (run.e-s002) that was not given;
+ * otherwise "". */
 std::string warn_of_next(const std::string &file, const std::vector<std::string> &given)
 {
     const std::string next = file + "-s002";

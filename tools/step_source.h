@@ -1,4 +1,4 @@
-/* The steps of a run: the file of each and the step in it, and this rank's part of its data. */
+/* The steps of a run: the file of each step, the index of the step in that file, and this rank's part of its data. */
 #ifndef STEP_SOURCE_H
 #define STEP_SOURCE_H
 
@@ -17,17 +17,17 @@ namespace render_tool
 class step_source
 {
   public:
-    /* Opens the files that hold several steps; throws std::runtime_error. */
+    /* Opens the files that contain several steps; throws std::runtime_error. */
     step_source(const options &o, int rank, int ranks);
 
     size_t count() const { return steps_.size(); }
     int64_t cycle(size_t step) const { return steps_[step].cycle; }
-    const std::string &name(size_t step) const { return steps_[step].name; } /* the file's, without its folder */
+    const std::string &name(size_t step) const { return steps_[step].name; } /* file name without its folder */
 
     struct result {
-        vtkSmartPointer<vtkDataObject> data; // this rank's part; null where it has none
+        vtkSmartPointer<vtkDataObject> data; // this rank's part; null if it has none
         double time = 0;
-        std::string warnings; // a line each
+        std::string warnings; // one per line
     };
     result read(size_t step); /* throws std::runtime_error */
 
@@ -46,8 +46,8 @@ class step_source
     options options_;
     int rank_, ranks_;
     std::vector<step> steps_;
-    std::string warnings_;            // of the files given, for the first step read
-    std::unique_ptr<data_file> open_; // the file read last
+    std::string warnings_;            // warnings about the given files, returned with the first step
+    std::unique_ptr<data_file> open_; // the file that was read last
     size_t open_index_ = 0;
 };
 

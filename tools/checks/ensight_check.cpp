@@ -1,5 +1,5 @@
-/* A geometry file, by the format's description. Parts in [] are there if its header says so; n and m are counts that
- * stand before:
+/* Checks EnSight Gold files by the description of the format. In a geometry file, parts in [] are present if the header
+ * says so; n and m are counts that precede:
  *
  *     [format] 2 descriptions, node id, element id, [extents: 6 floats]
  *     part     = "part" number description sections
@@ -7,9 +7,10 @@
  *              | "block" i j k 3ijk floats [ijk ints]     (rectilinear: i + j + k floats, uniform: 6)
  *              | type n [n ids] n × nodes ints            (nsided, nfaced: counts, then nodes)
  *
- * A variable's file has a description, and then for some parts: "part" number, and for nodes "coordinates" or "block",
- * for elements each type or "block", followed by one value a node or element and component. With "undef" behind that
- * word a value that stands for none comes first, with "partial" a count and the numbers of those that have values. */
+ * The file of a variable has a description. Then, for some of the parts, it has "part" and a number; for variables at
+ * nodes "coordinates" or "block", for variables at elements each type or "block"; and one value per node or element and
+ * component. If "undef" follows that word, the value that represents undefined ones comes first. If "partial" follows
+ * it, a count comes first, and the indices of the nodes or elements that have values. */
 #include "ensight_check.h"
 
 #include <algorithm>
@@ -35,7 +36,7 @@ using encoding = ensight_stream::encoding;
 struct part_sizes {
     int64_t points = 0;
     int64_t block_cells = 0;
-    std::map<std::string, int64_t> elements; // by type
+    std::map<std::string, int64_t> elements; // number of elements of each type
 
     bool operator==(const part_sizes &other) const
     {
@@ -43,14 +44,14 @@ struct part_sizes {
     }
 };
 
-using geometry = std::map<int64_t, part_sizes>; // by the part's number
+using geometry = std::map<int64_t, part_sizes>; // by part number
 
 bool starts_with(const std::string &text, const char *start)
 {
     return text.compare(0, std::strlen(start), start) == 0;
 }
 
-/* -1 for a word that is no element type; 0 for types whose elements differ in size. */
+/* Returns the number of nodes of an element type: -1 for an unknown type, 0 if elements of the type differ in size. */
 int nodes_of_type(const std::string &type)
 {
     static const std::map<std::string, int> nodes = {
@@ -66,7 +67,8 @@ bool has_ids(const std::string &line)
     return line.find("given") != std::string::npos || line.find("ignore") != std::string::npos;
 }
 
-/* A binary file's first line may name its encoding, also that of a variable. */
+/* Returns the first line of the contents. Binary files, including those of variables, may have a line that names the
+ * encoding in front of it. */
 std::string first_line(ensight_stream &in, encoding how)
 {
     const std::string line = in.line();
@@ -75,8 +77,8 @@ std::string first_line(ensight_stream &in, encoding how)
     return is_name ? in.line() : line;
 }
 
-/* Reads the description with which a step begins, if there is one. line is that of the first step, which may be alone
- * in the file, and "" for later ones. */
+/* Checks whether another step begins, and reads its description if there is one. For the first step, `line` is its
+ * first line, because a file may contain a single step without "BEGIN TIME STEP"; for later steps it is "". */
 bool is_next(ensight_stream &in, std::string line, bool is_first)
 {
     if (!is_first && !in.next_line(line)) return false;
@@ -92,7 +94,7 @@ class geometry_walk
   public:
     geometry_walk(const std::string &path, encoding how) : in_(path, how), how_(how) {}
 
-    /* Returns the geometry of each step in the file; one if it has no steps. */
+    /* Returns the geometry of each step in the file, or a single one if the file has no steps. */
     std::vector<geometry> steps()
     {
         std::vector<geometry> all;
@@ -102,7 +104,7 @@ class geometry_walk
     }
 
   private:
-    /* After the first of the two descriptions. */
+    /* Reads the parts of a step, after the first of its two descriptions. */
     geometry parts()
     {
         std::string line;
@@ -193,14 +195,14 @@ class geometry_walk
     part_sizes *part_ = nullptr;
 };
 
-/* A file named in a line of the case. */
+/* A file that a line of the case file names. */
 struct named_file {
-    std::string pattern; // with '*' for the step's number
-    int components = 0;  // 0: geometry
+    std::string pattern; // '*' represents the digits of the step number
+    int components = 0;  // 0 for a geometry file
     bool is_per_node = false;
 };
 
-/* A section's word, as "coordinates", and whether "undef" or "partial" follows it. */
+/* A section's word, for example "coordinates", and whether "undef" or "partial" follows it. */
 struct values_section {
     std::string word;
     bool has_undefined = false, is_partial = false;
@@ -218,7 +220,7 @@ values_section section_of(const std::string &line)
     return s;
 }
 
-/* Walks the values of a section, of which the part has `count`. */
+/* Skips the values of a section; `count` is the number of its nodes or elements in the part. */
 void skip_values(ensight_stream &in, const values_section &section, int64_t count, int components)
 {
     if (section.has_undefined) in.skip_numbers(1);
@@ -232,7 +234,7 @@ void skip_values(ensight_stream &in, const values_section &section, int64_t coun
     for (int c = 0; c < components; c++) in.skip_numbers(count);
 }
 
-/* The values of one step. Returns the last section that is partial, or "". */
+/* Reads through the values of one step. Returns the last section that is partial, or "". */
 std::string walk_values(ensight_stream &in, const geometry &parts, int components, bool is_per_node)
 {
     std::string line, partial;
@@ -264,8 +266,8 @@ std::string walk_values(ensight_stream &in, const geometry &parts, int component
     return partial;
 }
 
-/* Steps beyond those of the geometry are on its last one. VTK's reader skips earlier steps by the sizes of the one that
- * it reads, so all must have the same. */
+/* Checks all steps of a variable. Steps beyond those of the geometry use its last step. VTK's reader skips earlier
+ * steps by the sizes of the step that it reads, so all steps must have the same sizes. */
 void walk_variable(const std::string &path, encoding how, const std::vector<geometry> &steps, const named_file &file)
 {
     ensight_stream in(path, how);
@@ -281,7 +283,7 @@ void walk_variable(const std::string &path, encoding how, const std::vector<geom
     }
 }
 
-/* The words of "1 1 name file" without the numbers of time and file sets. */
+/* Splits "1 1 name file" into words, without the leading numbers of time and file sets. */
 std::vector<std::string> words_of(const std::string &text)
 {
     std::vector<std::string> words;
@@ -331,7 +333,7 @@ std::vector<named_file> files_of(const std::string &case_path)
     return files;
 }
 
-/* The files that match a pattern, by what its stars stand for. */
+/* Returns the files that match a pattern, by the digits that its stars represent. */
 std::map<std::string, std::string> matches(const std::string &folder, const std::string &pattern)
 {
     const size_t first = pattern.find('*'), last = pattern.find_last_of('*');
@@ -357,7 +359,7 @@ void check_ensight(const std::string &case_path)
 {
     const std::string folder = case_path.substr(0, case_path.find_last_of('/') + 1);
     const std::vector<named_file> files = files_of(case_path);
-    std::map<std::string, std::vector<geometry>> geometries; // by the number in the file's name
+    std::map<std::string, std::vector<geometry>> geometries; // by the digits in the file's name
     encoding how = encoding::text;
     for (const named_file &file : files) {
         if (file.components > 0) continue;

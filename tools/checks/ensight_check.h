@@ -1,5 +1,5 @@
-/* Checks that the files of an EnSight Gold case are whole. Where numbers are missing at a file's end, VTK's reader
- * takes whatever its memory holds, or crashes. */
+/* Checks that the files of an EnSight Gold case are complete. If numbers are missing at the end of a file, VTK's reader
+ * uses uninitialized memory or crashes. */
 #ifndef ENSIGHT_CHECK_H
 #define ENSIGHT_CHECK_H
 
@@ -8,8 +8,8 @@
 namespace render_tool
 {
 
-/* Follow every file that the case names (text, C binary, Fortran binary) to its end. Throws std::runtime_error with the
- * file's name where one is missing, ends too early or cannot be followed, and for a case of another type than Gold. */
+/* Reads every file that the case names (text, C binary, Fortran binary) to its end. Throws std::runtime_error with the
+ * file's name if a file is missing, ends too early or cannot be parsed, or if the case is not of type Gold. */
 void check_ensight(const std::string &case_path);
 
 } // namespace render_tool

@@ -1,5 +1,5 @@
-/* Text has one number, or the numbers of one element, in a line. Binary files have lines of 80 bytes and numbers of 4
- * bytes; Fortran puts both into records, with the length in bytes before and after the contents. */
+/* A line of a text file contains one number or the numbers of one element. Binary files have lines of 80 bytes and
+ * numbers of 4 bytes. Fortran stores both in records, with the length in bytes before and after the contents. */
 #include "ensight_stream.h"
 
 #include "number_check.h"
@@ -85,7 +85,8 @@ std::string ensight_stream::line()
     return text;
 }
 
-/* Numbers of parts and of points are small and not negative; bytes in the wrong order make them huge. */
+/* Reads an integer that must be small and not negative, such as a part number or a count. Larger values mean that the
+ * byte order is wrong. */
 int32_t ensight_stream::binary_integer()
 {
     int32_t n = 0;

@@ -1,4 +1,4 @@
-/* The lines and numbers of an EnSight Gold file in any of its three encodings. */
+/* Reads the lines and numbers of an EnSight Gold file in any of its three encodings. */
 #ifndef ENSIGHT_STREAM_H
 #define ENSIGHT_STREAM_H
 
@@ -9,24 +9,25 @@
 namespace render_tool
 {
 
-/* Every function throws std::runtime_error with the file's name where the file ends too early. */
+/* A file of the case. Every member throws std::runtime_error with the file's name if the file ends too early. */
 class ensight_stream
 {
   public:
-    /* The case's geometry files tell the encoding by their first bytes. */
+    /* The encoding of all files of a case. It is recognized by the first bytes of the geometry files. */
     enum class encoding { text, c_binary, fortran_binary };
 
     static encoding encoding_of(const std::string &path);
     ensight_stream(const std::string &path, encoding how);
 
-    /* The next line, without blanks around it; in text the next one that is not blank. False at the end of the file. */
+    /* Reads the next line, without leading and trailing blanks; in text files blank lines are skipped. Returns false at
+     * the end of the file. */
     bool next_line(std::string &line);
     std::string line();
 
     int64_t integer();
-    void integers(int64_t *values, int64_t count); /* in one record, none negative */
-    int64_t sum_of_integers(int64_t count);        /* in one record */
-    void skip_numbers(int64_t count);              /* skips numbers of 4 bytes in one record */
+    void integers(int64_t *values, int64_t count); /* reads one record of integers, which must not be negative */
+    int64_t sum_of_integers(int64_t count);        /* reads one record and returns the sum of its integers */
+    void skip_numbers(int64_t count);              /* skips one record of 4-byte numbers */
 
     [[noreturn]] void refuse(const std::string &why) const;
 

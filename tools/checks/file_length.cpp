@@ -1,5 +1,5 @@
-/* A number without its last digits is still a number, so plain text must end with an end of line. Files of VTK's XML
- * formats must end with their last tag, and so must the files that they name and VTK's readers open. */
+/* A number that is cut off is often still a valid number, so plain text must end with a newline. Files of VTK's XML
+ * formats must end with their last tag, and so must the files that they reference and VTK's readers open. */
 #include "file_length.h"
 
 #include <algorithm>
@@ -43,14 +43,14 @@ std::string last_bytes(const std::string &path, int64_t count)
     return bytes;
 }
 
-/* Behind the last tag there may be blanks and a comment. */
+/* Checks that only blanks and comments follow the last tag. */
 void check_last_tag(const std::string &path)
 {
     const bool is_whole = last_bytes(path, 4096).find("</VTKFile>") != std::string::npos;
     if (!is_whole) throw std::runtime_error(path + ": is cut short: it has no </VTKFile> at its end");
 }
 
-/* Tells whether the file begins as all of VTK's XML formats do. */
+/* Checks whether the beginning of the file is that of VTK's XML formats. */
 bool is_vtk_xml(const std::string &path)
 {
     const std::string name = path.substr(path.find_last_of('/') + 1);
@@ -60,7 +60,7 @@ bool is_vtk_xml(const std::string &path)
            (ending.compare(0, 3, ".vt") == 0 && ending != ".vtk" && ending != ".vtkhdf");
 }
 
-/* Tells whether a tag has name="0". */
+/* Checks whether a tag contains name="0". */
 bool is_zero(const std::string &tag, const std::string &name)
 {
     return tag.find(' ' + name + "=\"0\"") != std::string::npos;

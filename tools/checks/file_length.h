@@ -1,4 +1,4 @@
-/* Checks a file's length by its own text, for formats whose readers read zeros where the end is cut off. */
+/* Detects truncated files by their text, for formats whose readers return zeros for missing data. */
 #ifndef FILE_LENGTH_H
 #define FILE_LENGTH_H
 
@@ -7,11 +7,11 @@
 namespace render_tool
 {
 
-/* Throw std::runtime_error where the file is shorter than it says, ends within a line of text, or has a word among its
- * numbers that is none. */
+/* Throws std::runtime_error if the file is shorter than it declares, ends in the middle of a line of text, or contains
+ * a word that is not a number among its numbers. */
 void check_length(const std::string &path);
 
-/* Tells whether a .vtu is whole and declares all its pieces to have neither points nor cells. */
+/* Checks whether a .vtu file is complete and declares that none of its pieces has points or cells. */
 bool is_empty_vtu(const std::string &path);
 
 } // namespace render_tool

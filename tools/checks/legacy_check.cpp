@@ -1,5 +1,6 @@
-/* After four lines of heading ("# vtk DataFile Version 5.1", a title, ASCII or BINARY, DATASET and its kind) come
- * sections: each has a word and counts, and most have values, as text or as big-endian numbers and an end of line. */
+/* A file begins with four lines ("# vtk DataFile Version 5.1", a title, ASCII or BINARY, DATASET and its kind).
+ * Sections follow: each has a keyword and counts, and most have values, either as text or as big-endian numbers
+ * followed by a newline. */
 #include "legacy_check.h"
 
 #include "number_check.h"
@@ -66,7 +67,7 @@ class walker
         in_.seekg(here);
     }
 
-    /* A file may end between two sections as well. */
+    /* Checks that all required sections are present, because a file may also be truncated between two sections. */
     void check_sections() const
     {
         static const std::map<std::string, std::vector<std::string>> needed = {
@@ -82,7 +83,7 @@ class walker
             if (seen_.count(name) == 0) refuse("it has no " + name);
     }
 
-    /* The words of the next line that has any. */
+    /* Reads the words of the next nonblank line; returns false at the end of the file. */
     bool next_section()
     {
         words_.clear();
@@ -104,7 +105,7 @@ class walker
         return std::stoll(text);
     }
 
-    /* The bytes of so many values; -1 for a type whose values differ in size. */
+    /* Returns the size of this many values in bytes, or -1 for a type whose values differ in size. */
     int64_t bytes_of(int64_t values, const std::string &type) const
     {
         static const std::map<std::string, int64_t> sizes = {
@@ -117,7 +118,7 @@ class walker
         return found == sizes.end() ? -1 : values * found->second;
     }
 
-    /* False where the values cannot be followed. */
+    /* Skips values; returns false if their size is not known. */
     bool skip_values(int64_t values, const std::string &type)
     {
         if (values / 8 > size_) refuse("it says it has " + std::to_string(values) + " values");
@@ -147,7 +148,7 @@ class walker
         }
     }
 
-    /* Skips the data of the section just begun. Returns false where nothing behind it can be followed. */
+    /* Skips the data of the current section. Returns false if the rest of the file cannot be parsed. */
     bool skip_section()
     {
         const std::string name = word(0);
@@ -185,7 +186,7 @@ class walker
         return true;
     }
 
-    /* Skips the cells: up to version 5.0 one list of counts and points, later two lists. */
+    /* Skips the cells: a single list of counts and points up to version 5.0, and two lists in later versions. */
     bool skip_cells()
     {
         const int64_t cells = count(1), size = count(2);
@@ -217,7 +218,7 @@ class walker
         return true;
     }
 
-    /* Skips the lines up to an empty one. Missing ones change no picture. */
+    /* Skips the lines up to an empty one. Missing lines are accepted, because metadata does not affect pictures. */
     bool skip_metadata()
     {
         for (std::string line; std::getline(in_, line) && !line.empty();) {
@@ -252,11 +253,11 @@ class walker
     std::ifstream in_;
     int64_t size_ = 0;
     bool is_text_ = false;
-    std::string kind_;           // of the data set
-    bool is_empty_ = false;      // VTK's writer then leaves the cells out
-    std::set<std::string> seen_; // sections
+    std::string kind_;           // kind of the data set
+    bool is_empty_ = false;      // there are no points, and VTK's writer omits the cells
+    std::set<std::string> seen_; // keywords of the sections read so far
     int64_t tuples_ = 0;
-    std::vector<std::string> words_; // of the section's first line
+    std::vector<std::string> words_; // words of the section's first line
 };
 
 } // namespace

@@ -1,13 +1,14 @@
-/* The header by the format's specification. All numbers are big-endian; N has 4 bytes, or 8 in CDF-5:
+/* Reads the header by the specification of the format. All numbers are big-endian; N has 4 bytes, or 8 in CDF-5:
  *
  *     "CDF" version  records:N  dimensions  attributes  variables
  *     list           = tag:4 count:N entries
- *     dimension      = name length:N                       length 0: the records' dimension
+ *     dimension      = name length:N                       length 0: the record dimension
  *     attribute      = name type:4 count:N values, padded to 4 bytes
  *     variable       = name rank:N dimension:N... attributes type:4 size:N begin:4 (CDF-1) or 8
  *     name           = length:N characters, padded to 4 bytes
  *
- * A variable with the records' dimension has one slab a record, and the slabs of all such variables alternate. */
+ * A variable that has the record dimension consists of one slab per record; the slabs of all such variables
+ * alternate. */
 #include "netcdf_size.h"
 
 #include <algorithm>
@@ -33,7 +34,7 @@ class header
 
     bool is_classic() const { return version_ == 1 || version_ == 2 || version_ == 5; }
 
-    /* 0 where the header is cut. */
+    /* Returns the length of the file, or 0 if the header is truncated. */
     int64_t file_bytes()
     {
         records_ = count();
@@ -90,21 +91,22 @@ class header
         }
         skip_attributes();
         const int64_t bytes = elements * bytes_of_type(number(4));
-        count(); // its padded size, which is wrong above 4 GB
+        count(); // the stored size, which is wrong above 4 GB
         const int64_t begin = number(version_ == 1 ? 4 : 8);
         int64_t &end = has_records ? record_end_ : fixed_end_;
         end = std::max(end, begin + bytes);
         if (has_records) record_bytes_ += (bytes + 3) / 4 * 4;
     }
 
-    static constexpr int64_t streaming_ = 0xffffffff; // number of records where the writer did not count them
+    static constexpr int64_t streaming_ =
+        0xffffffff; // number of records in the header of a file whose writer did not count them
     std::ifstream in_;
     int version_ = 0;
     int64_t records_ = 0;
     std::vector<int64_t> dimensions_;
-    int64_t fixed_end_ = 0;    // of the variables without records
-    int64_t record_end_ = 0;   // of the first record; 0: there are none
-    int64_t record_bytes_ = 0; // of one record of all variables
+    int64_t fixed_end_ = 0;    // end of the variables without records
+    int64_t record_end_ = 0;   // end of the first record; 0 if there are no records
+    int64_t record_bytes_ = 0; // size of one record of all variables
 };
 
 } // namespace

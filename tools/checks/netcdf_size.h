@@ -1,5 +1,5 @@
-/* Checks that a NetCDF file of the classic formats (Exodus files often are) is as long as its header says. The library
- * that reads them returns zeros for missing numbers, and pictures of zeros would be lies. */
+/* Computes the length that the header of a NetCDF file in a classic format (common for Exodus files) implies. The
+ * NetCDF library returns zeros for missing numbers, which would give wrong pictures. */
 #ifndef NETCDF_SIZE_H
 #define NETCDF_SIZE_H
 
@@ -9,8 +9,8 @@
 namespace render_tool
 {
 
-/* The file's length in bytes, by the header of a classic NetCDF file (CDF-1, CDF-2, CDF-5); 0 for any other file, or if
- * the header itself cannot be read to its end. */
+/* Returns the length in bytes according to the header of a classic NetCDF file (CDF-1, CDF-2, CDF-5). Returns 0 for any
+ * other file, or if the header is truncated. */
 int64_t netcdf_bytes(const std::string &path);
 
 } // namespace render_tool

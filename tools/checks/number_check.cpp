@@ -1,4 +1,3 @@
-/* See the header. */
 #include "number_check.h"
 
 #include <algorithm>
@@ -22,7 +21,7 @@ bool is_blank(int c)
     return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-/* Moves at behind digits; returns their number. */
+/* Advances `at` behind any digits; returns their number. */
 size_t skip_digits(const std::string &word, size_t &at)
 {
     const size_t first = at;
@@ -30,9 +29,7 @@ size_t skip_digits(const std::string &word, size_t &at)
     return at - first;
 }
 
-/* Tells whether the values of an element, which begins with `tag`, are text: VTK's readers take them for that by
- * default.
- */
+/* Checks whether the element that begins with `tag` contains text values, which is the default of VTK's readers. */
 bool has_text_values(const std::string &tag)
 {
     if (tag.compare(0, 10, "DataArray ") != 0 || tag.back() == '/') return false;

@@ -1,5 +1,5 @@
-/* Cells are numbered through all leaves of a data set in the iterator's order. A cell's number, or its place, alone
- * tells its owner, so ranks that hold the same data agree without a message. */
+/* Cells are numbered through all leaves of a data set in the order of VTK's iterator. The owner depends only on a
+ * cell's number or position, so ranks with the same data agree without communication. */
 #include "cell_deal.h"
 
 #include <algorithm>
@@ -22,11 +22,11 @@ namespace
 {
 
 struct leaf {
-    vtkDataObject *data; // null where the leaf is empty
-    int64_t first_cell;  // its number among all cells
+    vtkDataObject *data; // null if the leaf is empty
+    int64_t first_cell;  // number of the leaf's first cell among all cells
 };
 
-/* Spread the bits of a number (the finalizer of splitmix64). */
+/* Returns a hash of the number (the finalizer of splitmix64). */
 uint64_t mix(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;

@@ -1,4 +1,4 @@
-/* Deals the cells of a data set out to ranks. */
+/* Distributes the cells of a data set to ranks. */
 #ifndef CELL_DEAL_H
 #define CELL_DEAL_H
 
@@ -12,16 +12,16 @@ namespace render_tool
 {
 
 enum class partition {
-    block,       // contiguous runs of cells, in the order of the file
-    random,      // by a hash of the cell's number: the worst case for compositing
-    checkerboard // by the cell's centre on a lattice of 8 × 8 × 8 over the bounds
+    block,       // contiguous ranges of cells, in the order of the file
+    random,      // by a hash of the cell's number, which is the worst case for compositing
+    checkerboard // by the position of the cell's centre in a lattice of 8 × 8 × 8 over the bounds
 };
 
 bool parse_partition(const std::string &text, partition &out);
 
-/* This rank's part of data, which has unstructured grids only (grids_of.h): the rank's cells, with the points they use
- * and all arrays. Every cell goes to exactly one rank. Leaves of composites keep their numbers; those without a cell
- * for this rank are null. data is returned as it is where all of it belongs to this rank. */
+/* Returns this rank's part of data, which must contain only unstructured grids (grids_of.h): the rank's cells, the
+ * points they use, and all arrays. Every cell belongs to exactly one rank. Leaves of composites keep their numbers;
+ * those without a cell for this rank are null. If all of data belongs to this rank, data itself is returned. */
 vtkSmartPointer<vtkDataObject> deal(vtkDataObject *data, partition how, int rank, int ranks);
 
 } // namespace render_tool

@@ -1,5 +1,5 @@
-/* VTK's filter for this, vtkExtractCells, is not used: VTK's own readers may leave lists of faces shorter than the
- * cells, and it reads beyond them. */
+/* VTK's filter vtkExtractCells is not used because it reads beyond the end of face lists that are shorter than the
+ * cells, as VTK's own readers may produce them. */
 #include "cell_extract.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace render_tool
 namespace
 {
 
-/* Numbers points anew, in the order of their first use. */
+/* Assigns new numbers to points in the order of their first use. */
 class renumbering
 {
   public:
@@ -37,7 +37,7 @@ class renumbering
         return number;
     }
 
-    /* The old numbers. */
+    /* Returns the old numbers of the points in use. */
     vtkIdList *used() { return used_.Get(); }
 
   private:
@@ -45,8 +45,8 @@ class renumbering
     vtkNew<vtkIdList> used_;
 };
 
-/* The faces of polyhedra. Each one's place is where its [number of faces, number of the first one's points, its points,
- * ...] begins; -1 for none. */
+/* The face streams of polyhedra. The location of a cell is the index where its stream begins, or -1: number of faces,
+ * then for each face its number of points and its points. */
 class face_streams
 {
   public:
@@ -73,7 +73,7 @@ class face_streams
   private:
     vtkNew<vtkIdTypeArray> stream_, places_;
 
-    /* The length of a cell's faces; 0 where they do not lie within the stream, or name a point that does not exist. */
+    /* Returns the length of a cell's stream, or 0 if it exceeds the array or names a point that does not exist. */
     static vtkIdType length_of(vtkUnstructuredGrid *grid, vtkIdType cell, const renumbering &points)
     {
         vtkIdTypeArray *const all = grid->GetFaces(), *const starts = grid->GetFaceLocations();
@@ -92,7 +92,7 @@ class face_streams
     }
 };
 
-/* Picks from arrays with one value an element; others cannot be dealt out. */
+/* Copies the picked tuples of arrays with one tuple per element; other arrays are left out. */
 void pick_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
 {
     for (int i = 0; i < from->GetNumberOfArrays(); i++) {
@@ -118,7 +118,7 @@ void pick_points(vtkUnstructuredGrid *grid, vtkIdList *picked, vtkUnstructuredGr
     part->SetPoints(places);
 }
 
-/* Returns the old numbers of the points in use. */
+/* Copies the cells to `part`; returns the old numbers of the points they use. */
 vtkSmartPointer<vtkIdList> pick_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells,
                                       vtkUnstructuredGrid *part)
 {

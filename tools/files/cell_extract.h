@@ -1,4 +1,4 @@
-/* Makes a grid of some of a grid's cells. */
+/* Extracts some of a grid's cells into a new grid. */
 #ifndef CELL_EXTRACT_H
 #define CELL_EXTRACT_H
 
@@ -12,9 +12,9 @@ class vtkUnstructuredGrid;
 namespace render_tool
 {
 
-/* The cells of grid with these numbers, in this order, with the points they use and all arrays of one value a point or
- * cell. Every cell's points must be the grid's (find_bad_cell() in grids_of.h); a polyhedron whose list of faces is
- * broken or missing comes out without faces. */
+/* Returns a grid of the cells with these numbers, in this order, with the points they use and all arrays with one value
+ * per point or cell. All points of the cells must exist (find_bad_cell() in grids_of.h). A polyhedron whose face stream
+ * is invalid or missing gets no faces. */
 vtkSmartPointer<vtkUnstructuredGrid> extract_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells);
 
 } // namespace render_tool

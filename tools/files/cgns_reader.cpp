@@ -1,11 +1,11 @@
-/* VTK 9.1 takes the sections that begin with one of the numbers 1 to N for a zone's N cells. CGNS has no such rule: a
- * section of boundary elements may come first, or in between. VTK's cells are then triangles and quads of the boundary.
- * And it mistakes where a section's vertices go unless the sections of cells are the zone's first ones in the file,
- * too.
+/* VTK 9.1 assumes that the N cells of a zone are the sections whose first element number is between 1 and N. CGNS has
+ * no such rule: a section of boundary elements may come first or in between, and VTK then reads triangles and quads of
+ * the boundary as cells. VTK also computes wrong positions for the vertices of a section, unless the sections of cells
+ * are also the first ones of the zone in the file.
  *
- * For such zones VTK is given another file, of a few kilobytes, whose nodes are links to those of the user's, but for
- * the numbers of elements and the order of sections. There the elements of the zone's highest dimension, which are its
- * cells, come first, in the order that they had, in which values stand too. */
+ * For such zones VTK is given a different file of a few kilobytes. Its nodes are links to those of the user's file,
+ * except for the element numbers and the order of sections. There the zone's cells, which are its elements of highest
+ * dimension, come first; their relative order does not change, because the values are stored in that order. */
 #include "cgns_reader.h"
 
 #include <algorithm>
@@ -41,7 +41,8 @@ namespace
 using element_type = CGNS_ENUMT(ElementType_t);
 using name_buffer = std::array<char, 33>; // CGNS names have at most 32 bytes
 
-/* An element's dimension, by what its type's name begins with, as in HEXA_27; 3 for polyhedra and what is not known. */
+/* Returns the dimension of an element type, recognized by the prefix of its name, for example HEXA_27. Polyhedra and
+ * unknown types count as 3. */
 int dimension_of(element_type type)
 {
     const std::string name = cg_ElementTypeName(type);
@@ -52,19 +53,19 @@ int dimension_of(element_type type)
 }
 
 struct section {
-    int number; // in the file, from 1
+    int number; // index in the file, counted from 1
     std::string name;
     element_type type;
     cgsize_t first, last;
-    int dimension; // of a mixed section, its first element's
+    int dimension; // for a mixed section, that of its first element
 
     cgsize_t size() const { return last - first + 1; }
 };
 
-/* The sections of a zone, by the paths of their nodes, whose elements get other numbers, from these on. */
+/* New first element numbers of sections, by the paths of their nodes. */
 using new_numbers = std::map<std::string, cgsize_t>;
 
-/* The sections of an unstructured zone. What cannot be read is passed over: VTK's reader reports it. */
+/* The sections of an unstructured zone. Sections that cannot be read are skipped, because VTK's reader reports them. */
 class cgns_zone
 {
   public:
@@ -87,8 +88,8 @@ class cgns_zone
 
     const std::string &name() const { return name_; }
 
-    /* Whether VTK's cells are others than the elements of the highest dimension. Faces of polyhedra it finds anywhere.
-     */
+    /* Checks whether VTK would read other elements than those of the highest dimension as cells. Zones of polyhedra are
+     * always read correctly. */
     bool is_misread_by_vtk() const
     {
         cgsize_t taken = 0;
@@ -105,7 +106,7 @@ class cgns_zone
         return taken > cell_count_ || last > count;
     }
 
-    /* Adds the sections by their new numbers, cells first. Throws if they cannot be numbered so. */
+    /* Assigns new element numbers to the sections, cells first. Throws if the numbers cannot be assigned. */
     void renumber(const std::string &where, const std::string &path, new_numbers &out) const
     {
         check(where);
@@ -122,7 +123,7 @@ class cgns_zone
     int file_, base_, zone_, dimension_ = 0;
     std::string name_;
     cgsize_t cell_count_ = 0;
-    std::vector<section> sections_; // in the order of their elements' numbers
+    std::vector<section> sections_; // in ascending order of element numbers
 
     void read_section(int number)
     {
@@ -149,7 +150,8 @@ class cgns_zone
         return static_cast<element_type>(nodes[0]);
     }
 
-    /* VTK relies on numbers without gaps, and writes beyond its memory if there are some. */
+    /* Throws if the element numbers have gaps, because VTK would then write beyond its memory, or if sections mix cells
+     * and boundary elements. */
     void check(const std::string &where) const
     {
         cgsize_t next = 1, cells = 0;
@@ -168,7 +170,8 @@ class cgns_zone
     }
 };
 
-/* The sections of all zones that VTK misreads. Throws if one cannot be numbered for it. */
+/* Returns the new numbers for all zones that VTK would misread. Throws if the elements of a zone cannot be
+ * renumbered. */
 new_numbers numbers_for_vtk(const std::string &path)
 {
     new_numbers all;
@@ -198,7 +201,7 @@ new_numbers numbers_for_vtk(const std::string &path)
     return all;
 }
 
-/* A file by CGNS's layer of nodes. */
+/* A file that is accessed through CGNS's node interface (cgio). */
 class node_file
 {
   public:
@@ -258,8 +261,8 @@ class link_writer
     {
     }
 
-    /* Gives `into` the children of a node: links, but for those on the way to a section with other numbers. Such
-     * sections stand in the order of their numbers, behind all else. */
+    /* Writes the children of a node to `into`. They become links, except for nodes on the path to a renumbered section,
+     * which are copied. Renumbered sections are sorted by their numbers, behind all other nodes. */
     void write_children(double node, const std::string &path, double into) const
     {
         std::vector<double> children = from_.children(node);
@@ -311,7 +314,7 @@ class link_writer
     }
 };
 
-/* A file that exists only while VTK reads it. HDF5 opens no file that has no name. */
+/* A temporary file that exists only while VTK reads it. It needs a name, because HDF5 cannot open unnamed files. */
 class link_file
 {
   public:
@@ -334,7 +337,7 @@ class link_file
 
     const std::string &name() const { return name_; }
 
-    /* Calls read() while the file is there; false if it cannot be written. */
+    /* Creates the file, calls read(), and deletes the file. Returns false if it cannot be written. */
     template <typename Read> bool while_there(const Read &read) const
     {
         const int file = open(name_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, S_IRUSR | S_IWUSR);
@@ -354,7 +357,7 @@ class link_file
     std::string name_, content_;
 };
 
-/* VTK's reader, of the file of links if it has one. */
+/* VTK's reader, which reads from the file of links if there is one. */
 class reader : public vtkCGNSReader
 {
   public:
@@ -399,7 +402,8 @@ vtkStandardNewMacro(reader)
 
 vtkSmartPointer<vtkAlgorithm> make_cgns(const std::string &path)
 {
-    (void)node_file(path, CGIO_MODE_READ); /* VTK's reader ends the program where a file cannot be opened */
+    /* Throws if the file cannot be opened, because VTK's reader would terminate the program. */
+    (void)node_file(path, CGIO_MODE_READ);
     const new_numbers numbers = numbers_for_vtk(path);
     auto r = vtkSmartPointer<reader>::New();
     if (numbers.empty()) {

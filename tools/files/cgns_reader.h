@@ -1,4 +1,4 @@
-/* Reads CGNS files by VTK's reader, with elements numbered as that expects them. */
+/* Reads CGNS files with VTK's reader, after renumbering elements if VTK would misread them. */
 #ifndef CGNS_READER_H
 #define CGNS_READER_H
 
@@ -11,8 +11,9 @@ class vtkAlgorithm;
 namespace render_tool
 {
 
-/* A reader with all bases and arrays switched on. Throws std::runtime_error if path is no CGNS file or is cut short,
- * and with the zone and the section if the numbers of a misread zone's elements have gaps. */
+/* Returns a reader with all bases and arrays enabled. Throws std::runtime_error if path is not a CGNS file or is
+ * truncated, or, with the names of the zone and section, if a zone that VTK would misread has gaps in its element
+ * numbers. */
 vtkSmartPointer<vtkAlgorithm> make_cgns(const std::string &path);
 
 } // namespace render_tool

@@ -1,5 +1,5 @@
-/* Opens each file by one of VTK's readers (file_kinds.cpp), or as a list of other files (piece_files.cpp). For readers
- * that read zeros where a file's end is missing, the length is checked first. */
+/* Opens each file with one of VTK's readers (file_kinds.cpp), or as a list of other files (piece_files.cpp). If a
+ * reader returns zeros for data missing at the end of a file, the length of the file is checked first. */
 #include "data_file.h"
 
 #include <cerrno>
@@ -53,7 +53,7 @@ bool is_empty(vtkDataObject *data)
     return !data || (!vtkDataSet::SafeDownCast(data) && !vtkCompositeDataSet::SafeDownCast(data));
 }
 
-/* A file for one of VTK's readers. */
+/* A file that one of VTK's readers reads. */
 class vtk_file : public data_file
 {
   public:
@@ -99,7 +99,7 @@ class vtk_file : public data_file
         throw_caught(path_);
         vtkDataObject *output = reader_->GetOutputDataObject(0);
         if (is_empty(output)) throw std::runtime_error(path_ + ": holds no data set");
-        /* A copy by reference: the reader may then read its next step while this one is in use. */
+        /* Returns a shallow copy, so that the reader can read the next step while this one is in use. */
         auto kept = vtkSmartPointer<vtkDataObject>::Take(output->NewInstance());
         kept->ShallowCopy(output);
         return kept;
@@ -112,7 +112,8 @@ class vtk_file : public data_file
     int pieces_ = 1;
 };
 
-/* A .vtu without points and cells. VTK's reader reports an error where such a file leaves the lists of them out. */
+/* A .vtu file without points and cells. VTK's reader reports an error if the lists of points and cells are missing in
+ * such a file. */
 class empty_file : public data_file
 {
   public:
@@ -128,7 +129,7 @@ class empty_file : public data_file
 
   private:
     std::string path_;
-    std::vector<double> times_; // none
+    std::vector<double> times_; // always empty
 };
 
 } // namespace

@@ -1,4 +1,4 @@
-/* A file of cells, whichever reader it needs. */
+/* The interface to a file of cells, independent of the reader that it needs. */
 #ifndef DATA_FILE_H
 #define DATA_FILE_H
 
@@ -14,20 +14,20 @@ class vtkDataObject;
 namespace render_tool
 {
 
-/* "" or why the file cannot be read as data: it is missing, a directory or not readable, or no reader has its ending.
- */
+/* Returns "", or the reason why the file cannot be read as data: it does not exist, is a directory, is not readable, or
+ * has an unknown extension. */
 std::string why_not_data(const std::string &path);
 
-/* The endings that are read, for help texts: ".vtu .pvtu ...". */
+/* Returns the supported extensions for help texts: ".vtu .pvtu ...". */
 std::string known_endings();
 
-/* Tells whether a reader has the file's ending. */
+/* Checks whether there is a reader for the file's extension. */
 bool has_known_ending(const std::string &path);
 
-/* Tells whether the name is that of a scene file. */
+/* Checks whether the name is that of a scene file. */
 bool is_scene(const std::string &path);
 
-/* Tells whether files of this ending hold time steps, or name files that are steps. */
+/* Checks whether files with this extension may contain time steps, or reference files that are steps. */
 bool may_hold_steps(const std::string &path);
 
 class data_file
@@ -35,20 +35,20 @@ class data_file
   public:
     virtual ~data_file() = default;
 
-    /* The times of the steps inside; empty where the file has none. */
+    /* Returns the times of the steps in the file; empty if the file has no steps. */
     virtual const std::vector<double> &times() const = 0;
 
-    /* The file from which the step is read, as a person would name it. */
+    /* Returns the path of the file that contains the step, for messages. */
     virtual std::string step_path(size_t step) const = 0;
 
-    /* The number of pieces that a step can be read in; 1 for most files. Throws as read() does. */
+    /* Returns the number of pieces in which a step can be read, which is 1 for most files. Throws as read() does. */
     virtual int pieces(size_t step) = 0;
 
-    /* Reads piece `piece` of `pieces` of a step (0 where the file has none); 0 of 1 is all of it. Throws
-     * std::runtime_error with the file's name and what is wrong. */
+    /* Reads piece number `piece` of `pieces` of a step; piece 0 of 1 is the whole step. step is 0 for a file without
+     * steps. Throws std::runtime_error with the file's name and the problem. */
     virtual vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) = 0;
 
-    /* What is worth a warning of what was read since the last call, a line each. */
+    /* Returns the warnings since the last call, one per line. */
     std::string take_warnings() { return std::exchange(warnings_, ""); }
 
   protected:
@@ -58,14 +58,14 @@ class data_file
     std::string warnings_;
 };
 
-/* Throws as data_file::read() does. */
+/* Opens a file with the reader for its extension. Throws as data_file::read() does. */
 std::unique_ptr<data_file> open_data_file(const std::string &path);
 
-/* Opens path by VTK's reader for its ending, which must be known. The file need not exist if the reader goes by its
- * folder alone. Throws as data_file::read() does. */
+/* Opens path with VTK's reader for its extension, which must be known. If the reader uses only the folder, the file
+ * need not exist. Throws as data_file::read() does. */
 std::unique_ptr<data_file> open_by_vtk(const std::string &path);
 
-/* A data set's time, from its field data TimeValue, or fallback where there is none. */
+/* Returns the time in the field data TimeValue of a data set, or fallback if it has none. */
 double time_of(vtkDataObject *data, double fallback);
 
 } // namespace render_tool

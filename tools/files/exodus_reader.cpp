@@ -1,11 +1,11 @@
-/* VTK 9.1 takes the type of a block's cells from the first letters of its element type and from a short list of numbers
- * of nodes. For a number that is not in the list it takes the linear type, but goes through the connectivity by that
- * type's number of nodes: a HEX9's second cell begins at the first one's ninth node.
+/* VTK 9.1 determines the cell type of a block from the first letters of its element type and a short list of numbers of
+ * nodes. If the number is not in the list, it uses the linear type, but advances through the connectivity by the number
+ * of nodes of the linear type: the second cell of a block of HEX9 elements begins at the ninth node of the first.
  *
- * Corners come first in every element type. So the cells of a block whose elements have another number of nodes than
- * its cells are made anew, from the corners in the file's own connectivity. VTK's reader keeps only the points of the
- * cells that it made, so where a number of nodes is unusual it is told to keep all points, and each block's are picked
- * here. */
+ * The corners are the first nodes of every element type. For a block whose elements have a different number of nodes
+ * than its cells, the cells are therefore created again, from the corners in the file's connectivity. VTK's reader
+ * keeps only the points of its own cells; if a number of nodes is unusual, the reader is configured to keep all points,
+ * and those that each block uses are extracted here. */
 #include "exodus_reader.h"
 
 #include <algorithm>
@@ -42,12 +42,13 @@ namespace
 struct element_block {
     std::string type;
     int64_t elements = 0;
-    int64_t nodes = 0; // of each element; 0: they differ (nsided, nfaced)
+    int64_t nodes = 0; // number of nodes per element; 0 if elements differ (nsided, nfaced)
 };
 
 struct shape {
-    int cell_type = VTK_EMPTY_CELL; // of the cell between the corners; empty for those that are not made anew
-    int64_t corners = 0;            // 0: the type is not known
+    int cell_type = VTK_EMPTY_CELL; // type of the linear cell with the same corners; VTK_EMPTY_CELL if the cells are
+                                    // not created again
+    int64_t corners = 0;            // number of corners; 0 if the type is unknown
 };
 
 std::string upper(std::string text)
@@ -56,7 +57,8 @@ std::string upper(std::string text)
     return text;
 }
 
-/* By the first three letters, as VTK does. A shell of three corners is called SHELL3, SHELL6 or TRISHELL. */
+/* Returns the shape of a block's elements from the first three letters of their type, as VTK does. A triangular shell
+ * is called SHELL3, SHELL6 or TRISHELL. */
 shape shape_of(const element_block &b)
 {
     static const std::map<std::string, shape> shapes = {
@@ -72,7 +74,7 @@ shape shape_of(const element_block &b)
     return found == shapes.end() ? shape{} : found->second;
 }
 
-/* Tells whether VTK has a cell type of so many nodes, as far as is known. */
+/* Checks whether VTK has a cell type with this number of nodes. */
 bool is_usual(const element_block &b)
 {
     static const std::map<int, std::vector<int64_t>> usual = {
@@ -88,7 +90,8 @@ std::string describe(int64_t id, const element_block &b)
            std::to_string(b.nodes) + " nodes";
 }
 
-/* Throws std::runtime_error where VTK's reader would read beyond the connectivity, or says less. */
+/* Throws std::runtime_error for elements that VTK's reader would read beyond the end of the connectivity, or whose type
+ * is unknown. The message is more specific than VTK's. */
 void check_elements(const std::string &path, int64_t id, const element_block &b)
 {
     const int64_t corners = shape_of(b).corners;
@@ -98,7 +101,7 @@ void check_elements(const std::string &path, int64_t id, const element_block &b)
         (corners > 0 ? ", fewer than its " + std::to_string(corners) + " corners" : ", a type that is not known"));
 }
 
-/* An open Exodus file, whose numbers come in 64 bits. */
+/* An open Exodus file, whose integers are read with 64 bits. */
 class exodus_file
 {
   public:
@@ -117,7 +120,7 @@ class exodus_file
 
     bool is_open() const { return id_ >= 0; }
 
-    /* By their ids; empty where they cannot be read. */
+    /* Returns the element blocks by their ids; empty if they cannot be read. */
     std::map<int64_t, element_block> blocks() const
     {
         std::map<int64_t, element_block> all;
@@ -139,7 +142,7 @@ class exodus_file
         return all;
     }
 
-    /* The nodes of all elements of a block, from 1; empty where they cannot be read. */
+    /* Returns the nodes of all elements of a block, counted from 1; empty if they cannot be read. */
     std::vector<int64_t> connectivity(int64_t block, const element_block &b) const
     {
         std::vector<int64_t> nodes(static_cast<size_t>(b.elements * b.nodes));
@@ -151,7 +154,7 @@ class exodus_file
     int id_ = -1;
 };
 
-/* Puts cells between the corners into grid in place of its own. Returns what is wrong, or "". */
+/* Replaces the grid's cells by linear cells with the same corners. Returns an error message, or "". */
 std::string set_cells(vtkUnstructuredGrid *grid, const element_block &b, const std::vector<int64_t> &nodes)
 {
     const shape s = shape_of(b);
@@ -205,7 +208,7 @@ class reader : public vtkExodusIIReader
   private:
     std::map<int64_t, element_block> blocks_;
 
-    /* The block that a grid was made from; null where that is not known or the grid has no cells. */
+    /* Returns the block from which a grid was made; null if it is unknown or the grid has no cells. */
     const element_block *block_of(vtkUnstructuredGrid *grid, int64_t &id) const
     {
         vtkDataArray *ids = grid ? grid->GetCellData()->GetArray(GetObjectIdArrayName()) : nullptr;
@@ -215,13 +218,14 @@ class reader : public vtkExodusIIReader
         return found == blocks_.end() ? nullptr : &found->second;
     }
 
-    /* Tells whether the cells of a block's grid have another number of points than the block's elements. */
+    /* Checks whether the cells of a block's grid have a different number of points than the block's elements. */
     static bool has_other_cells(vtkUnstructuredGrid *grid, const element_block &b)
     {
         return b.nodes > 0 && (grid->GetCells()->GetCellSize(0) != b.nodes || grid->GetCellType(0) == VTK_EMPTY_CELL);
     }
 
-    /* Makes wrong cells anew, and leaves each block the points that it uses. Returns what is wrong, or "". */
+    /* Replaces wrong cells, and reduces the points of each block to those that it uses. Returns an error message, or
+     * "". */
     std::string set_right(vtkMultiBlockDataSet *all)
     {
         for (unsigned i = 0; all && i < all->GetNumberOfBlocks(); i++) {
@@ -272,7 +276,8 @@ vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path)
     return r;
 }
 
-/* VTK's reader moves the points by the first vector at nodes whose name begins with "dis". */
+/* Warns of displaced points: VTK's reader displaces the points by the first vector field at nodes whose name begins
+ * with "dis". */
 std::string warn_of_exodus(const std::string &path, vtkAlgorithm *algorithm)
 {
     auto *r = vtkExodusIIReader::SafeDownCast(algorithm);

@@ -1,4 +1,4 @@
-/* Reads Exodus files by VTK's reader, and sets right what that makes of element types that it does not have. */
+/* Reads Exodus files with VTK's reader, and corrects the cells of element types that VTK does not support. */
 #ifndef EXODUS_READER_H
 #define EXODUS_READER_H
 
@@ -11,12 +11,13 @@ class vtkAlgorithm;
 namespace render_tool
 {
 
-/* A reader with all arrays switched on. Elements with more nodes than VTK has a cell type for become linear cells
- * between their corners. Throws std::runtime_error with the block, the element type and its number of nodes where an
- * element has fewer nodes than corners; the reader reports the same for types that neither VTK nor this file has. */
+/* Returns a reader with all arrays enabled. Elements with more nodes than any VTK cell type become linear cells with
+ * the same corners. Throws std::runtime_error with the block, the element type and its number of nodes if an element
+ * has fewer nodes than corners; the reader reports the same for element types that are unknown to VTK and to this
+ * file. */
 vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path);
 
-/* What is worth a warning of the file of a reader that make_exodus() made, a line each: that its points are moved. */
+/* Returns a warning if the reader, which make_exodus() must have created, displaces points; otherwise "". */
 std::string warn_of_exodus(const std::string &path, vtkAlgorithm *reader);
 
 } // namespace render_tool

@@ -1,5 +1,5 @@
-/* Each ending has a function that makes its reader, with every array switched on: some of VTK's readers load nothing
- * unless asked. Readers that Debian's VTK may lack are compiled in only where CMake found them. */
+/* Each file extension has a function that creates its reader, with every array enabled, because some of VTK's readers
+ * load nothing by default. Readers that a VTK installation may lack are compiled only if CMake found them. */
 #include "file_kinds.h"
 
 #include <vtkAlgorithm.h>
@@ -65,7 +65,7 @@ reader make_amr(const std::string &path)
 {
     auto r = vtkSmartPointer<vtkXMLUniformGridAMRReader>::New();
     r->SetFileName(path.c_str());
-    r->SetMaximumLevelsToReadByDefault(0); // all
+    r->SetMaximumLevelsToReadByDefault(0); // 0 means all levels
     return r;
 }
 
@@ -80,7 +80,7 @@ reader make_ensight(const std::string &path)
 #endif
 
 #ifdef INSITU_VTK_OPENFOAM
-/* Makes a reader of the mesh's cells with the values that the solver computed, without VTK's means of them at the
+/* Creates a reader of the mesh's cells with the values that the solver computed, without VTK's averages at the
  * points. */
 reader make_openfoam(const std::string &path)
 {

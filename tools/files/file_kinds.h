@@ -1,4 +1,4 @@
-/* Knows for each ending which of VTK's readers reads it, and makes it ready to load everything. */
+/* The table of file extensions, with the VTK reader for each. */
 #ifndef FILE_KINDS_H
 #define FILE_KINDS_H
 
@@ -14,15 +14,15 @@ namespace render_tool
 
 struct file_kind {
     const char *ending;
-    vtkSmartPointer<vtkAlgorithm> (*make)(const std::string &path); // null: no reader of VTK's (see data_file.cpp)
+    vtkSmartPointer<vtkAlgorithm> (*make)(const std::string &path); // null if VTK has no such reader
     bool may_hold_steps;
-    bool names_files;      // it names files of its own folder, which the reader opens
-    const char *piece_tag; // an XML tag that the file has once for each piece that can be read separately
+    bool names_files;      // the file references files in its folder, which the reader opens
+    const char *piece_tag; // XML tag that occurs once for each piece that can be read separately
 };
 
 const std::vector<file_kind> &file_kinds();
 
-/* Null where the name has no ending that is known. */
+/* Returns null if the extension is unknown. */
 const file_kind *kind_of(const std::string &path);
 
 } // namespace render_tool

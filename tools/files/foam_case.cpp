@@ -1,5 +1,6 @@
-/* Each processor's folder has the layout of a case, so VTK's reader of whole cases reads one alone, by the name of a
- * file in it that need not exist. Its own reader of decomposed cases takes all folders on every rank.
+/* The folder of each processor has the layout of a case, so that VTK's reader for complete cases can read it alone,
+ * through the name of a file in it that need not exist. VTK's reader for decomposed cases reads all folders on every
+ * rank.
  *
  *     case/dec.foam
  *     case/processor0/constant/polyMesh/points ...
@@ -38,7 +39,7 @@ bool are_digits(const std::string &text)
     return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
-/* The folders of steps by their times. */
+/* Returns the folders of steps by their times. */
 std::map<double, std::string> steps_in(const fs::path &folder)
 {
     std::map<double, std::string> steps;
@@ -50,7 +51,7 @@ std::map<double, std::string> steps_in(const fs::path &folder)
     return steps;
 }
 
-/* Tells whether a case has a mesh, or meshes of regions. */
+/* Checks whether a case has a mesh, or meshes of regions. */
 bool has_mesh(const fs::path &folder)
 {
     std::error_code code;
@@ -66,7 +67,7 @@ std::string folder_of(size_t processor)
     return "processor" + std::to_string(processor);
 }
 
-/* The numbers of the processors that have a folder, in order. */
+/* Returns the numbers of the processors that have a folder, in ascending order. */
 std::vector<int> processors_in(const fs::path &folder)
 {
     std::vector<int> numbers;
@@ -94,7 +95,7 @@ void check_processors(const std::string &path, const fs::path &folder, const std
     }
 }
 
-/* Throws where there are no folders of single processors, but one that holds several in OpenFOAM's collated format. */
+/* Throws if there are no folders of single processors, but one folder for several in OpenFOAM's collated format. */
 void check_collated(const std::string &path, const fs::path &folder)
 {
     for (const std::string &name : folders_in(folder))

@@ -24,7 +24,7 @@ namespace render_tool
 namespace
 {
 
-/* Gives a grid's cells ghost flags of VTK's own type where they have others. Returns a copy by reference then. */
+/* Returns the grid, or a shallow copy with ghost flags of VTK's type if its cells have other ghost flags. */
 vtkSmartPointer<vtkUnstructuredGrid> with_ghost_bytes(vtkUnstructuredGrid *grid)
 {
     const auto flags = vtkSmartPointer<vtkUnsignedCharArray>::Take(
@@ -37,7 +37,7 @@ vtkSmartPointer<vtkUnstructuredGrid> with_ghost_bytes(vtkUnstructuredGrid *grid)
     return copy;
 }
 
-/* An object that is no data set is returned as it is. */
+/* Converts a leaf to an unstructured grid. An object that is not a data set is returned unchanged. */
 vtkSmartPointer<vtkDataObject> grid_of(vtkDataObject *leaf, const std::string &path)
 {
     auto *data = vtkDataSet::SafeDownCast(leaf);

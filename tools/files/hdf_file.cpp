@@ -1,16 +1,16 @@
-/* A file of unstructured grids, by VTK's description of the format, version 2. A part is a grid of its own, and a step
- * has one or several. Arrays of all parts and steps stand one after the other:
+/* Reads a file of unstructured grids by VTK's description of the format, version 2. A part is a separate grid, and a
+ * step has one or several parts. The arrays of all parts and steps are concatenated:
  *
  *     /VTKHDF                     attribute Type
- *       NumberOfPoints, NumberOfCells, NumberOfConnectivityIds    one entry a part
- *       Points, Types, Connectivity, Offsets (number of cells + 1 a part)
+ *       NumberOfPoints, NumberOfCells, NumberOfConnectivityIds    one entry per part
+ *       Points, Types, Connectivity, Offsets (number of cells + 1 per part)
  *       PointData/NAME, CellData/NAME
- *       Steps                     attribute NSteps; each of these has one entry a step
- *         Values                  the times
+ *       Steps                     attribute NSteps; each of the following has one entry per step
+ *         Values                  times
  *         PartOffsets, NumberOfParts
- *         PointOffsets, CellOffsets, ConnectivityIdOffsets        where the first part's begin
- *         PointDataOffsets/NAME, CellDataOffsets/NAME             the same of fields; as the points, cells if missing
- */
+ *         PointOffsets, CellOffsets, ConnectivityIdOffsets        first index of the step's first part
+ *         PointDataOffsets/NAME, CellDataOffsets/NAME             the same for fields; by default as for points or
+ * cells */
 #include "hdf_file.h"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ namespace
 
 using array_pointer = vtkSmartPointer<vtkDataArray>;
 
-/* A handle of the HDF5 library's, closed at the end. */
+/* Owns a handle of the HDF5 library and closes it in the destructor. */
 class handle
 {
   public:
@@ -64,7 +64,7 @@ class handle
     herr_t (*close_)(hid_t);
 };
 
-/* VTK's type for numbers in a file; VTK_VOID for all else. */
+/* Returns VTK's type for numeric types in a file, and VTK_VOID for all others. */
 int vtk_type(hid_t type)
 {
     const size_t size = H5Tget_size(type);
@@ -93,7 +93,7 @@ hid_t memory_type(int type)
     case VTK_UNSIGNED_INT: return H5T_NATIVE_UINT;
     case VTK_LONG_LONG: return H5T_NATIVE_LLONG;
     case VTK_UNSIGNED_LONG_LONG: return H5T_NATIVE_ULLONG;
-    default: return H5T_NATIVE_INT64; /* vtkIdType */
+    default: return H5T_NATIVE_INT64; /* for vtkIdType */
     }
 }
 
@@ -112,7 +112,8 @@ class hdf
         throw std::runtime_error(path_ + ": cannot be read: " + why);
     }
 
-    /* Each group on the way must be there before the next is asked for. */
+    /* Checks whether an object exists. H5Lexists() requires that each group of the path exists, so they are checked one
+     * by one. */
     bool has(const std::string &name) const
     {
         for (size_t at = name.find('/', 1); at != std::string::npos; at = name.find('/', at + 1))
@@ -120,7 +121,7 @@ class hdf
         return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0;
     }
 
-    /* The file's Type. */
+    /* Returns the file's attribute Type. */
     std::string type() const
     {
         if (H5Aexists_by_name(file_, "/VTKHDF", "Type", H5P_DEFAULT) <= 0) refuse("its group VTKHDF has no Type");
@@ -139,7 +140,7 @@ class hdf
         return text.substr(0, text.find('\0'));
     }
 
-    /* The names of the data sets in a group; none where it is missing. */
+    /* Returns the names of the data sets in a group; empty if there is no such group. */
     std::vector<std::string> names(const std::string &group) const
     {
         std::vector<std::string> all;
@@ -153,8 +154,8 @@ class hdf
         return all;
     }
 
-    /* Rows first, first + 1, ... of a data set, as VTK's type `as`, or of the file's type for VTK_VOID. Null where it
-     * holds no numbers. A negative count is all. */
+    /* Returns `count` rows of a data set from `first` on, or all if count is negative. They are converted to VTK's type
+     * `as`, or keep the file's type for VTK_VOID. Returns null if the data set is not numeric. */
     array_pointer rows(const std::string &name, int64_t first, int64_t count, int as = VTK_VOID) const
     {
         if (!has(name)) refuse(name + " is missing");
@@ -186,7 +187,7 @@ class hdf
         return array;
     }
 
-    /* The number of rows of a data set; 0 where there is none. */
+    /* Returns the number of rows of a data set; 0 if it does not exist. */
     int64_t length(const std::string &name) const
     {
         const handle set(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
@@ -196,7 +197,7 @@ class hdf
         return H5Sget_simple_extent_dims(space, sizes.data(), nullptr) > 0 ? static_cast<int64_t>(sizes[0]) : 0;
     }
 
-    /* Row `row`'s first number. */
+    /* Returns the first number of a row. */
     int64_t number(const std::string &name, int64_t row) const
     {
         const array_pointer one = rows(name, row, 1, VTK_ID_TYPE);
@@ -209,7 +210,7 @@ class hdf
     handle file_;
 };
 
-/* Where the arrays of a part begin. */
+/* The first index of a part in each array, and its counts. */
 struct part_place {
     int64_t part = 0;
     int64_t point = 0, cell = 0, id = 0, offset = 0;
@@ -266,7 +267,7 @@ class hdf_grids : public data_file
     bool has_steps_;
     std::vector<double> times_;
 
-    /* An entry of Steps; `missing` where there are no steps, or no such list. */
+    /* Returns an entry of Steps, or `missing` if there are no steps or there is no such list. */
     int64_t of_step(const std::string &name, size_t step, int64_t missing) const
     {
         const std::string list = "/VTKHDF/Steps/" + name;
@@ -304,8 +305,8 @@ class hdf_grids : public data_file
                in_.number(offsets, at.offset) == 0 && in_.number(offsets, at.offset + at.cells) == at.ids;
     }
 
-    /* The list of offsets has one entry more than that of cells for each part before; parts whose cells are those of
-     * an earlier step have none of their own. */
+    /* Returns by how many entries the list of offsets is ahead of that of cells: one for each earlier part. Parts that
+     * reuse the cells of an earlier step have no entries of their own. */
     int64_t offsets_beside_cells(const part_place &at) const
     {
         int64_t parts = 0;
@@ -357,8 +358,8 @@ class hdf_grids : public data_file
     }
 
     struct field_place {
-        int64_t in_step, count; // from the first part's on
-        int64_t first;          // the first part's points or cells, where a field has no place of its own
+        int64_t in_step, count; // counted from the first part
+        int64_t first;          // first index of the first part, for fields without an entry of their own
         size_t step;
     };
 

@@ -1,5 +1,5 @@
-/* VTK's HDF files (.vtkhdf), of which VTK 9.1's own reader takes the first version alone: it reads no steps, but all
- * steps' points and cells as one grid. */
+/* Reads VTK's HDF files (.vtkhdf). VTK 9.1's own reader supports only the first version of the format: it ignores steps
+ * and reads the points and cells of all steps as one grid. */
 #ifndef HDF_FILE_H
 #define HDF_FILE_H
 
@@ -11,8 +11,8 @@
 namespace render_tool
 {
 
-/* Opens a file of unstructured grids, with or without steps. Null for an image without steps, which VTK's reader reads.
- * Throws std::runtime_error with what is not read for any other type, and where the file is none of VTK's. */
+/* Opens a file of unstructured grids, with or without steps. Returns null for an image without steps, which VTK's
+ * reader can read. Throws std::runtime_error for any other type, or if the file is not a VTK HDF file. */
 std::unique_ptr<data_file> open_hdf(const std::string &path);
 
 } // namespace render_tool

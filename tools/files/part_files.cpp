@@ -43,7 +43,7 @@ vtkSmartPointer<vtkDataObject> parts_file::read(size_t step, int piece, int piec
         all->SetBlock(static_cast<unsigned>(p), part);
         if (!first) first = vtkMultiBlockDataSet::SafeDownCast(part);
     }
-    /* Parts of other ranks have as many leaves, so that a mesh has one number on all ranks. */
+    /* Creates empty leaves for the parts of other ranks, so that the leaves have the same numbers on all ranks. */
     for (unsigned p = 0; first && p < count; p++) {
         if (all->GetBlock(p)) continue;
         auto empty = vtkSmartPointer<vtkMultiBlockDataSet>::New();

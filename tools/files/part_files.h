@@ -1,4 +1,4 @@
-/* Data sets that are divided into files, each of which holds a part of every step. */
+/* Data sets that are stored in several files, each of which contains a part of every step. */
 #ifndef PART_FILES_H
 #define PART_FILES_H
 
@@ -11,8 +11,8 @@
 namespace render_tool
 {
 
-/* A data set with these steps, of parts that VTK's readers read (open_by_vtk()), each a block. path names the whole.
- * All parts have blocks of their own alike. */
+/* A data set whose parts are read by VTK's readers (open_by_vtk()); each part becomes a block. path names the whole
+ * data set. All parts must have the same structure of blocks. */
 class parts_file : public data_file
 {
   public:
@@ -28,35 +28,37 @@ class parts_file : public data_file
   private:
     std::string path_;
     std::vector<std::string> parts_;
-    std::vector<std::unique_ptr<data_file>> files_; // by part; null until read
+    std::vector<std::unique_ptr<data_file>> files_; // one per part; null until it is read
     std::vector<double> times_;
 
     vtkSmartPointer<vtkDataObject> read_part(size_t part, size_t step);
 };
 
-/* The files of a parallel run's Exodus output (Nemesis), run.e.4.0 to run.e.4.3. */
+/* The parsed name of a file of a parallel run's Exodus output (Nemesis), for example run.e.4.0 of run.e.4.0 to
+ * run.e.4.3. */
 struct nemesis_name {
-    std::string start; // "run.e.4."
-    int count = 1;     // 4
-    size_t digits = 1; // of the last number
+    std::string start; // for example "run.e.4."
+    int count = 1;     // number of files, for example 4
+    size_t digits = 1; // number of digits of the last number
 };
 
-/* Tells whether path is such a name, and takes it apart. */
+/* Parses path; returns false if it is not such a name. */
 bool parse_nemesis(const std::string &path, nemesis_name &name);
 
-/* The name with the ending by which a file's kind is known. It is another for Nemesis files and for files of runs whose
- * mesh changes: run.e for run.e.4.0, run.e-s002 and run.e-s002.4.0. */
+/* Returns the name with the extension that determines the kind of file. It differs from the file's name for Nemesis
+ * files and for files of runs whose mesh changes: it is run.e for run.e.4.0, run.e-s002 and run.e-s002.4.0. */
 std::string plain_name(const std::string &path);
 
-/* A time as messages have it. */
+/* Formats a time for messages. */
 std::string time_text(double time);
 
-/* Opens all files of which path is one. Throws std::runtime_error with the file that is missing. */
+/* Opens all files of the output to which path belongs. Throws std::runtime_error with the name of a file that is
+ * missing. */
 std::unique_ptr<data_file> open_nemesis(const std::string &path, const nemesis_name &name);
 
-/* Opens the processors' folders of an OpenFOAM case that has them, if it has no mesh of its own beside path or fewer
- * steps. Null for any other case, which VTK's reader reads. Throws std::runtime_error with the folder that is missing.
- */
+/* Opens the processor folders of an OpenFOAM case, if it has any and has no mesh of its own next to path, or fewer
+ * steps. Returns null for any other case, which VTK's reader can read. Throws std::runtime_error with the name of a
+ * folder that is missing. */
 std::unique_ptr<data_file> open_decomposed_foam(const std::string &path);
 
 } // namespace render_tool

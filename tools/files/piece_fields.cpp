@@ -1,5 +1,5 @@
-/* What is done to a piece depends on the piece and on the parallel file alone, so the picture does not depend on which
- * pieces a rank reads. Doubles hold the values of all shorter types. */
+/* Pieces are changed only depending on the piece itself and the parallel file, so that the picture does not depend on
+ * which pieces a rank reads. Double represents the values of all shorter types. */
 #include "piece_fields.h"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ bool is_ghost_array(const std::string &name)
     return name == vtkDataSetAttributes::GhostArrayName() || name == "avtGhostZones";
 }
 
-/* The type's name in VTK's XML files, such as "Float64". */
+/* Returns the name of the array's type in VTK's XML files, for example "Float64". */
 std::string type_name(vtkDataArray *array)
 {
     const int bits = 8 * array->GetDataTypeSize(), type = array->GetDataType();
@@ -131,7 +131,7 @@ void even_out_types(const std::vector<vtkUnstructuredGrid *> &pieces)
             if (!array || array->GetDataType() == VTK_DOUBLE) continue;
             const auto wide = doubles(field.second, array->GetNumberOfComponents(), array->GetNumberOfTuples());
             wide->DeepCopy(array);
-            data->AddArray(wide); /* in place of the one of that name */
+            data->AddArray(wide); /* replaces the array of the same name */
         }
     }
 }

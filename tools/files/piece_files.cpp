@@ -1,11 +1,11 @@
-/* A .pvtu's pieces are read one by one and appended here. VTK 9.1's own reader of .pvtu files puts the faces of
- * polyhedra under wrong cells where an earlier piece has none.
+/* The pieces of a .pvtu file are read one by one and appended. VTK 9.1's own reader of .pvtu files assigns the faces of
+ * polyhedra to wrong cells if an earlier piece has none.
  *
  *     .pvtu     <VTKFile> <PUnstructuredGrid> <Piece Source="a.vtu"/>...
  *     .pvd      <VTKFile> <Collection> <DataSet timestep="0.5" part="0" file="a.vtu"/>...
  *     .series   {"file-series-version": "1.0", "files": [{"name": "a.vtu", "time": 0.5}, ...]}
  *
- * Names are relative to the file's folder. Entries of a .pvd with one time are parts of one step. */
+ * Names are relative to the file's folder. Entries of a .pvd file with the same time are parts of one step. */
 #include "piece_files.h"
 
 #include <algorithm>
@@ -62,7 +62,7 @@ vtkSmartPointer<vtkXMLDataElement> read_list(const std::string &path, const char
     return found;
 }
 
-/* The elements called `name` in another. */
+/* Returns the child elements with this name. */
 std::vector<vtkSmartPointer<vtkXMLDataElement>> elements_of(vtkXMLDataElement *parent, const char *name)
 {
     std::vector<vtkSmartPointer<vtkXMLDataElement>> found;
@@ -72,7 +72,7 @@ std::vector<vtkSmartPointer<vtkXMLDataElement>> elements_of(vtkXMLDataElement *p
     return found;
 }
 
-/* The file that an element names; it must exist. */
+/* Returns the path of the file that an element's attribute names. Throws if the file does not exist. */
 std::string file_named_by(vtkXMLDataElement *element, const char *attribute, const std::string &path)
 {
     const char *name = element->GetAttribute(attribute);
@@ -83,7 +83,8 @@ std::string file_named_by(vtkXMLDataElement *element, const char *attribute, con
     return file;
 }
 
-/* Tables beside grids (.vtt) have no cells: they are not read as files, but within others. */
+/* Checks whether a file is a table (.vtt). Tables may be stored next to grids; they contain no cells and are
+ * skipped. */
 bool is_table(const char *name)
 {
     const std::string text = name;
@@ -98,7 +99,7 @@ void check_named(vtkXMLDataElement *element, const std::string &path)
     for (int i = 0; i < element->GetNumberOfNestedElements(); i++) check_named(element->GetNestedElement(i), path);
 }
 
-/* Tells whether file number `index` of `count` is for reader `piece` of `pieces`. */
+/* Checks whether file `index` of `count` belongs to piece `piece` of `pieces`. */
 bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
 {
     return static_cast<int>(index * static_cast<size_t>(pieces) / count) == piece;
@@ -106,7 +107,7 @@ bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
 
 using grid_list = std::vector<vtkSmartPointer<vtkUnstructuredGrid>>;
 
-/* Gives ghost flags to pieces without them, because appending keeps only arrays that all pieces have. */
+/* Adds ghost flags to pieces without them, because appending keeps only arrays that all pieces have. */
 void even_out_ghosts(const grid_list &grids)
 {
     const bool has_ghosts = std::any_of(grids.begin(), grids.end(), [](auto &g) { return g->GetCellGhostArray(); });
@@ -160,12 +161,12 @@ class pvtu_file : public data_file
     std::string path_;
     std::vector<std::string> pieces_;
     std::vector<declared_field> fields_;
-    std::vector<double> times_; // none
+    std::vector<double> times_; // always empty
 };
 
 struct series_step {
     double time;
-    std::vector<std::string> parts; // files
+    std::vector<std::string> parts; // paths of the step's files
 };
 
 class series_file : public data_file
@@ -227,7 +228,7 @@ class series_file : public data_file
     std::string path_;
     std::vector<series_step> steps_;
     std::vector<double> times_;
-    std::unique_ptr<data_file> open_; // the file read last
+    std::unique_ptr<data_file> open_; // the file that was read last
     std::string open_path_;
 };
 

@@ -1,4 +1,5 @@
-/* Files that name other files: a .pvtu its pieces; a .pvd and a .series the files that are time steps. */
+/* Opens files that reference other files: a .pvtu file references its pieces; .pvd and .series files reference time
+ * steps. */
 #ifndef PIECE_FILES_H
 #define PIECE_FILES_H
 
@@ -10,8 +11,8 @@
 namespace render_tool
 {
 
-/* Check that the files which an XML file names for VTK's own readers exist and are whole. Throws std::runtime_error
- * with the file's name and what is wrong, as do the functions below. */
+/* Checks that the files which an XML file references for VTK's own readers exist and are complete. Like the functions
+ * below, throws std::runtime_error with the file's name and the problem. */
 void check_named_files(const std::string &path);
 
 std::unique_ptr<data_file> open_pvtu(const std::string &path);

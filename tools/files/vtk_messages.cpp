@@ -1,5 +1,5 @@
-/* Some of VTK's readers only warn where a file ends too early, and go on with whatever their memory held. So a warning
- * about reading counts as an error. */
+/* Some of VTK's readers only warn if a file ends too early, and continue with uninitialized memory. Warnings during
+ * reading are therefore treated as errors. */
 #include "vtk_messages.h"
 
 #include <cctype>
@@ -26,7 +26,7 @@ bool contains_any(const char *text, std::initializer_list<const char *> parts)
     return false;
 }
 
-/* Takes the place of VTK's output window: keeps the first error, drops the rest. */
+/* Replaces VTK's output window: stores the first error and discards the other messages. */
 class message_catcher : public vtkOutputWindow
 {
   public:
@@ -39,7 +39,7 @@ class message_catcher : public vtkOutputWindow
     void DisplayGenericWarningText(const char *text) override { keep_if_serious(text); }
     void DisplayErrorText(const char *text) override
     {
-        /* VTK's own writer leaves out the points of a grid without cells, which its reader then reports. */
+        /* This message is no error: VTK's own writer omits the points of a grid without cells. */
         if (text && !contains_any(text, {"No Points element available in first piece"})) keep(text);
     }
 
@@ -59,10 +59,12 @@ class message_catcher : public vtkOutputWindow
 
 vtkStandardNewMacro(message_catcher)
 
-    message_catcher *catcher = nullptr; // owned by VTK from catch_vtk_messages() on
+    message_catcher *catcher = nullptr; // owned by VTK after catch_vtk_messages()
 
-/* VTK writes "ERROR: In file, line n\nclass (0x...): what\n\n", the class only if there is one. Only the last part is
- * of use to a person. */
+/* Extracts the part that is useful to the user from VTK's messages, which have the form "ERROR: In file, line n
+ * class (0x...): what
+ *
+ * "; the class may be missing. */
 std::string plain_words(std::string text)
 {
     if (text.find("returned failure for request") != std::string::npos) return "VTK's reader failed";

@@ -1,4 +1,5 @@
-/* VTK reports errors by printing them and going on. Here they are kept instead, and become one exception. */
+/* VTK reports errors by printing them and continues. These functions store the messages instead, and convert them to an
+ * exception. */
 #ifndef VTK_MESSAGES_H
 #define VTK_MESSAGES_H
 
@@ -7,14 +8,14 @@
 namespace render_tool
 {
 
-/* Catch VTK's messages from now on: nothing of VTK's is printed any more. */
+/* Redirects VTK's messages from now on; VTK prints nothing any more. */
 void catch_vtk_messages();
 
-/* Throw std::runtime_error with path and what VTK reported since the last call, if anything. */
+/* Throws std::runtime_error with path and VTK's message since the last call, if there is one. */
 void throw_caught(const std::string &path);
 
-/* While it lives nothing reaches stderr, for the libraries below VTK's readers (Exodus, NetCDF, HDF5) print what VTK
- * reports as well. */
+/* Suppresses all output to stderr during its lifetime, because the libraries used by VTK's readers (Exodus, NetCDF,
+ * HDF5) print errors that VTK reports as well. */
 class quiet_stderr
 {
   public:

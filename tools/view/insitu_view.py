@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
 """insitu-view: watch a running simulation, and edit its scene, in a browser or a terminal.
 
-Runs beside the run's files, on a login node, and serves 127.0.0.1 alone: the pictures of a Cinema database as they come,
-the statistics beside it, what the run reports (report.json in the database), and, with --scene, the scene in a text box.
-It needs nothing but Python's standard library. The simulation has no server: both know of each other by files alone.
+It runs on a login node with access to the run's files, and serves only 127.0.0.1: new pictures of a Cinema database, the
+statistics stored with it, the run's report (report.json in the database), and, with --scene, an editor for the scene.
+It requires only Python's standard library. The simulation contains no server: the two programs communicate only through
+files.
 
-Who may ask. All users of the node reach its 127.0.0.1, and so does every page that a browser there has open. So each
-address begins with a token of 128 random bits, the Host header has to be this machine's (a foreign name that is made to
-point here is refused), and what is written has to come from a page of this server. The database's own page, which the
-run has written, is served as of an origin of its own: it can show pictures and do nothing else.
+Access. Every user of the node can connect to its 127.0.0.1, and so can every page that is open in a browser there.
+Therefore each address begins with a token of 128 random bits, the Host header must be that of this machine (which
+prevents DNS rebinding), and writing is possible only from a page of this server. The database's own page, which was
+written by the run, is served with a separate origin: it can only show pictures.
 
-What is served. Regular files of known kinds below the database, opened folder by folder without following any link;
-numbers of statistics files beside it, and the scene. Nothing is listed.
+Files. Only regular files with known extensions in the database are served. They are opened folder by folder without
+following links. In addition, the numbers in statistics files and the scene are served. Folders are never listed.
 """
 
 import argparse
@@ -35,10 +36,10 @@ import threading
 import time
 import urllib.parse
 
-MAX_SCENE = 1 << 20  # bytes, as the library takes them
+MAX_SCENE = 1 << 20  # in bytes; the same limit as in the library
 MAX_REPORT = 1 << 20
 MAX_STATISTICS, MAX_STATISTICS_FILES, MAX_ROWS = 8 << 20, 16, 1000
-MAX_PICTURE = 64 << 20  # of those that are sent to a terminal
+MAX_PICTURE = 64 << 20  # in bytes, for pictures that are sent to a terminal
 MAX_CONNECTIONS = 64
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".csv": "text/csv; charset=utf-8",
          ".json": "application/json", ".png": "image/png", ".exr": "image/x-exr"}
@@ -50,7 +51,7 @@ PAGE = r"""@INSITU_VIEW_PAGE@"""
 # ---- files ------------------------------------------------------------------------------------------------------------
 
 def open_inside(root, parts):
-    """Open a regular file below a folder for reading, following no link on the way. OSError: there is no such file."""
+    """Open a regular file in a folder tree for reading, without following links. Raises OSError if there is none."""
     if not parts or any(part in ("", ".", "..") or "/" in part or "\0" in part for part in parts):
         raise FileNotFoundError("no such file")
     folder = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
@@ -70,7 +71,7 @@ def open_inside(root, parts):
 
 
 def read_inside(root, parts, limit):
-    """The bytes of a file; None: there is none, or it has more than limit."""
+    """Return the contents of a file, or None if it does not exist or has more than limit bytes."""
     try:
         with open_inside(root, parts) as file:
             data = file.read(limit + 1)
@@ -80,23 +81,23 @@ def read_inside(root, parts, limit):
 
 
 def stamp_of(info):
-    """When a file was changed, as report.json has it."""
+    """Return the modification time of a file in the format of report.json."""
     return "%d.%09d" % divmod(info.st_mtime_ns, 10**9)
 
 
 class Changed(Exception):
-    """The scene on disk is another one than the one that was edited."""
+    """Raised if the scene file has changed since it was read for editing."""
 
 
 class Scene:
-    """A scene file. Where its name is a link, the file that it leads to."""
+    """A scene file, or the target of the link if its name is a link."""
 
     def __init__(self, path):
         self.path, self.shown = os.path.realpath(path), path
         self.lock = threading.Lock()
 
     def read(self):
-        """Text and stamp. OSError or ValueError: it cannot be read."""
+        """Return the text and its stamp. Raises OSError or ValueError if the file cannot be read."""
         with open(self.path, "rb") as file:
             info = os.fstat(file.fileno())
             data = file.read(MAX_SCENE + 1)
@@ -111,8 +112,7 @@ class Scene:
             return None
 
     def write(self, text, stamp):
-        """Put the text in the file's place, which no reader sees in part, if the file is that of the stamp. Returns the
-        new stamp."""
+        """Replace the file atomically by the text, if the file still has this stamp. Returns the new stamp."""
         with self.lock:
             if self.stamp() != stamp:
                 raise Changed()
@@ -134,11 +134,11 @@ class Scene:
 
 
 class Statistics:
-    """The files of statistics in the database's folder and beside it."""
+    """The statistics files in the database's folder and in its parent folder."""
 
     def __init__(self, database):
         self.folders = (database, os.path.dirname(database))
-        self.known = {}  # (folder, name): (stamp, what to send)
+        self.known = {}  # cache: (folder, name) -> (key of the file's state, table)
 
     def files(self):
         out = []
@@ -154,7 +154,7 @@ class Statistics:
         return out
 
     def table(self, folder, name):
-        """Cycles, times and values of a file; None: it holds no statistics."""
+        """Return the table of a file, or None if the file contains no statistics."""
         try:
             with open_inside(folder, [name]) as file:
                 info = os.fstat(file.fileno())
@@ -174,9 +174,9 @@ class Statistics:
         if size > MAX_STATISTICS:
             file.seek(size - MAX_STATISTICS)
             file.readline()
-        lines = file.read(MAX_STATISTICS).decode("utf-8", "replace").split("\n")[:-1]  # a torn last line is dropped
+        lines = file.read(MAX_STATISTICS).decode("utf-8", "replace").split("\n")[:-1]  # drops an incomplete last line
         step = max(1, math.ceil(len(lines) / MAX_ROWS))
-        chosen = lines[(len(lines) - 1) % step::step] if lines else []  # the last one too
+        chosen = lines[(len(lines) - 1) % step::step] if lines else []  # always includes the last line
         rows = []
         for line in chosen:
             try:
@@ -197,7 +197,7 @@ class Refused(Exception):
 
 
 class View:
-    """What is watched."""
+    """The database and scene that the server shows."""
 
     def __init__(self, database, scene):
         self.database, self.token = os.path.realpath(database), secrets.token_urlsafe(16)
@@ -227,12 +227,12 @@ class Handler(http.server.BaseHTTPRequestHandler):
     server_version, sys_version = "insitu-view", ""
 
     def log_message(self, *_):
-        """Nothing: addresses have the token in them."""
+        """Log nothing, because addresses contain the token."""
 
-    # -- who asks, and for what
+    # -- access control and dispatch
 
     def parts(self):
-        """The path behind the token. Refused: somebody else asks, or from elsewhere."""
+        """Return the path behind the token. Raises Refused if the token or the Host header is wrong."""
         host = self.headers.get_all("Host", [])
         if len(host) != 1 or not re.fullmatch(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", host[0], re.IGNORECASE):
             raise Refused(403, "this server is 127.0.0.1 alone")
@@ -254,10 +254,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
         try:
             method(self.parts())
         except Refused as refused:
-            self.close_connection = True  # a body may stand unread
+            self.close_connection = True  # the request's body may be unread
             self.send_json({"error": str(refused)}, refused.status)
         except OSError:
-            self.close_connection = True  # who asked is gone
+            self.close_connection = True  # the client has disconnected
 
     def get(self, parts):
         view = self.server.view
@@ -293,11 +293,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.send_json({"stamp": stamp})
 
     def body(self):
-        """What was posted: a mapping of two texts."""
+        """Return the posted mapping, which must contain two strings."""
         length = self.headers.get("Content-Length", "")
         if self.headers.get("Transfer-Encoding") or not re.fullmatch(r"\d{1,9}", length):
             raise Refused(411, "expected a Content-Length")
-        if int(length) > 6 * MAX_SCENE:  # JSON may write a byte as six
+        if int(length) > 6 * MAX_SCENE:  # JSON may encode a byte as six
             raise Refused(413, f"expected at most {MAX_SCENE} bytes")
         if self.headers.get_content_type() != "application/json":
             raise Refused(415, "expected application/json")
@@ -310,7 +310,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             raise Refused(413, f"expected at most {MAX_SCENE} bytes")
         return body
 
-    # -- what is sent
+    # -- responses
 
     def send_head(self, status, kind, size, **others):
         self.send_response(status)
@@ -352,7 +352,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             info = os.fstat(file.fileno())
             others = {"ETag": f'"{info.st_ino:x}-{info.st_mtime_ns:x}-{info.st_size:x}"',
                       "Last_Modified": self.date_time_string(int(info.st_mtime)),
-                      # An origin of its own, which may see when tables have changed, and write nothing.
+                      # A separate origin, which may read tables but write nothing.
                       "Access_Control_Allow_Origin": "null", "Access_Control_Expose_Headers": "Content-Length",
                       "Content_Security_Policy": "sandbox allow-scripts allow-forms"}
             if self.headers.get("If-None-Match") == others["ETag"]:
@@ -363,7 +363,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             while left > 0:
                 piece = file.read(min(left, 1 << 20))
                 if not piece:
-                    self.close_connection = True  # it was cut short meanwhile
+                    self.close_connection = True  # the file was truncated in the meantime
                     break
                 self.wfile.write(piece)
                 left -= len(piece)
@@ -377,7 +377,7 @@ class Server(socketserver.ThreadingMixIn, http.server.HTTPServer):
         self.view, self.places = view, threading.BoundedSemaphore(MAX_CONNECTIONS)
 
     def server_bind(self):
-        """As HTTPServer's, without asking a name server for the machine's name."""
+        """Bind the socket as HTTPServer does, but without a DNS lookup of the machine's name."""
         socketserver.TCPServer.server_bind(self)
         self.server_name, self.server_port = self.server_address
 
@@ -394,7 +394,7 @@ class Server(socketserver.ThreadingMixIn, http.server.HTTPServer):
             self.places.release()
 
     def handle_error(self, request, client_address):
-        """A connection that ends is none."""
+        """Report errors except for closed connections."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)
 
@@ -418,7 +418,7 @@ def serve(options, view):
 # ---- the terminal ------------------------------------------------------------------------------------------------------
 
 def newest_picture(database):
-    """The name of the last PNG in the database's table; None: there is none yet."""
+    """Return the name of the last PNG in the database's table, or None if there is none yet."""
     try:
         with open_inside(database, ["data.csv"]) as file:
             size = os.fstat(file.fileno()).st_size
@@ -435,7 +435,7 @@ def newest_picture(database):
 
 
 def choose_protocol(environment):
-    """The way in which the terminal takes pictures; None: it is not known to take any."""
+    """Return the terminal's protocol for pictures, or None if it is not known to support any."""
     program, kind = environment.get("TERM_PROGRAM", ""), environment.get("TERM", "")
     if "kitty" in kind or "ghostty" in kind or program.lower() == "ghostty" or "KITTY_WINDOW_ID" in environment:
         return "kitty"
@@ -445,7 +445,7 @@ def choose_protocol(environment):
 
 
 def columns_for(data):
-    """How many columns a PNG is to be shrunk to; 0: it fits, or the terminal does not say how wide it is."""
+    """Return the number of columns to which a PNG must be shrunk; 0 if it fits or the terminal's width is unknown."""
     try:
         answer = fcntl.ioctl(sys.stdout.fileno(), termios.TIOCGWINSZ, bytes(8))
     except OSError:
@@ -455,7 +455,7 @@ def columns_for(data):
 
 
 def picture_codes(protocol, data, columns):
-    """The bytes that have a terminal show a PNG.
+    """Return the escape sequence with which a terminal shows a PNG.
     https://sw.kovidgoyal.net/kitty/graphics-protocol/, https://iterm2.com/documentation-images.html"""
     text = base64.standard_b64encode(data)
     if protocol == "iterm2":
