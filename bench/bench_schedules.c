@@ -19,7 +19,7 @@ static comp_load load_of(int ranks)
 
 static void print(const char *name, const comp_route *route, const comp_load *load)
 {
-    const comp_cost cost = comp_cost_of(route, load, &comp_usual_machine);
+    const comp_cost cost = comp_cost_of(route, load, &comp_default_machine);
     printf("%d,%d,%s,%d,%.0f,%.0f,%.3f\n", route->ranks, route->nodes.ranks, name, route->round_count, cost.messages,
            cost.bytes, 1e3 * cost.seconds);
 }
@@ -37,7 +37,7 @@ int main(int argc, char **argv)
             const comp_route route = comp_route_of(s, counts[i], nodes, 8);
             print(comp_schedule_name(s), &route, &load);
         }
-        const comp_route best = comp_cheapest_route(counts[i], nodes, &load, &comp_usual_machine);
+        const comp_route best = comp_cheapest_route(counts[i], nodes, &load, &comp_default_machine);
         print("chosen", &best, &load);
     }
     return 0;

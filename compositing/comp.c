@@ -20,14 +20,14 @@
 typedef struct composition {
     const comp_group *group;
     image *out;
-    comp_merged merged;
+    comp_merge_output merged;
     comp_statistics *statistics;
-    comp_mailroom room;
+    comp_transport transport;
     comp_route route;
     comp_grid grid;
     comp_strips strips;
     comp_owners owners;
-    uint64_t *loads; /* load of each rank, in fragments */
+    uint64_t *loads; /* load of each rank: number of fragments that it owns */
 } composition;
 
 static composition composition_of(const comp_group *group, const float background[4], image *out,
@@ -50,16 +50,17 @@ static double milliseconds_since(double start)
 }
 
 /* Expected number of bytes per fragment in a message. Most pictures take 10 for a hit and 11 for a volume interval. */
-static const double usual_bytes = 11;
+static const double expected_bytes = 11;
 
 /* Chooses the route; the result is the same on all ranks. fragments is the largest number on any rank. */
 static void choose_route(composition *c, int64_t fragments)
 {
-    enum { USUAL_RADIX = 8 };
+    enum { DEFAULT_RADIX = 8 };
     const comp_group *g = c->group;
-    const comp_load load = {fragments, usual_bytes, comp_grid_block_pixels(&c->grid)};
-    c->route = g->schedule == COMP_AUTOMATIC ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_usual_machine)
-                                             : comp_route_of(g->schedule, c->route.ranks, g->nodes, USUAL_RADIX);
+    const comp_load load = {fragments, expected_bytes, comp_grid_block_pixels(&c->grid)};
+    c->route = g->schedule == COMP_AUTOMATIC
+                   ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_default_machine)
+                   : comp_route_of(g->schedule, c->route.ranks, g->nodes, DEFAULT_RADIX);
     if (g->longest_dense) c->route.longest_dense = g->longest_dense;
     c->statistics->schedule = c->route.schedule;
 }
@@ -69,23 +70,23 @@ static void choose_owners(composition *c)
     comp_claim *const claims = c->group->claims->items;
     c->owners.count = c->route.owners;
     comp_route_fold(&c->route, claims, c->grid.blocks);
-    comp_claims_level(claims, c->grid.blocks, c->loads, c->route.owners);
+    comp_claims_balance(claims, c->grid.blocks, c->loads, c->route.owners);
     for (uint32_t b = 0; b < c->grid.blocks; b++)
         c->owners.places[b] = claims[b].vote ? comp_vote_rank(claims[b].vote) : -1;
 }
 
 /* Claims each block in proportion to the number of this rank's fragments there. */
-static void claim(composition *c)
+static void claim_blocks(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
     const uint32_t ranges = c->strips.starts[c->grid.strips];
     for (uint32_t r = 0; r < ranges; r++)
         claims[comp_grid_block(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
-    for (uint32_t b = 0; b < c->grid.blocks; b++) claims[b].vote = comp_vote(b, c->room.rank, claims[b].fragments);
+    for (uint32_t b = 0; b < c->grid.blocks; b++) claims[b].vote = comp_vote(b, c->transport.rank, claims[b].fragments);
 }
 
 /* Allocates the memory for the three phases. */
-static insitu_status prepare(composition *c, fragment_list *items, base_error *error)
+static insitu_status allocate_phases(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
     if (c->out->deep) c->merged.deep = base_calloc((size_t)c->grid.threads, sizeof *c->merged.deep);
@@ -96,9 +97,9 @@ static insitu_status prepare(composition *c, fragment_list *items, base_error *e
     if (!c->loads || !c->owners.places)
         return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for the owners of %u blocks",
                          (unsigned)c->grid.blocks);
-    insitu_status status = c->route.ranks > 1 ? comp_mailroom_open(c->group->comm, &c->room, error) : INSITU_OK;
+    insitu_status status = c->route.ranks > 1 ? comp_transport_open(c->group->comm, &c->transport, error) : INSITU_OK;
     if (!status) status = comp_strips_make(&c->grid, items, &c->strips, error);
-    if (!status) claim(c);
+    if (!status) claim_blocks(c);
     return status;
 }
 
@@ -107,14 +108,14 @@ static insitu_status merge_owned(composition *c, const comp_messages *held, comp
                                  insitu_status status, base_error *error)
 {
     const double start = MPI_Wtime();
-    const int place = comp_route_place(&c->route, c->room.rank);
+    const int place = comp_route_place(&c->route, c->transport.rank);
     comp_owned owned = {.own = &c->strips, .owners = &c->owners, .place = place};
     c->merged.out = place == 0 ? c->out : NULL;
     if (!status && place < c->route.owners) {
         const int parent = place ? comp_route_rank(&c->route, comp_gather_parent(&c->route, place)) : 0;
-        status = comp_arrivals_find(&c->grid, place, held, &owned.arrivals, error);
+        status = comp_received_find(&c->grid, place, held, &owned.arrivals, error);
         if (!status) status = comp_owned_merge(&owned, &c->merged, parent, finished, error);
-        comp_arrivals_free(&owned.arrivals);
+        comp_received_free(&owned.arrivals);
     }
     c->statistics->merge_ms = milliseconds_since(start);
     return status;
@@ -125,7 +126,7 @@ static insitu_status merge_alone(composition *c, base_error *error)
     return merge_owned(c, &(comp_messages){NULL, NULL}, &(comp_messages){NULL, NULL}, INSITU_OK, error);
 }
 
-static void give_back(fragment_list *items)
+static void free_fragments(fragment_list *items)
 {
     base_free(items->items);
     *items = (fragment_list){NULL, 0, 0};
@@ -135,25 +136,25 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
 {
     comp_messages held = {NULL, NULL}, finished = {NULL, NULL};
     const comp_canvas canvas = {&c->grid, c->merged.background, c->out};
-    insitu_status status = comp_exchange(&c->room, &c->route, &c->strips, &c->owners, &held, INSITU_OK, error);
+    insitu_status status = comp_exchange(&c->transport, &c->route, &c->strips, &c->owners, &held, INSITU_OK, error);
     status = merge_owned(c, &held, &finished, status, error);
     comp_messages_free(&held);
-    give_back(items);
-    status = comp_gather(&c->room, &c->route, &canvas, &finished, status, error);
-    c->statistics->sent_bytes = c->room.sent_bytes;
-    c->statistics->sent_messages = c->room.sent_messages;
+    free_fragments(items);
+    status = comp_gather(&c->transport, &c->route, &canvas, &finished, status, error);
+    c->statistics->sent_bytes = c->transport.sent_bytes;
+    c->statistics->sent_messages = c->transport.sent_messages;
     return status;
 }
 
 /* Begins compositing. If it fails, the fragments are freed. */
-static insitu_status begin(composition *c, fragment_list *items, int threads, base_error *error)
+static insitu_status begin_composite(composition *c, fragment_list *items, int threads, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(c->group->comm, &ranks);
     const insitu_status status = comp_check_size(c->out, error);
     c->statistics->has_failed = status != INSITU_OK;
     if (status) {
-        give_back(items);
+        free_fragments(items);
         return status;
     }
     c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
@@ -170,7 +171,7 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     if (!status) {
         status =
             comp_deep_gather(c->group->comm, lists, c->grid.threads, c->out->deep, &c->statistics->sent_bytes, error);
-        c->statistics->has_failed = status != INSITU_OK; /* *error has the reason, to be reported */
+        c->statistics->has_failed = status != INSITU_OK; /* the caller reports the reason, which is in *error */
     } else if (lists) {
         comp_deep_free(lists, c->grid.threads);
     }
@@ -185,7 +186,7 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     const MPI_Comm comm = c->group->comm;
     statistics->sent_fragments = items->count;
     int64_t most = items->count;
-    insitu_status own = prepare(c, items, error), status = own;
+    insitu_status own = allocate_phases(c, items, error), status = own;
     if (c->route.ranks > 1) status = comp_agree_claims(comm, own, &most, c->group->claims, (int)c->grid.blocks, error);
     if (!status) {
         if (c->route.ranks > 1) choose_route(c, most);
@@ -196,22 +197,22 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     }
     statistics->has_failed = own != INSITU_OK || status == INSITU_ERROR_MPI;
     comp_strips_free(&c->strips);
-    comp_mailroom_close(&c->room);
+    comp_transport_close(&c->transport);
     base_free(c->owners.places);
     base_free(c->loads);
-    give_back(items);
+    free_fragments(items);
     return c->out->deep ? gather_deep(c, status, error) : status;
 }
 
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error)
 {
-    comp_statistics unwanted;
-    if (!statistics) statistics = &unwanted;
+    comp_statistics ignored;
+    if (!statistics) statistics = &ignored;
     *statistics = (comp_statistics){0};
     composition c = composition_of(group, background, out, statistics);
     int64_t none = 0;
-    const insitu_status status = begin(&c, items, threads, error);
+    const insitu_status status = begin_composite(&c, items, threads, error);
     return status ? status : composite(&c, items, &none, error);
 }
 
@@ -232,14 +233,14 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
                                       int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error)
 {
-    comp_statistics unwanted;
-    if (!statistics) statistics = &unwanted;
+    comp_statistics ignored;
+    if (!statistics) statistics = &ignored;
     *statistics = (comp_statistics){0};
     *overlaps = (comp_overlaps){0, NULL};
     composition c = composition_of(group, background, out, statistics);
     base_error here = {INSITU_OK, ""};
     if (!error) error = &here;
-    insitu_status status = begin(&c, items, threads, error);
+    insitu_status status = begin_composite(&c, items, threads, error);
     if (status) return status;
     c.merged.overlaps = base_calloc(pixel_set_bytes(pixel_count(&c)), 1);
     if (!c.merged.overlaps && !error->status)

@@ -28,11 +28,11 @@
 
 /* The communicator of the ranks that composite, and the settings that they share. */
 typedef struct comp_group {
-    MPI_Comm comm; /* used only by compositing */
+    MPI_Comm comm; /* communicator that only compositing uses */
     comp_nodes nodes;
-    comp_schedule schedule; /* COMP_AUTOMATIC chooses the fastest one for each picture */
-    int longest_dense;      /* rounds with more ranks are sparse (comp_mail.h); 0: the default of comp_route.h */
-    comp_claims *claims;    /* made by comp_claims_create() */
+    comp_schedule schedule; /* schedule of messages; COMP_AUTOMATIC chooses the fastest one for each picture */
+    int longest_dense;      /* rounds with more ranks are sparse (comp_messages.h); 0: the default of comp_route.h */
+    comp_claims *claims;    /* buffer made by comp_claims_create() */
 } comp_group;
 
 /* Blends one pixel's fragments in place: they are sorted by (t_in, surface before volume, then bits) and blended front
@@ -57,23 +57,26 @@ bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
-    int64_t sent_fragments; /* sent by this rank, including those to itself */
+    int64_t sent_fragments; /* number of fragments sent by this rank, including those to itself */
     int64_t sent_bytes; /* bytes sent by this rank to other ranks: fragments and finished pixels, including forwarded
                            ones */
     int64_t sent_messages;
     double merge_ms;
     comp_schedule schedule;
-    bool has_failed; /* the error originated on this rank */
+    bool has_failed; /* true if the error occurred on this rank */
 } comp_statistics;
 
-/* Composites an image. Collective over group->comm: two reductions, and a barrier if a round is sparse (comp_mail.h).
- * out's width and height are set on all ranks; on rank 0 out->rgba must be allocated, out->depth may be, and both are
- * filled; on other ranks they are not accessed. out->deep may be given, on all ranks: that of rank 0, whose first and
- * counts are allocated, receives the samples of the pixels that have fragments (comp_deep.h), with t as depth. If
- * out->is_folded, which must be the same on all ranks, pixels are merged by comp_merge_folded_pixel(). The list is
- * always emptied and its memory released. An error on one rank (memory) is an error on all ranks, and so is an error
- * that *error holds before the call: a rank that could not make its fragments reports the error in this way. threads is
- * the number of threads on this rank; 0: the default of OpenMP. statistics may be NULL. */
+/* Composites an image. Takes two reductions over group->comm, and a barrier if a round is sparse (comp_messages.h).
+ * threads is the number of threads of this rank, or 0 for the default of OpenMP. statistics may be NULL. Collective.
+ *
+ * out->width and out->height must be set on all ranks. Rank 0 must allocate out->rgba and may allocate out->depth; both
+ * are filled on rank 0 and ignored on other ranks. out->deep must be given on all ranks or on none. Rank 0's, whose
+ * first and counts must be allocated, receives the samples of the pixels that have fragments (comp_deep.h), with t as
+ * depth. If out->is_folded, which must be the same on all ranks, pixels are merged by comp_merge_folded_pixel().
+ *
+ * The fragment list is always emptied and its memory released. An error on one rank (lack of memory) is an error on all
+ * ranks. If *error contains an error before the call, because this rank could not make its fragments, that too becomes
+ * an error on all ranks. */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
 

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-const comp_machine comp_usual_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
+const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
 /* The renderer makes fragments tile by tile, so the fragments of one tile, or of one block if blocks are smaller, go to
  * a single owner. */
@@ -47,7 +47,8 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
         int radix;
     } tried[] = {{COMP_NODES, 0},  {COMP_RADIX, 4},  {COMP_RADIX, 8},
                  {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
-    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all ranks are equally near */
+    if (nodes.ranks >= ranks)
+        nodes = (comp_nodes){1, false}; /* all ranks are on one node, and therefore equally near */
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_cost_of(&best, load, machine).seconds;
     for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {

@@ -10,25 +10,25 @@
 
 /* Times in seconds; the gap is the time per byte. */
 typedef struct comp_machine {
-    double latency, overhead, gap;                /* for messages between nodes */
-    double node_latency, node_overhead, node_gap; /* for messages within a node */
+    double latency, overhead, gap;                /* times of messages between nodes */
+    double node_latency, node_overhead, node_gap; /* times of messages within a node */
 } comp_machine;
 
 /* Typical values of a current cluster: 10 GB/s per rank, 1 microsecond of overhead and 2 microseconds of latency
  * between nodes; half of these times within a node. */
-extern const comp_machine comp_usual_machine;
+extern const comp_machine comp_default_machine;
 
 /* The load of the busiest rank. */
 typedef struct comp_load {
     int64_t fragments;
-    double bytes;          /* average size of a fragment in a message (comp_sheet.h) */
+    double bytes;          /* average size of a fragment in a message, in bytes (comp_sheet.h) */
     uint32_t block_pixels; /* number of pixels of a block, all of which have the same owner (comp_grid.h) */
 } comp_load;
 
 /* The cost of a route for the busiest rank. */
 typedef struct comp_cost {
-    double messages; /* number of messages that it sends, including empty ones */
-    double bytes;    /* total size of these messages */
+    double messages; /* number of messages that the rank sends, including empty ones */
+    double bytes;    /* total size of the rank's messages */
     double seconds;
 } comp_cost;
 

@@ -14,7 +14,7 @@ enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
 /* ---- on the owner --------------------------------------------------------------------------------------------- */
 
 /* Ensures space for one more item; returns false if memory ran out. */
-static bool make_room(void **items, int64_t count, int64_t *capacity, size_t size)
+static bool reserve(void **items, int64_t count, int64_t *capacity, size_t size)
 {
     if (count < *capacity) return true;
     const int64_t more = *capacity ? 2 * *capacity : 1024;
@@ -26,15 +26,15 @@ static bool make_room(void **items, int64_t count, int64_t *capacity, size_t siz
 }
 
 /* Callback of comp_merge_cut(): adds a sample for the interval, unless the interval is invisible. */
-static void take_stretch(void *of_list, const fragment *f)
+static void add_interval(void *state, const fragment *f)
 {
-    comp_deep_list *list = of_list;
+    comp_deep_list *list = state;
     const insitu_deep_sample sample = {{f->colour[0], f->colour[1], f->colour[2], 1 - f->transmittance},
                                        f->t_in,
                                        f->t_out < f->t_in ? f->t_in : f->t_out};
     if (sample.rgba[3] == 0 && sample.rgba[0] == 0 && sample.rgba[1] == 0 && sample.rgba[2] == 0) return;
     void *items = list->samples;
-    if (!make_room(&items, list->sample_count, &list->sample_capacity, sizeof sample)) {
+    if (!reserve(&items, list->sample_count, &list->sample_capacity, sizeof sample)) {
         list->lacks_memory = true;
         return;
     }
@@ -46,15 +46,15 @@ void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool i
 {
     const int64_t first = list->sample_count;
     void *items = list->pixels;
-    if (!make_room(&items, list->pixel_count, &list->pixel_capacity, sizeof *list->pixels)) {
+    if (!reserve(&items, list->pixel_count, &list->pixel_capacity, sizeof *list->pixels)) {
         list->lacks_memory = true;
         return;
     }
     list->pixels = items;
     if (is_folded)
-        comp_merge_folded_cut(sorted, count, take_stretch, list);
+        comp_merge_folded_cut(sorted, count, add_interval, list);
     else
-        comp_merge_cut(sorted, count, take_stretch, list);
+        comp_merge_cut(sorted, count, add_interval, list);
     list->pixels[list->pixel_count++] = (comp_deep_pixel){sorted->pixel, (uint32_t)(list->sample_count - first)};
 }
 
@@ -116,7 +116,7 @@ static void place_pixels(deep_image *out, const comp_deep_pixel *pixels, int64_t
     }
 }
 
-static void take_own(deep_image *out, const comp_deep_list *lists, int count)
+static void copy_own(deep_image *out, const comp_deep_list *lists, int count)
 {
     for (int i = 0; i < count; i++) {
         place_pixels(out, lists[i].pixels, lists[i].pixel_count, out->count);
@@ -196,7 +196,7 @@ static insitu_status gather(MPI_Comm comm, int rank, const comp_deep_list *lists
     if (!status && rank == 0) status = open_inbox(in, out, error);
     status = comp_agree(comm, status, NULL, error);
     if (status) return status;
-    if (rank == 0) take_own(out, lists, list_count);
+    if (rank == 0) copy_own(out, lists, list_count);
     const int code = rank == 0 ? receive_all(comm, in, out) : send_lists(comm, lists, list_count);
     return comp_agree(comm, comp_mpi_status(code, error), NULL, error);
 }

@@ -12,7 +12,7 @@
 #include "image.h"
 
 typedef struct comp_deep_pixel {
-    uint32_t pixel, count; /* count is the number of samples */
+    uint32_t pixel, count; /* pixel index and its number of samples */
 } comp_deep_pixel;
 
 /* The samples of a thread on one owner, pixel after pixel. A zeroed struct is empty. */
@@ -20,7 +20,7 @@ typedef struct comp_deep_list {
     comp_deep_pixel *pixels;
     insitu_deep_sample *samples;
     int64_t pixel_count, pixel_capacity, sample_count, sample_capacity;
-    bool lacks_memory; /* some samples are missing */
+    bool lacks_memory; /* true if samples are missing because memory ran out */
 } comp_deep_list;
 
 /* Adds one pixel's fragments as sorted by comp_merge_pixel(), or by comp_merge_folded_pixel() if is_folded. z and

@@ -40,17 +40,17 @@ static void divide_blocks(comp_grid *g)
         g->row_shift--;
 }
 
-/* Returns the grid. Its blocks are nearly square. They are as small as possible with at most COMP_FEW_BLOCKS blocks;
+/* Returns the grid. Its blocks are nearly square. They are as small as possible with at most COMP_TARGET_BLOCKS blocks;
  * for many ranks they are made smaller until every rank has enough. A block of one row of a strip is not divided
  * further. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
 {
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
-    const int counted = ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS;
-    const uint32_t wanted = counted > 1 ? COMP_RANK_BLOCKS * (uint32_t)counted : 0;
+    const int counted = ranks < COMP_COUNTED_RANKS_MAX ? ranks : COMP_COUNTED_RANKS_MAX;
+    const uint32_t wanted = counted > 1 ? COMP_BLOCKS_PER_RANK * (uint32_t)counted : 0;
     g.across = (width - 1) / COMP_LANES + 1;
     g.inverse = width > 1 ? UINT64_MAX / width + 1 : 0;
-    for (count_blocks(&g); g.blocks > COMP_FEW_BLOCKS; count_blocks(&g)) merge_blocks(&g);
+    for (count_blocks(&g); g.blocks > COMP_TARGET_BLOCKS; count_blocks(&g)) merge_blocks(&g);
     for (; g.blocks < wanted && (g.shift_x || g.row_shift); count_blocks(&g)) divide_blocks(&g);
     return g;
 }
@@ -66,7 +66,7 @@ int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
     const uint32_t drawn = hash(hash(block + 1) + (uint32_t)rank);
-    const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* between 0 and 1, and may round to 1 */
+    const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* random number between 0 and 1; may be rounded to 1 */
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
     const int steps = (int)(16 * (chance + 3)); /* logarithm in steps of 1/16, between 0 and 1800 */
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
@@ -92,32 +92,32 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
  * rank takes a block for the same reason; if there is no such rank, a rank takes it that exceeds its share afterwards
  * by an eighth of the block more, and so on; finally any rank that has less than its share. Such a rank exists as long
  * as another has more. As no rank gives its last block away, each owner appears among the blocks. */
-typedef struct takers {
+typedef struct taker_search {
     const comp_claim *claims;
     uint32_t blocks, next;
-    uint64_t beyond; /* allowed excess over the equal share, in eighths of a block's fragments */
+    uint64_t allowed_excess; /* allowed excess over the equal share, in eighths of a block's fragments */
     const uint64_t *loads;
     uint64_t share;
-} takers;
+} taker_search;
 
-static int find_taker(takers *t, uint64_t fragments)
+static int find_taker(taker_search *t, uint64_t fragments)
 {
     for (;; t->next++) {
         if (t->next == t->blocks) {
             t->next = 0;
-            t->beyond += t->beyond < 8;
+            t->allowed_excess += t->allowed_excess < 8;
         }
         const int32_t vote = t->claims[t->next].vote;
         if (!vote) continue;
         const int rank = comp_vote_rank(vote);
         const uint64_t load = t->loads[rank];
-        if (load < t->share && 8 * load + (8 - t->beyond) * fragments <= 8 * t->share) return rank;
+        if (load < t->share && 8 * load + (8 - t->allowed_excess) * fragments <= 8 * t->share) return rank;
     }
 }
 
-void comp_claims_level(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
+void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
-    takers t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
+    taker_search t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].vote) continue;
         const uint64_t fragments = claims[b].fragments;
@@ -126,6 +126,6 @@ void comp_claims_level(comp_claim *claims, uint32_t blocks, uint64_t *loads, int
         const int taker = find_taker(&t, fragments);
         *load -= fragments;
         loads[taker] += fragments;
-        claims[b].vote = comp_vote_of(claims[b].vote, taker);
+        claims[b].vote = comp_vote_with_rank(claims[b].vote, taker);
     }
 }

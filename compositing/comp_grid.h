@@ -8,18 +8,17 @@
 
 enum {
     COMP_LANES = 16,
-    COMP_ROWS = 32, /* most rows of a strip */
+    COMP_ROWS = 32, /* maximum number of rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
-    COMP_FEW_BLOCKS = 2048, /* target number of blocks, so that a message of all claims is small */
-    COMP_RANK_BLOCKS =
-        60, /* minimum number of blocks per rank on average, even if there are then more than COMP_FEW_BLOCKS */
-    COMP_EVEN_RANKS = 1024 /* more ranks than this do not increase the number of blocks */
+    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks, so that a message of all claims is small */
+    COMP_BLOCKS_PER_RANK = 60,    /* many ranks get at least this many blocks each, on average */
+    COMP_COUNTED_RANKS_MAX = 1024 /* beyond this number of ranks the number of blocks does not increase */
 };
 
 typedef struct comp_grid {
     uint32_t width, height;
     uint32_t row_shift;        /* a strip has 2^row_shift rows of pixels */
-    uint32_t across, strips;   /* strips per row, and in total */
+    uint32_t across, strips;   /* number of strips per row of strips, and in total */
     uint32_t shift_x, shift_y; /* a block has 2^shift_x × 2^shift_y strips */
     uint32_t blocks_across, blocks;
     uint64_t
@@ -32,10 +31,11 @@ typedef struct comp_grid {
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks);
 
 /* Returns the maximum number of blocks of a picture for this number of ranks. */
-static inline uint32_t comp_most_blocks(int ranks)
+static inline uint32_t comp_max_blocks(int ranks)
 {
-    const uint32_t few = COMP_FEW_BLOCKS, counted = (uint32_t)(ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS);
-    return 2 * counted * COMP_RANK_BLOCKS > few ? 2 * counted * COMP_RANK_BLOCKS : few;
+    const uint32_t few = COMP_TARGET_BLOCKS,
+                   counted = (uint32_t)(ranks < COMP_COUNTED_RANKS_MAX ? ranks : COMP_COUNTED_RANKS_MAX);
+    return 2 * counted * COMP_BLOCKS_PER_RANK > few ? 2 * counted * COMP_BLOCKS_PER_RANK : few;
 }
 
 /* Returns the number of pixels of a block that the picture's border does not cut. */
@@ -93,7 +93,7 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
 /* A rank's claim to a block. The combined claim of all ranks has the largest vote and the sum of the fragments. */
 typedef struct comp_claim {
     int32_t vote;       /* the rank with the largest vote is the owner; 0: the block has no fragments */
-    uint32_t fragments; /* number of fragments; UINT32_MAX if there are more */
+    uint32_t fragments; /* number of fragments in the block; UINT32_MAX if there are more */
 } comp_claim;
 
 /* Returns a rank's vote to own a block in which it has this number of fragments. */
@@ -106,7 +106,7 @@ static inline int comp_vote_rank(int32_t vote)
 }
 
 /* Returns the same vote with another rank. */
-static inline int32_t comp_vote_of(int32_t vote, int rank)
+static inline int32_t comp_vote_with_rank(int32_t vote, int rank)
 {
     return (int32_t)(((uint32_t)vote & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
@@ -119,11 +119,11 @@ static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
     sum->vote = sum->vote > claim->vote ? sum->vote : claim->vote;
 }
 
-/* Moves blocks from ranks that own more fragments than their share to other ranks that own some, until no rank exceeds
- * the mean of these ranks by more than the fragments of one block, the fullest one. claims are those of all ranks, and
- * are the same on all ranks before and after. loads has space for one number per rank and receives the number of
- * fragments that the rank owns. Ranks that own nothing continue to own nothing: if one rank has nearly all fragments,
- * most of them need not be sent. */
-void comp_claims_level(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks);
+/* Balances the number of fragments per rank: moves blocks from ranks with more than their share to other owners, until
+ * no rank exceeds the mean of the owners by more than the fragments of the fullest block. claims must be those of all
+ * ranks; they are the same on all ranks before and after. loads has one entry per rank and receives the number of
+ * fragments that the rank owns. Ranks without blocks do not get any, so that if one rank has nearly all fragments, most
+ * of them need not be sent. */
+void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks);
 
 #endif

@@ -91,29 +91,30 @@ static int64_t samples_at(const fragment *sorted, int64_t count)
  * their common face two positions: one of the two samples is left out. */
 typedef struct sample_pass {
     uint32_t layer;
-    int64_t begun; /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
+    int64_t
+        unmatched_begins; /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
     int64_t counted;
 } sample_pass;
 
-static bool does_count(sample_pass *pass, const fragment *sample)
+static bool is_counted(sample_pass *pass, const fragment *sample)
 {
     const uint32_t layer = sample->kind / FRAGMENT_LAYER, ends = sample->kind % FRAGMENT_LAYER;
     if (layer != pass->layer) *pass = (sample_pass){.layer = layer};
-    if (ends == FRAGMENT_LATE && pass->begun > 0) {
-        pass->begun--;
+    if (ends == FRAGMENT_LATE && pass->unmatched_begins > 0) {
+        pass->unmatched_begins--;
         return false;
     }
-    pass->begun += ends == FRAGMENT_EARLY;
+    pass->unmatched_begins += ends == FRAGMENT_EARLY;
     pass->counted++;
     return true;
 }
 
 /* Checks whether two of the samples belong to the same volume. */
-static bool are_of_overlaps(const fragment *samples, int64_t count)
+static bool are_of_one_volume(const fragment *samples, int64_t count)
 {
     sample_pass pass = {0};
     for (int64_t i = 0; i < count; i++)
-        if (does_count(&pass, &samples[i]) && pass.counted > 1) return true;
+        if (is_counted(&pass, &samples[i]) && pass.counted > 1) return true;
     return false;
 }
 
@@ -123,7 +124,7 @@ static const float face_error = 4e-6f;
 
 /* Advances *next to the first fragment that begins within rounding of t or behind it; returns the largest end of the
  * volumes in front of it. */
-static float reach_before(const fragment *sorted, int64_t *next, float t, float reach)
+static float furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
     for (; sorted[*next].t_in < begin; ++*next)
@@ -139,10 +140,10 @@ bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
         const fragment *f = &sorted[i];
         n = samples_at(f, count - i);
         const bool is_surface = f->kind >= FRAGMENT_SURFACE;
-        if (is_surface) before = reach_before(sorted, &next, f->t_in, before);
+        if (is_surface) before = furthest_end_before(sorted, &next, f->t_in, before);
         if (f->t_in <= (is_surface ? before : reach) && f->t_out >= f->t_in) return true;
         if (f->transmittance == 0) return false;
-        if (n > 1 && are_of_overlaps(f, n)) return true;
+        if (n > 1 && are_of_one_volume(f, n)) return true;
         if (!is_surface && f->t_out > reach) reach = f->t_out;
     }
     return false;
@@ -154,7 +155,7 @@ static fragment mix_samples(const fragment *samples, int64_t count)
     double colour[3] = {0, 0, 0}, weight = 0, absorbed = 0;
     sample_pass pass = {0};
     for (int64_t i = 0; i < count; i++) {
-        if (!does_count(&pass, &samples[i])) continue;
+        if (!is_counted(&pass, &samples[i])) continue;
         const double own = 1 - (double)samples[i].transmittance;
         for (int c = 0; c < 3; c++) colour[c] += (double)samples[i].colour[c];
         weight += own;
@@ -212,7 +213,7 @@ static void exchange(fragment *items, int64_t a, int64_t b)
 }
 
 /* Moves the intervals that extend behind the depth to the front, in their order; returns their number. */
-static int64_t keep_open(fragment *items, int64_t count, float depth)
+static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
     for (int64_t i = 0; i < count; i++)
@@ -234,29 +235,29 @@ static bool is_overlapped(const fragment *sorted, int64_t count)
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
-/* The callback that receives the blended intervals, and its state. take is NULL if there is none. */
-typedef struct stretch_sink {
-    comp_stretch_taker *take;
+/* The callback that receives the blended intervals, and its state. callback is NULL if there is none. */
+typedef struct interval_sink {
+    comp_interval_callback *callback;
     void *state;
-} stretch_sink;
+} interval_sink;
 
-static void hand_over(const stretch_sink *sink, const blend *b, const fragment *of, float from, float to)
+static void emit_interval(const interval_sink *sink, const blend *b, const fragment *of, float from, float to)
 {
-    fragment stretch = *of;
-    stretch.t_in = from;
-    stretch.t_out = to;
-    for (int c = 0; c < 3; c++) stretch.colour[c] = (float)b->colour[c];
-    stretch.transmittance = (float)b->transmittance;
-    sink->take(sink->state, &stretch);
+    fragment interval = *of;
+    interval.t_in = from;
+    interval.t_out = to;
+    for (int c = 0; c < 3; c++) interval.colour[c] = (float)b->colour[c];
+    interval.transmittance = (float)b->transmittance;
+    sink->callback(sink->state, &interval);
 }
 
 /* Same as blend_mixed(), and also passes the mixture to the sink. */
-static void blend_cut(blend *b, const fragment *items, int64_t count, float from, float to, const stretch_sink *sink)
+static void blend_cut(blend *b, const fragment *items, int64_t count, float from, float to, const interval_sink *sink)
 {
     blend own = {{0, 0, 0}, 1};
-    if (sink->take) {
+    if (sink->callback) {
         blend_mixed(&own, items, count, from, to);
-        hand_over(sink, &own, items, from, to);
+        emit_interval(sink, &own, items, from, to);
     }
     blend_mixed(b, items, count, from, to);
 }
@@ -264,7 +265,7 @@ static void blend_cut(blend *b, const fragment *items, int64_t count, float from
 /* Blends fragments from the first one until no interval is open; returns their number. Open intervals are kept at the
  * front, so that a cut costs only the intervals that are mixed in it: a thousand short intervals in a row beside a long
  * one make a thousand cuts of two. At the end the fragments are in their original order. */
-static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretch_sink *sink)
+static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const interval_sink *sink)
 {
     float at = sorted[0].t_in;
     int64_t open = 0, end = 0;
@@ -274,10 +275,10 @@ static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretc
                 exchange(sorted, open++, end);
             } else {
                 blend_over(b, &sorted[end]);
-                if (sink->take) sink->take(sink->state, &sorted[end]);
+                if (sink->callback) sink->callback(sink->state, &sorted[end]);
             }
         }
-        open = keep_open(sorted, open, at);
+        open = move_open_to_front(sorted, open, at);
         if (open == 0 || b->transmittance == 0) break;
         float to = next_end(sorted, open);
         if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
@@ -296,11 +297,11 @@ static void blend_single(const fragment *f, const float background[4], float out
     *out_depth = nearest_surface(f, 1);
 }
 
-/* Not inlined, because the inlined code would slow down pixels of one fragment. */
+/* Not inlined, because inlining it would slow down the frequent case of a single fragment. */
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {
-    static const stretch_sink nobody = {NULL, NULL};
+    static const interval_sink nobody = {NULL, NULL};
     sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
@@ -323,12 +324,12 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
 }
 
 /* Counts the leading fragments that a fold combines into one: those of volumes in the same interval. */
-static int64_t folded_together(const fragment *sorted, int64_t count)
+static int64_t count_folded(const fragment *sorted, int64_t count)
 {
-    const int32_t stretch = fragment_stretch(sorted[0].t_in);
+    const int32_t interval = fragment_stretch(sorted[0].t_in);
     int64_t n = 1;
     if (sorted[0].kind >= FRAGMENT_SURFACE) return n;
-    while (n < count && sorted[n].kind < FRAGMENT_SURFACE && fragment_stretch(sorted[n].t_in) == stretch) n++;
+    while (n < count && sorted[n].kind < FRAGMENT_SURFACE && fragment_stretch(sorted[n].t_in) == interval) n++;
     return n;
 }
 
@@ -347,7 +348,7 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &items[i - 1], &items[i])); i += n) {
-        n = folded_together(items + i, count - i);
+        n = count_folded(items + i, count - i);
         const fragment f = fragment_fold(items + i, n);
         for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];
         transmittance *= f.transmittance;
@@ -365,9 +366,9 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
         blend_sorted(items, count, background, out_rgba, out_depth);
 }
 
-void comp_merge_cut(fragment *sorted, int64_t count, comp_stretch_taker *take, void *state)
+void comp_merge_cut(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)
 {
-    const stretch_sink sink = {take, state};
+    const interval_sink sink = {callback, state};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
         if (is_overlapped(sorted + i, count - i)) {
@@ -378,18 +379,18 @@ void comp_merge_cut(fragment *sorted, int64_t count, comp_stretch_taker *take, v
         }
         n = samples_at(sorted + i, count - i);
         const fragment f = n == 1 ? sorted[i] : mix_samples(sorted + i, n);
-        take(state, &f);
+        callback(state, &f);
         transmittance *= f.transmittance;
     }
 }
 
-void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_stretch_taker *take, void *state)
+void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)
 {
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &sorted[i - 1], &sorted[i])); i += n) {
-        n = folded_together(sorted + i, count - i);
+        n = count_folded(sorted + i, count - i);
         const fragment f = fragment_fold(sorted + i, n);
-        take(state, &f);
+        callback(state, &f);
         transmittance *= f.transmittance;
     }
 }
@@ -400,7 +401,7 @@ bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
     float transmittance = 1;
     int64_t lit = 0;
     for (int64_t n; lit < count && !(lit > 0 && is_dark(transmittance, &sorted[lit - 1], &sorted[lit])); lit += n) {
-        n = folded_together(sorted + lit, count - lit);
+        n = count_folded(sorted + lit, count - lit);
         transmittance *= fragment_fold(sorted + lit, n).transmittance;
     }
     return comp_pixel_overlaps(sorted, lit);

@@ -15,8 +15,9 @@
 /* The work space of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
     comp_sheet all, other, pixels;
-    fragment_list left, listed; /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
-    uint16_t mixed[COMP_ROWS];  /* bit mask per row: pixels that have fragments in left */
+    fragment_list remaining,
+        listed;                /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
+    uint16_t mixed[COMP_ROWS]; /* bit mask per row: pixels that have fragments in the list `remaining` */
     /* Number of fragments of each mixed pixel, and the end of its fragments in listed. */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
@@ -36,7 +37,7 @@ static bool reserve(fragment_list *list, int64_t count)
 /* ---- joined -------------------------------------------------------------------------------------------------- */
 
 /* Marks a pixel as one whose fragments are listed, and counts its fragment in the sheet first. */
-static void mix(merge_scratch *m, uint32_t at)
+static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
     if (m->mixed[at / COMP_LANES] & bit) return;
@@ -44,13 +45,13 @@ static void mix(merge_scratch *m, uint32_t at)
     m->counts[at] = 1;
 }
 
-static bool leave(merge_scratch *m, const fragment *item, uint32_t at)
+static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
 {
-    fragment_list *const left = &m->left;
+    fragment_list *const left = &m->remaining;
     if (left->count == left->capacity && !reserve(left, left->count + 256)) return false;
     left->items[left->count] = *item;
     left->items[left->count++].pixel = at;
-    mix(m, at);
+    mark_mixed(m, at);
     m->counts[at]++;
     return true;
 }
@@ -59,7 +60,7 @@ static bool leave(merge_scratch *m, const fragment *item, uint32_t at)
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->all, at, item->pixel);
-    if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return leave(m, item, at);
+    if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return add_remaining(m, item, at);
     if (fragment_compare(item, &other) < 0) comp_sheet_put(&m->all, at, item);
     return true;
 }
@@ -90,17 +91,17 @@ static bool join_other(merge_scratch *m)
         for (unsigned bits = left[r]; bits; bits &= bits - 1) {
             const uint32_t at = r * COMP_LANES + (uint32_t)__builtin_ctz(bits);
             const fragment item = comp_sheet_get(&m->other, at, at);
-            if (!leave(m, &item, at)) return false;
+            if (!add_remaining(m, &item, at)) return false;
         }
     return true;
 }
 
 static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 {
-    const comp_arrivals *const come = &owned->arrivals;
+    const comp_received *const come = &owned->arrivals;
     const uint32_t first = come->starts[strip];
     const bool has_own = owned->own->starts[strip] < owned->own->starts[strip + 1];
-    m->left.count = 0;
+    m->remaining.count = 0;
     memset(m->mixed, 0, sizeof m->mixed);
     comp_sheet_begin(&m->all, strip);
     if (!join_own(owned->own, strip, m)) return false;
@@ -135,15 +136,16 @@ static bool list_pixels(merge_scratch *m)
     if (!reserve(&m->listed, sum)) return false;
     for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1))
         m->listed.items[--m->ends[k]] = comp_sheet_get(&m->all, k, k);
-    for (int64_t i = 0; i < m->left.count; i++) m->listed.items[--m->ends[m->left.items[i].pixel]] = m->left.items[i];
+    for (int64_t i = 0; i < m->remaining.count; i++)
+        m->listed.items[--m->ends[m->remaining.items[i].pixel]] = m->remaining.items[i];
     return true;
 }
 
 /* Marks all pixels as mixed, for deep pictures, which need the fragments of all pixels. */
-static void mix_all(merge_scratch *m)
+static void mark_all_mixed(merge_scratch *m)
 {
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
-        if (comp_sheet_has(&m->all, k)) mix(m, k);
+        if (comp_sheet_has(&m->all, k)) mark_mixed(m, k);
 }
 
 static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
@@ -154,7 +156,7 @@ static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
     for (int w = 0; w < COMP_PIXEL_WORDS; w++) pixels->words[w][at] = words[w];
 }
 
-static void blend_listed(const comp_grid *grid, const comp_merged *merged, merge_scratch *m)
+static void blend_listed(const comp_grid *grid, const comp_merge_output *merged, merge_scratch *m)
 {
     for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1)) {
         const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
@@ -170,18 +172,18 @@ static void blend_listed(const comp_grid *grid, const comp_merged *merged, merge
 static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 {
     const int count = comp_sheet_count(&m->pixels);
-    unsigned char *at = comp_writer_room(&m->writer, (uint32_t)owned->place, comp_sheet_bound(count, COMP_PIXEL_WORDS),
-                                         COMP_MESSAGE_BYTES);
+    unsigned char *at = comp_writer_reserve(&m->writer, (uint32_t)owned->place,
+                                            comp_sheet_max_bytes(count, COMP_PIXEL_WORDS), COMP_MESSAGE_BYTES);
     if (!at) return false;
     comp_writer_commit(&m->writer, comp_sheet_write(&m->pixels, COMP_PIXEL_WORDS, at), (uint32_t)count);
     return true;
 }
 
-static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merged *merged, merge_scratch *m)
+static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merge_output *merged, merge_scratch *m)
 {
     if (!join_all(owned, strip, m)) return false;
     comp_sheet_finish(&m->all, merged->background, &m->pixels);
-    if (merged->deep) mix_all(m);
+    if (merged->deep) mark_all_mixed(m);
     if (!list_pixels(m)) return false;
     blend_listed(owned->own->grid, merged, m);
     if (!merged->out) return write_pixels(owned, m);
@@ -190,50 +192,50 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
 }
 
 /* Stores the background in a strip without fragments. */
-static void clear_strip(const comp_grid *grid, uint32_t strip, const comp_merged *merged, merge_scratch *m)
+static void clear_strip(const comp_grid *grid, uint32_t strip, const comp_merge_output *merged, merge_scratch *m)
 {
     comp_sheet_begin(&m->pixels, strip);
     comp_sheet_store(&m->pixels, grid, merged->background, merged->out);
 }
 
-static bool merge_strips(const comp_owned *owned, const comp_merged *merged, merge_scratch *m)
+static bool merge_strips(const comp_owned *owned, const comp_merge_output *merged, merge_scratch *m)
 {
-    bool is_well = m != NULL;
+    bool is_ok = m != NULL;
 #pragma omp for schedule(dynamic, 16) nowait
     for (uint32_t s = 0; s < owned->own->grid->strips; s++) {
         const int32_t place = owned->owners->places[comp_grid_block(owned->own->grid, s)];
-        if (is_well && place == owned->place)
-            is_well = merge_strip(owned, s, merged, m);
-        else if (is_well && place < 0 && merged->out)
+        if (is_ok && place == owned->place)
+            is_ok = merge_strip(owned, s, merged, m);
+        else if (is_ok && place < 0 && merged->out)
             clear_strip(owned->own->grid, s, merged, m);
     }
-    return is_well;
+    return is_ok;
 }
 
-insitu_status comp_owned_merge(const comp_owned *owned, const comp_merged *merged, int parent, comp_messages *finished,
-                               base_error *error)
+insitu_status comp_owned_merge(const comp_owned *owned, const comp_merge_output *merged, int parent,
+                               comp_messages *finished, base_error *error)
 {
-    bool is_well = true;
+    bool is_ok = true;
     *finished = (comp_messages){NULL, NULL};
-#pragma omp parallel num_threads(owned->own->grid->threads) reduction(&& : is_well)
+#pragma omp parallel num_threads(owned->own->grid->threads) reduction(&& : is_ok)
     {
         region_enter();
         merge_scratch *const m = base_alloc(sizeof *m);
         if (m) {
-            m->left = m->listed = (fragment_list){NULL, 0, 0};
+            m->remaining = m->listed = (fragment_list){NULL, 0, 0};
             m->writer = (comp_writer){.rank = parent};
         }
-        is_well = merge_strips(owned, merged, m);
+        is_ok = merge_strips(owned, merged, m);
         if (m) {
 #pragma omp critical(comp_owned)
             comp_messages_append(finished, &m->writer.messages);
-            base_free(m->left.items);
+            base_free(m->remaining.items);
             base_free(m->listed.items);
         }
         base_free(m);
         region_leave();
     }
-    if (is_well) return INSITU_OK;
+    if (is_ok) return INSITU_OK;
     comp_messages_free(finished);
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory to merge the fragments of a rank's pixels");
 }

@@ -2,7 +2,7 @@
 #ifndef COMP_COMP_OWNED_H
 #define COMP_COMP_OWNED_H
 
-#include "comp_mail.h"
+#include "comp_messages.h"
 #include "comp_pack.h"
 #include "comp_pixels.h"
 #include "comp_strips.h"
@@ -10,7 +10,7 @@
 /* The input of one rank's merge: all fragments in the strips that it owns. */
 typedef struct comp_owned {
     const comp_strips *own; /* fragments that this rank traced */
-    comp_arrivals arrivals; /* fragments received from other ranks */
+    comp_received arrivals; /* fragments received from other ranks for these strips */
     const comp_owners *owners;
     int place;
 } comp_owned;
@@ -18,7 +18,7 @@ typedef struct comp_owned {
 /* Merges all fragments of the strips. If merged->out is given, it receives their pixels, and the background in pixels
  * without fragments; otherwise *finished receives messages for the rank of the parent. Local; on an error *finished is
  * empty, and out may have some of the pixels. */
-insitu_status comp_owned_merge(const comp_owned *owned, const comp_merged *merged, int parent, comp_messages *finished,
-                               base_error *error);
+insitu_status comp_owned_merge(const comp_owned *owned, const comp_merge_output *merged, int parent,
+                               comp_messages *finished, base_error *error);
 
 #endif

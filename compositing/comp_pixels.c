@@ -15,7 +15,7 @@ void comp_add_overlap(unsigned char *overlaps, uint32_t pixel)
     __atomic_fetch_or(&overlaps[pixel >> 3], (unsigned char)(1u << (pixel & 7)), __ATOMIC_RELAXED);
 }
 
-comp_pixel comp_pixels_blend(const comp_merged *merged, fragment *items, int64_t count, uint32_t pixel)
+comp_pixel comp_pixels_blend(const comp_merge_output *merged, fragment *items, int64_t count, uint32_t pixel)
 {
     comp_pixel blended;
     (merged->is_folded ? comp_merge_folded_pixel : comp_merge_pixel)(items, count, merged->background, blended.rgba,

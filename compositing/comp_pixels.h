@@ -20,15 +20,15 @@ insitu_status comp_check_size(const image *out, base_error *error);
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 
 /* Settings of a merge, and where its results go. */
-typedef struct comp_merged {
-    const float *background; /* 4 floats: linear premultiplied RGBA */
+typedef struct comp_merge_output {
+    const float *background; /* colour of the background: linear premultiplied RGBA */
     bool is_folded;          /* pixels are merged by comp_merge_folded_pixel() */
-    image *out;              /* picture of rank 0; NULL on other ranks */
+    image *out;              /* picture that receives the pixels on rank 0; NULL on other ranks */
     unsigned char *overlaps; /* pixel_set.h: receives the pixels whose fragments overlap. NULL: not requested */
-    comp_deep_list *deep;    /* one per thread: receives the samples. NULL: not requested */
-} comp_merged;
+    comp_deep_list *deep; /* lists that receive the samples, one per thread; NULL if deep samples are not requested */
+} comp_merge_output;
 
 /* Merges one pixel of the image; its fragments are reordered. Local; any number of threads may call it at once. */
-comp_pixel comp_pixels_blend(const comp_merged *merged, fragment *items, int64_t count, uint32_t pixel);
+comp_pixel comp_pixels_blend(const comp_merge_output *merged, fragment *items, int64_t count, uint32_t pixel);
 
 #endif

@@ -82,7 +82,7 @@ void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t block
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].vote) continue;
         const int place = comp_route_place(route, comp_vote_rank(claims[b].vote));
-        claims[b].vote = comp_vote_of(claims[b].vote, place < route->owners ? place : place - route->owners);
+        claims[b].vote = comp_vote_with_rank(claims[b].vote, place < route->owners ? place : place - route->owners);
     }
 }
 

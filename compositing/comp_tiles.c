@@ -22,21 +22,21 @@
 enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
 /* A block of memory that grows without keeping its contents. */
-typedef struct room {
+typedef struct buffer {
     void *data;
     size_t bytes;
-} room;
+} buffer;
 
 struct comp_tile_scratch {
-    room starts; /* int64_t, one per pixel of a tile and one more: first index of each pixel in order */
-    room order;  /* int64_t: indices of fragments, sorted by pixel */
-    room pile;   /* copies of one pixel's fragments, which are sorted there */
+    buffer starts;          /* int64_t, one per pixel of a tile and one more: first index of each pixel in order */
+    buffer order;           /* array of int64_t: indices of fragments, sorted by pixel */
+    buffer pixel_fragments; /* copies of one pixel's fragments, which are sorted there */
     int64_t fragments;
     double seconds;
-    char apart[64]; /* padding, so that threads do not write to a common cache line */
+    char padding[64]; /* prevents two threads from writing to the same cache line */
 };
 
-static void *make_room(room *r, int64_t count, size_t size)
+static void *reserve(buffer *r, int64_t count, size_t size)
 {
     const size_t bytes = (size_t)count * size;
     if (bytes <= r->bytes) return r->data;
@@ -76,7 +76,7 @@ void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics 
         slowest = fmax(slowest, own->seconds);
         base_free(own->starts.data);
         base_free(own->order.data);
-        base_free(own->pile.data);
+        base_free(own->pixel_fragments.data);
     }
     statistics->merge_ms = 1e3 * slowest;
     base_free(tiles->scratch);
@@ -130,7 +130,7 @@ static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
 
 /* Returns the pixel's index in the area, row by row. The division gives the correct integer, because adding half a
  * pixel keeps the quotient far from the next integer. */
-static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
+static uint32_t index_in_area(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)tiles->out->width;
     const uint32_t from = pixel - ((uint32_t)area->y * width + (uint32_t)area->x);
@@ -141,24 +141,24 @@ static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32
 
 /* Sorts the indices of fragments by pixel: the fragments of the k-th pixel are order[starts[k]] .. order[starts[k +
  * 1]]. */
-static void number(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
-                   int64_t *starts, int64_t *order)
+static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
+                          int64_t *starts, int64_t *order)
 {
     const int64_t pixels = (int64_t)area->width * area->height;
     memset(starts, 0, (size_t)pixels * sizeof *starts);
-    for (int64_t i = 0; i < count; i++) starts[place_in(tiles, area, items[i].pixel)]++;
+    for (int64_t i = 0; i < count; i++) starts[index_in_area(tiles, area, items[i].pixel)]++;
     for (int64_t k = 1; k < pixels; k++) starts[k] += starts[k - 1];
-    for (int64_t i = 0; i < count; i++) order[--starts[place_in(tiles, area, items[i].pixel)]] = i;
+    for (int64_t i = 0; i < count; i++) order[--starts[index_in_area(tiles, area, items[i].pixel)]] = i;
     starts[pixels] = count;
 }
 
 /* Copies one pixel's fragments to the pile; returns NULL if memory ran out. */
-static fragment *collect(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
+static fragment *copy_pixel(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];
-    fragment *pile = make_room(&own->pile, count, sizeof *pile);
-    for (int64_t i = 0; i < count && pile; i++) pile[i] = items[order[i]];
-    return pile;
+    fragment *pixel_fragments = reserve(&own->pixel_fragments, count, sizeof *pixel_fragments);
+    for (int64_t i = 0; i < count && pixel_fragments; i++) pixel_fragments[i] = items[order[i]];
+    return pixel_fragments;
 }
 
 static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64_t count)
@@ -180,7 +180,7 @@ static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragm
     if (count > pixels || pixels > MOST_PIXELS) return false;
     if (count < pixels) clear(tiles, area);
     for (int64_t i = 0; i < count; i++) {
-        const uint32_t place = place_in(tiles, area, items[i].pixel);
+        const uint32_t place = index_in_area(tiles, area, items[i].pixel);
         if (seen[place]) return false;
         seen[place] = 1;
         blend(tiles, items[i].pixel, &items[i], 1);
@@ -193,10 +193,10 @@ static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pi
 {
     if (blend_singles(tiles, area, items, count)) return true;
     const int64_t pixels = (int64_t)area->width * area->height;
-    int64_t *starts = make_room(&own->starts, pixels + 1, sizeof *starts);
-    int64_t *order = make_room(&own->order, count, sizeof *order);
+    int64_t *starts = reserve(&own->starts, pixels + 1, sizeof *starts);
+    int64_t *order = reserve(&own->order, count, sizeof *order);
     if (!starts || !order) return false;
-    number(tiles, area, items, count, starts, order);
+    sort_by_pixel(tiles, area, items, count, starts, order);
     for (int64_t k = 0; k < pixels; k++) {
         const int64_t pixel = (area->y + k / area->width) * tiles->out->width + area->x + k % area->width;
         const int64_t own_count = starts[k + 1] - starts[k];
@@ -204,7 +204,7 @@ static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pi
             store_background(tiles, pixel);
             continue;
         }
-        fragment *collected = collect(own, items, order + starts[k], own_count);
+        fragment *collected = copy_pixel(own, items, order + starts[k], own_count);
         if (!collected) return false;
         blend(tiles, pixel, collected, own_count);
     }
@@ -216,12 +216,12 @@ bool comp_tiles_take(void *state, int thread, const pixel_area *area, fragment *
     comp_tiles *tiles = state;
     comp_tile_scratch *own = &tiles->scratch[thread];
     const double start = omp_get_wtime();
-    bool is_well = true;
+    bool is_ok = true;
     if (count)
-        is_well = blend_tile(tiles, own, area, items, count);
+        is_ok = blend_tile(tiles, own, area, items, count);
     else
         clear_empty(tiles, area);
     own->fragments += count;
     own->seconds += omp_get_wtime() - start;
-    return is_well;
+    return is_ok;
 }

@@ -9,10 +9,10 @@ typedef struct comp_tile_scratch comp_tile_scratch;
 typedef struct comp_tiles {
     const float *background;
     image *out;
-    unsigned char *overlaps; /* pixel_set.h; NULL: not requested */
+    unsigned char *overlaps; /* set of pixels (pixel_set.h) whose fragments overlap; NULL if not requested */
     double inverse_width;
     int threads;
-    comp_tile_scratch *scratch; /* one per thread */
+    comp_tile_scratch *scratch; /* scratch memory, one per thread */
 } comp_tiles;
 
 /* Begins tiles for at most this number of threads. out is the same as for comp_composite(). If finds_overlaps, pixels

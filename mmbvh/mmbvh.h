@@ -47,10 +47,10 @@ typedef struct mmbvh {
     mmbvh_node *nodes;           /* nodes in the reference layout, otherwise NULL */
     mmbvh_compact_node *compact; /* nodes in the compact layout, otherwise NULL */
     mmbvh_grid grid;             /* quantization grid of the compact layout */
-    int64_t node_count;          /* 0 if there are no cells */
+    int64_t node_count;          /* number of nodes; 0 if there are no cells */
     uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
     int64_t cell_count;
-    double origin[3]; /* bounds are those of (position - origin) * scale */
+    double origin[3]; /* origin of the tree's coordinates, which are (position - origin) * scale */
     double scale;
     double built_cost; /* SAH cost (mmbvh_cost()) when the tree was built */
     double area;       /* sum over all nodes of half the box's surface area times the tests in the node (mmbvh_cost());
@@ -100,7 +100,7 @@ int64_t mmbvh_bytes(const mmbvh *tree);
 /* The ranges of one field for all nodes: either those stored in the nodes (stride 24 or 40), or an array of pairs
  * outside the tree (stride 8). */
 typedef struct mmbvh_ranges {
-    const char *low; /* address of node 0's lower end */
+    const char *low; /* address of node 0's lower end of the range */
     const char *high;
     int64_t stride; /* bytes between consecutive nodes */
 } mmbvh_ranges;
@@ -112,7 +112,7 @@ typedef struct mmbvh_selection {
 } mmbvh_selection;
 
 typedef struct mmbvh_options {
-    int threads; /* at least 1; 0: the default of OpenMP */
+    int threads; /* number of threads; 0 means the default of OpenMP */
     const mmbvh_selection
         *selection; /* for a build: only these cells, none of which may be a ghost or flat; NULL: all drawn cells */
     mmbvh_layout layout;
@@ -200,11 +200,11 @@ double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options);
 typedef struct mmbvh_statistics {
     int64_t leaves;
     int depth;              /* depth of the deepest leaf; the root has depth 1 */
-    double cells_a_leaf;    /* mean */
+    double cells_a_leaf;    /* mean number of cells per leaf */
     double sibling_overlap; /* mean over inner nodes: surface area of the intersection of the children's boxes, divided
                                by that of their union */
-    double cost;            /* mmbvh_cost() */
-    int64_t bytes;          /* size of nodes and cell indices */
+    double cost;            /* SAH cost as computed by mmbvh_cost() */
+    int64_t bytes;          /* size in bytes of nodes and cell indices */
 } mmbvh_statistics;
 
 /* Checks the tree: every drawn cell is in exactly one leaf, leaves have 1 to 7 cells, every node's bounds and range

@@ -15,41 +15,41 @@
     }
 FETCH_INSTANCES(DEFINE_READ, read)
 
-MMBVH_INLINE void read_spans(const grid *g, const uint32_t *cells, int count, fetch_span *spans,
-                             const fetch_shape shape, const bool wide_index, const bool is_packed)
+MMBVH_INLINE void read_float_boxes(const grid *g, const uint32_t *cells, int count, fetch_float_box *float_boxes,
+                                   const fetch_shape shape, const bool wide_index, const bool is_packed)
 {
     for (int i = 0; i < count; i++) {
-        fetch_span span = fetch_span_empty();
-        fetch_ahead(g, cells[i], shape);
-        fetch_span_cell(&span, g, cells[i], shape, wide_index, is_packed);
-        spans[i] = span;
+        fetch_float_box float_box = fetch_float_box_empty();
+        prefetch_later_cell(g, cells[i], shape);
+        fetch_float_box_cell(&float_box, g, cells[i], shape, wide_index, is_packed);
+        float_boxes[i] = float_box;
     }
 }
 
-#define DEFINE_READ_SPANS(name, shape, wide_index, wide_number)                                                        \
-    static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans)                 \
+#define DEFINE_READ_FLOAT_BOXES(name, shape, wide_index, wide_number)                                                  \
+    static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_float_box *float_boxes)      \
     {                                                                                                                  \
         if (fetch_is_packed(&source->g->coordinates[0])) {                                                             \
-            read_spans(source->g, cells, count, spans, shape, wide_index, true);                                       \
+            read_float_boxes(source->g, cells, count, float_boxes, shape, wide_index, true);                           \
         } else {                                                                                                       \
-            read_spans(source->g, cells, count, spans, shape, wide_index, false);                                      \
+            read_float_boxes(source->g, cells, count, float_boxes, shape, wide_index, false);                          \
         }                                                                                                              \
     }
-FETCH_FLOAT_INSTANCES(DEFINE_READ_SPANS, read_spans)
+FETCH_FLOAT_INSTANCES(DEFINE_READ_FLOAT_BOXES, read_float_boxes)
 
 MMBVH_INLINE void prefetch_cells(const grid *g, const uint32_t *cells, int cell_count, const fetch_shape shape)
 {
     for (int k = 0; k < cell_count; k++) {
         const int64_t first = fetch_first(g, cells[k], fetch_vertex_count(g, cells[k], shape), shape);
-        fetch_soon(g, first, shape);
+        prefetch_connectivity(g, first, shape);
     }
 }
 
 #define DEFINE_UNITE(name, shape, wide_index, wide_number)                                                             \
-    static void name(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,              \
+    static void name(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,             \
                      fetch_box *box)                                                                                   \
     {                                                                                                                  \
-        if (soon) prefetch_cells(source->g, soon, count, shape);                                                       \
+        if (later) prefetch_cells(source->g, later, count, shape);                                                     \
         fetch_box_cells(box, source->g, cells, count, shape, wide_index, wide_number);                                 \
     }
 FETCH_INSTANCES(DEFINE_UNITE, unite)
@@ -62,10 +62,10 @@ static void read_any(const bounds_source *source, const uint32_t *cells, int cou
     }
 }
 
-static void unite_any(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+static void unite_any(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
                       fetch_box *box)
 {
-    (void)soon;
+    (void)later;
     for (int i = 0; i < count; i++) fetch_box_any_cell(box, source->g, cells[i]);
 }
 
@@ -79,10 +79,10 @@ static void read_given(const bounds_source *source, const uint32_t *cells, int c
     }
 }
 
-static void unite_given(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+static void unite_given(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
                         fetch_box *box)
 {
-    (void)soon;
+    (void)later;
     for (int i = 0; i < count; i++) {
         fetch_box given;
         read_given(source, cells + i, 1, &given);
@@ -94,7 +94,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
                                  const double origin[3], double scale)
 {
     static bounds_read *const reads[FETCH_SHAPES][2][2] = FETCH_TABLE(read);
-    static bounds_read_spans *const reads_spans[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(read_spans);
+    static bounds_read_float_boxes *const reads_float_boxes[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(read_float_boxes);
     static bounds_unite *const unites[FETCH_SHAPES][2][2] = FETCH_TABLE(unite);
     bounds_source s = {.g = g, .scale = scale, .lower = lower, .upper = upper, .box_count = count};
     s.read = g ? read_any : read_given;
@@ -102,13 +102,14 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
     for (int axis = 0; axis < 3; axis++) s.origin[axis] = origin[axis];
     if (!g || !fetch_is_plain(g)) return s;
     s.read = reads[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
-    if (!g->coordinates[0].is_wide) s.read_spans = reads_spans[fetch_grid_shape(g)][g->connectivity.is_wide];
+    if (!g->coordinates[0].is_wide)
+        s.read_float_boxes = reads_float_boxes[fetch_grid_shape(g)][g->connectivity.is_wide];
     s.unite = unites[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
     return s;
 }
 
 /* Finds the smallest and largest finite number of an array of any type. */
-static void span_of_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
+static void array_range_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
 #pragma omp parallel num_threads(threads)
@@ -133,7 +134,7 @@ static inline float float_at(const char *p)
 }
 
 /* Finds the smallest and largest of an array of floats, four at a time. NaN is ignored. */
-MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
+MMBVH_INLINE void array_range_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
 {
     enum { LANES = 4 };
     vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY);
@@ -154,17 +155,17 @@ MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t
     }
 }
 
-static void span_of(const grid_array *a, int64_t count, int threads, double *least, double *most)
+static void array_range(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     enum { BLOCK = 65536 };
     float low = INFINITY, high = -INFINITY;
     if (a->axis) {
         const grid_array places = {.data = (const char *)a->axis->places, .stride = sizeof(double), .is_wide = true};
-        span_of_any(&places, a->axis->count, 1, least, most);
+        array_range_any(&places, a->axis->count, 1, least, most);
         return;
     }
     if (a->is_wide || a->is_integer) {
-        span_of_any(a, count, threads, least, most);
+        array_range_any(a, count, threads, least, most);
         return;
     }
 #pragma omp parallel num_threads(threads)
@@ -175,16 +176,16 @@ static void span_of(const grid_array *a, int64_t count, int threads, double *lea
             const int64_t n = count - begin < BLOCK ? count - begin : BLOCK;
             const char *data = a->data + begin * a->stride;
             if (a->stride == sizeof(float)) {
-                span_of_floats(data, sizeof(float), n, &low, &high);
+                array_range_floats(data, sizeof(float), n, &low, &high);
             } else {
-                span_of_floats(data, a->stride, n, &low, &high);
+                array_range_floats(data, a->stride, n, &low, &high);
             }
         }
         region_leave();
     }
     *least = (double)low;
     *most = (double)high;
-    if (!(low > -INFINITY && high < INFINITY)) span_of_any(a, count, threads, least, most);
+    if (!(low > -INFINITY && high < INFINITY)) array_range_any(a, count, threads, least, most);
 }
 
 fetch_box bounds_guess(const bounds_source *source, int threads)
@@ -194,13 +195,13 @@ fetch_box bounds_guess(const bounds_source *source, int threads)
     for (int axis = 0; axis < 3; axis++) {
         if (source->g) {
             const grid_array *a = &source->g->coordinates[axis];
-            span_of(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
+            array_range(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
         } else {
             double unused;
             const grid_array lower = {.data = (const char *)(source->lower + axis), .stride = 3 * size};
             const grid_array upper = {.data = (const char *)(source->upper + axis), .stride = 3 * size};
-            span_of(&lower, source->box_count, 1, &box.lower[axis], &unused);
-            span_of(&upper, source->box_count, 1, &unused, &box.upper[axis]);
+            array_range(&lower, source->box_count, 1, &box.lower[axis], &unused);
+            array_range(&upper, source->box_count, 1, &unused, &box.upper[axis]);
         }
     }
     bounds_transform(source, &box);
@@ -234,14 +235,14 @@ static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BL
 
 /* Maps floats in the source's coordinates to grid steps. The origin is a float too: the difference from a coordinate
  * near it is exact, and from a distant one has a relative error of at most 2^-24. */
-typedef struct span_mapping {
+typedef struct float_mapping {
     vec4 origin;
     vec4 factor;
-} span_mapping;
+} float_mapping;
 
-static span_mapping span_mapping_make(const bounds_source *source, const item_grid *grid)
+static float_mapping float_mapping_make(const bounds_source *source, const item_grid *grid)
 {
-    span_mapping m = {.factor = {0}};
+    float_mapping m = {.factor = {0}};
     for (int axis = 0; axis < 3; axis++) {
         m.origin[axis] = (float)(source->origin[axis] + grid->origin[axis] / source->scale);
         m.factor[axis] = (float)(source->scale * grid->inverse[axis]);
@@ -250,30 +251,30 @@ static span_mapping span_mapping_make(const bounds_source *source, const item_gr
 }
 
 /* Rounds to the nearest step. NaN becomes 0. */
-static inline ivec4 steps_of(const span_mapping *m, vec4 x)
+static inline ivec4 steps_of(const float_mapping *m, vec4 x)
 {
     const vec4 steps = (x - m->origin) * m->factor + 0.5f;
     return vec4_truncate(vec4_min(vec4_max(steps, (vec4){0}), vec4_set1(ITEM_TOP)));
 }
 
-static inline item item_of_span(const span_mapping *m, const fetch_span *span, uint32_t index)
+static inline item item_of_float_box(const float_mapping *m, const fetch_float_box *float_box, uint32_t index)
 {
-    const lanes box = lanes_pack(ITEM_TOP - steps_of(m, span->lower), steps_of(m, span->upper));
+    const lanes box = lanes_pack(ITEM_TOP - steps_of(m, float_box->lower), steps_of(m, float_box->upper));
     return (box & (lanes){-1, -1, -1, 0, -1, -1, -1, 0}) | item_of_index(index);
 }
 
-static void place_spans(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
-                        fetch_span *exact)
+static void place_float_boxes(const bounds_source *source, const item_grid *grid, item *items, int64_t count,
+                              item_set *set, fetch_float_box *exact)
 {
     uint32_t cells[BOUNDS_BLOCK];
-    fetch_span spans[BOUNDS_BLOCK];
-    const span_mapping m = span_mapping_make(source, grid);
+    fetch_float_box float_boxes[BOUNDS_BLOCK];
+    const float_mapping m = float_mapping_make(source, grid);
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
         const int n = list_block(items + begin, count - begin, cells);
-        source->read_spans(source, cells, n, spans);
+        source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
-            fetch_span_unite(exact, &spans[i]);
-            items[begin + i] = item_of_span(&m, &spans[i], cells[i]);
+            fetch_float_box_unite(exact, &float_boxes[i]);
+            items[begin + i] = item_of_float_box(&m, &float_boxes[i], cells[i]);
             item_set_add(set, items[begin + i]);
         }
     }
@@ -296,16 +297,16 @@ static void place_boxes(const bounds_source *source, const item_grid *grid, item
     }
 }
 
-void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
-                  fetch_box *exact)
+void bounds_fill_items(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                       fetch_box *exact)
 {
     item_set own = item_set_empty();
     fetch_box box;
     fetch_box_empty(&box);
-    if (source->read_spans) {
-        fetch_span span = fetch_span_empty();
-        place_spans(source, grid, items, count, &own, &span);
-        box = fetch_span_box(&span);
+    if (source->read_float_boxes) {
+        fetch_float_box float_box = fetch_float_box_empty();
+        place_float_boxes(source, grid, items, count, &own, &float_box);
+        box = fetch_float_box_widen(&float_box);
     } else {
         place_boxes(source, grid, items, count, &own, &box);
     }

@@ -10,21 +10,22 @@
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
 /* Same as bounds_read, for coordinates that are floats. */
-typedef void bounds_read_spans(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans);
+typedef void bounds_read_float_boxes(const bounds_source *source, const uint32_t *cells, int count,
+                                     fetch_float_box *float_boxes);
 
-/* Extends *box by the boxes of `count` cells. `soon`, unless NULL, lists as many cells that will be read later and may
+/* Extends *box by the boxes of `count` cells. `later`, unless NULL, lists as many cells that will be read later and may
  * be prefetched. */
-typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
                           fetch_box *box);
 
 struct bounds_source {
-    const grid *g; /* NULL if the boxes are given */
+    const grid *g; /* grid whose cells are read; NULL if the boxes are given */
     double origin[3];
     double scale;
-    const float *lower, *upper; /* the given boxes, count × 3 values */
+    const float *lower, *upper; /* corners of the given boxes, count × 3 values */
     int64_t box_count;          /* number of boxes, including those of ghosts */
     bounds_read *read;
-    bounds_read_spans *read_spans; /* NULL unless all coordinates are floats */
+    bounds_read_float_boxes *read_float_boxes; /* reads boxes of floats; NULL unless all coordinates are floats */
     bounds_unite *unite;
 };
 
@@ -49,7 +50,7 @@ fetch_box bounds_guess(const bounds_source *source, int threads);
 
 /* Computes the boxes of items that have only an index. Extends *set by the items, and *exact, unless NULL, by the boxes
  * in the source's coordinates. */
-void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
-                  fetch_box *exact);
+void bounds_fill_items(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                       fetch_box *exact);
 
 #endif

@@ -9,11 +9,11 @@
 #include "memory.h"
 #include "mmbvh_cost.h"
 
-typedef struct walk {
+typedef struct check_state {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    unsigned char *seen; /* one bit per cell */
+    unsigned char *seen; /* bit set of the cells visited so far */
     int64_t seen_count;  /* number of cells of the grid, or of meshes in a parent tree */
     int64_t next_pair;
     int64_t next_entry;
@@ -22,24 +22,24 @@ typedef struct walk {
     int depth;
     double overlap;
     base_error *error;
-} walk;
+} check_state;
 
-#define BROKEN(w, ...) base_fail((w)->error, INSITU_ERROR_INTERNAL, __VA_ARGS__)
+#define VIOLATION(w, ...) base_fail((w)->error, INSITU_ERROR_INTERNAL, __VA_ARGS__)
 
-static insitu_status check_box(const walk *w, int64_t index)
+static insitu_status check_box(const check_state *w, int64_t index)
 {
     float lower[4], upper[4];
     mmbvh_node_box(w->tree, index, lower, upper);
     for (int axis = 0; axis < 3; axis++) {
         if (w->g && !(lower[axis] <= upper[axis])) {
-            return BROKEN(w, "node %" PRId64 ": lower bound %g above upper bound %g on axis %d", index,
-                          (double)lower[axis], (double)upper[axis], axis);
+            return VIOLATION(w, "node %" PRId64 ": lower bound %g above upper bound %g on axis %d", index,
+                             (double)lower[axis], (double)upper[axis], axis);
         }
     }
     return INSITU_OK;
 }
 
-static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cell)
+static insitu_status check_cell_bounds(const check_state *w, int64_t index, int64_t cell)
 {
     float lower[4], upper[4];
     mmbvh_node_box(w->tree, index, lower, upper);
@@ -51,8 +51,8 @@ static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cel
         for (int axis = 0; axis < 3; axis++) {
             const double x = (p[axis] - w->tree->origin[axis]) * w->tree->scale;
             if (!(lower[axis] <= x && x <= upper[axis])) {
-                return BROKEN(w, "leaf %" PRId64 ": vertex %" PRId64 " of cell %" PRId64 " lies outside its bounds",
-                              index, vertex, cell);
+                return VIOLATION(w, "leaf %" PRId64 ": vertex %" PRId64 " of cell %" PRId64 " lies outside its bounds",
+                                 index, vertex, cell);
             }
         }
     }
@@ -60,7 +60,7 @@ static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cel
 }
 
 /* Finds the range of the cell's values; returns false if one of them is not finite. */
-static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
+static bool cell_range(const check_state *w, int64_t cell, double *low, double *high)
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
     int64_t vertex;
@@ -76,14 +76,14 @@ static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
     return true;
 }
 
-static void node_range(const walk *w, int64_t index, float *low, float *high)
+static void node_range(const check_state *w, int64_t index, float *low, float *high)
 {
     const mmbvh_ranges own = mmbvh_own_ranges(w->tree);
     memcpy(low, own.low + index * own.stride, sizeof *low);
     memcpy(high, own.high + index * own.stride, sizeof *high);
 }
 
-static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell)
+static insitu_status check_cell_range(check_state *w, int64_t index, int64_t cell)
 {
     float range_low, range_high;
     node_range(w, index, &range_low, &range_high);
@@ -93,33 +93,33 @@ static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell)
         return INSITU_OK;
     }
     if (!(range_low <= low && high <= range_high)) {
-        return BROKEN(w, "leaf %" PRId64 ": value %g or %g of cell %" PRId64 " lies outside its range", index, low,
-                      high, cell);
+        return VIOLATION(w, "leaf %" PRId64 ": value %g or %g of cell %" PRId64 " lies outside its range", index, low,
+                         high, cell);
     }
     return INSITU_OK;
 }
 
-static insitu_status check_cell(walk *w, int64_t index, int64_t cell)
+static insitu_status check_cell(check_state *w, int64_t index, int64_t cell)
 {
-    if (cell >= w->seen_count) return BROKEN(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
+    if (cell >= w->seen_count) return VIOLATION(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
     unsigned char *byte = &w->seen[cell / 8];
     const unsigned bit = 1u << (cell % 8);
-    if (*byte & bit) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is in the tree twice", index, cell);
+    if (*byte & bit) return VIOLATION(w, "leaf %" PRId64 ": cell %" PRId64 " is in the tree twice", index, cell);
     *byte = (unsigned char)(*byte | bit);
     if (!w->g) return INSITU_OK;
-    if (grid_is_ghost(w->g, cell)) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is a ghost", index, cell);
-    if (grid_is_flat(w->g, cell)) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is flat", index, cell);
+    if (grid_is_ghost(w->g, cell)) return VIOLATION(w, "leaf %" PRId64 ": cell %" PRId64 " is a ghost", index, cell);
+    if (grid_is_flat(w->g, cell)) return VIOLATION(w, "leaf %" PRId64 ": cell %" PRId64 " is flat", index, cell);
     const insitu_status status = check_cell_bounds(w, index, cell);
     if (status || !w->field) return status;
     return check_cell_range(w, index, cell);
 }
 
-static insitu_status check_leaf(walk *w, int64_t index)
+static insitu_status check_leaf(check_state *w, int64_t index)
 {
     const int64_t first = mmbvh_node_ref(w->tree, index), count = mmbvh_node_count(w->tree, index);
     if (first != w->next_entry || count > w->tree->cell_count - first) {
-        return BROKEN(w, "leaf %" PRId64 ": its cells are entries %" PRId64 " on, expected %" PRId64 " of %" PRId64,
-                      index, first, w->next_entry, w->tree->cell_count);
+        return VIOLATION(w, "leaf %" PRId64 ": its cells are entries %" PRId64 " on, expected %" PRId64 " of %" PRId64,
+                         index, first, w->next_entry, w->tree->cell_count);
     }
     for (int64_t i = first; i < first + count; i++) {
         const insitu_status status = check_cell(w, index, w->tree->cells[i]);
@@ -130,7 +130,7 @@ static insitu_status check_leaf(walk *w, int64_t index)
     return INSITU_OK;
 }
 
-static insitu_status check_contained(const walk *w, int64_t index, int64_t child_index)
+static insitu_status check_contained(const check_state *w, int64_t index, int64_t child_index)
 {
     float lower[2][4], upper[2][4], low[2], high[2];
     mmbvh_node_box(w->tree, index, lower[0], upper[0]);
@@ -139,11 +139,11 @@ static insitu_status check_contained(const walk *w, int64_t index, int64_t child
     node_range(w, child_index, &low[1], &high[1]);
     for (int axis = 0; axis < 3; axis++) {
         if (!(lower[0][axis] <= lower[1][axis] && upper[1][axis] <= upper[0][axis])) {
-            return BROKEN(w, "node %" PRId64 ": child %" PRId64 " lies outside its bounds", index, child_index);
+            return VIOLATION(w, "node %" PRId64 ": child %" PRId64 " lies outside its bounds", index, child_index);
         }
     }
     if (!(low[0] <= low[1] && high[1] <= high[0])) {
-        return BROKEN(w, "node %" PRId64 ": child %" PRId64 " lies outside its range", index, child_index);
+        return VIOLATION(w, "node %" PRId64 ": child %" PRId64 " lies outside its range", index, child_index);
     }
     return INSITU_OK;
 }
@@ -161,12 +161,12 @@ static double pair_overlap(const mmbvh *tree, int64_t parent, int64_t pair)
     return whole > 0 ? cost_half_area(lower[0], upper[0]) / whole : 0;
 }
 
-static insitu_status check_inner(walk *w, int64_t index)
+static insitu_status check_inner(check_state *w, int64_t index)
 {
     const int64_t pair = mmbvh_node_ref(w->tree, index);
     if (pair != w->next_pair || pair + 2 > w->tree->node_count) {
-        return BROKEN(w, "node %" PRId64 ": its children are nodes %" PRId64 " on, expected %" PRId64 " of %" PRId64,
-                      index, pair, w->next_pair, w->tree->node_count);
+        return VIOLATION(w, "node %" PRId64 ": its children are nodes %" PRId64 " on, expected %" PRId64 " of %" PRId64,
+                         index, pair, w->next_pair, w->tree->node_count);
     }
     w->next_pair += 2;
     for (int side = 0; side < 2; side++) {
@@ -177,7 +177,7 @@ static insitu_status check_inner(walk *w, int64_t index)
     return INSITU_OK;
 }
 
-static insitu_status check_nodes(walk *w)
+static insitu_status check_nodes(check_state *w)
 {
     /* The nodes that are still to be visited: the right child of each pair on the current path. */
     struct {
@@ -188,7 +188,7 @@ static insitu_status check_nodes(walk *w)
     while (height > 0) {
         const int64_t index = stack[--height].index;
         const int depth = stack[height].depth;
-        if (depth > MMBVH_MAX_DEPTH) return BROKEN(w, "node %" PRId64 ": deeper than %d", index, MMBVH_MAX_DEPTH);
+        if (depth > MMBVH_MAX_DEPTH) return VIOLATION(w, "node %" PRId64 ": deeper than %d", index, MMBVH_MAX_DEPTH);
         w->depth = depth > w->depth ? depth : w->depth;
         insitu_status status = check_box(w, index);
         const bool is_leaf = mmbvh_node_count(w->tree, index) > 0;
@@ -204,26 +204,27 @@ static insitu_status check_nodes(walk *w)
 }
 
 /* Checks that the traversal visited all nodes, entries and cells. */
-static insitu_status check_complete(const walk *w)
+static insitu_status check_complete(const check_state *w)
 {
     if (w->next_pair != w->tree->node_count && w->tree->node_count) {
-        return BROKEN(w, "%" PRId64 " of %" PRId64 " nodes are reached", w->next_pair, w->tree->node_count);
+        return VIOLATION(w, "%" PRId64 " of %" PRId64 " nodes are reached", w->next_pair, w->tree->node_count);
     }
     if (w->next_entry != w->tree->cell_count) {
-        return BROKEN(w, "%" PRId64 " of %" PRId64 " cell entries are in leaves", w->next_entry, w->tree->cell_count);
+        return VIOLATION(w, "%" PRId64 " of %" PRId64 " cell entries are in leaves", w->next_entry,
+                         w->tree->cell_count);
     }
     for (int64_t cell = 0; cell < w->seen_count; cell++) {
         const bool seen = w->seen[cell / 8] >> (cell % 8) & 1;
-        if (!seen && !(w->g && !grid_is_drawn(w->g, cell))) return BROKEN(w, "cell %" PRId64 " is in no leaf", cell);
+        if (!seen && !(w->g && !grid_is_drawn(w->g, cell))) return VIOLATION(w, "cell %" PRId64 " is in no leaf", cell);
     }
     if (w->field && w->unusable != w->tree->unusable_cells) {
-        return BROKEN(w, "%" PRId64 " cells are unusable, the tree says %" PRId64, w->unusable,
-                      w->tree->unusable_cells);
+        return VIOLATION(w, "%" PRId64 " cells are unusable, the tree says %" PRId64, w->unusable,
+                         w->tree->unusable_cells);
     }
     return INSITU_OK;
 }
 
-static mmbvh_statistics statistics_of(const walk *w)
+static mmbvh_statistics statistics_of(const check_state *w)
 {
     mmbvh_statistics s = {.leaves = w->leaves, .depth = w->depth, .cost = mmbvh_cost(w->tree, NULL)};
     const int64_t inner = w->tree->node_count - w->leaves;
@@ -237,7 +238,7 @@ insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *fi
                           base_error *error)
 {
     if (!tree) return base_fail(error, INSITU_ERROR_ARGUMENT, "no tree to check");
-    walk w = {.tree = tree, .g = g, .field = g ? field : NULL, .next_pair = 1, .error = error};
+    check_state w = {.tree = tree, .g = g, .field = g ? field : NULL, .next_pair = 1, .error = error};
     w.seen_count = g ? g->cell_count : tree->cell_count;
     w.seen = base_calloc((size_t)w.seen_count / 8 + 1, 1);
     if (!w.seen) return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: checking a tree");

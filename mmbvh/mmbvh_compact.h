@@ -35,7 +35,7 @@ typedef struct mmbvh_compact_node {
 
 typedef struct mmbvh_grid {
     float origin[4];
-    float step[4]; /* powers of two; element 3 of origin and step is 0 */
+    float step[4]; /* step of each axis, a power of two; element 3 of origin and step is 0 */
 } mmbvh_grid;
 
 typedef float compact_vec4 __attribute__((vector_size(16), may_alias, aligned(4)));

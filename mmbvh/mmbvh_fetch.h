@@ -66,18 +66,18 @@ MMBVH_INLINE int64_t fetch_corner(const grid *g, int64_t first, int i, const fet
 }
 
 /* Prefetches the connectivity of a cell whose first entry is `first`. A lattice has no connectivity. */
-MMBVH_INLINE void fetch_soon(const grid *g, int64_t first, const fetch_shape shape)
+MMBVH_INLINE void prefetch_connectivity(const grid *g, int64_t first, const fetch_shape shape)
 {
     if (shape != FETCH_LATTICE) __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
 }
 
 /* Prefetches the connectivity of later cells, in a pass over the cells in the mesh's order. The hardware prefetcher
  * reacts too late, although the pass is regular. */
-MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape shape)
+MMBVH_INLINE void prefetch_later_cell(const grid *g, int64_t cell, const fetch_shape shape)
 {
-    enum { AHEAD = 512 }; /* distance in entries of the connectivity */
+    enum { AHEAD = 512 }; /* prefetch distance in entries of the connectivity */
     if (shape == FETCH_LATTICE) return;
-    fetch_soon(g, fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
+    prefetch_connectivity(g, fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
 }
 
 /* Checks whether an array's numbers are contiguous. Code for such arrays uses the constant stride in its address
@@ -108,8 +108,8 @@ MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const float *)(const void *)at[i];
     out[0] = (vec4){v[0], v[1], v[2], v[3]};
     out[1] = shape == FETCH_TETS ? out[0] : (vec4){v[4], v[5], v[6], v[7]};
-    const vec4 poison = (out[0] - out[0]) + (out[1] - out[1]); /* 0 if both are finite, otherwise NaN */
-    return vec4_all((ivec4)(poison == vec4_set1(0)));
+    const vec4 nonfinite = (out[0] - out[0]) + (out[1] - out[1]); /* 0 if all values are finite, otherwise NaN */
+    return vec4_all((ivec4)(nonfinite == vec4_set1(0)));
 }
 
 /* The range of the values of a cell or leaf, per lane. fetch_doubles_range() combines the lanes. */
@@ -126,15 +126,15 @@ MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, in
     fetch_values(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const double *)(const void *)at[i];
     const vec2 a = {v[0], v[1]}, b = {v[2], v[3]};
-    vec2 poison = (a - a) + (b - b); /* 0 if both are finite, otherwise NaN */
+    vec2 nonfinite = (a - a) + (b - b); /* 0 if all values are finite, otherwise NaN */
     *out = (fetch_doubles){vec2_min(a, b), vec2_max(a, b)};
     if (shape != FETCH_TETS) {
         const vec2 c = {v[4], v[5]}, d = {v[6], v[7]};
-        poison += (c - c) + (d - d);
+        nonfinite += (c - c) + (d - d);
         out->low = vec2_min(vec2_min(c, d), out->low);
         out->high = vec2_max(vec2_max(c, d), out->high);
     }
-    return poison[0] + poison[1] == 0;
+    return nonfinite[0] + nonfinite[1] == 0;
 }
 
 /* The range of a cell's values. is_finite is true if all values are finite. */
@@ -191,34 +191,34 @@ MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
 }
 
 /* A bounding box in float, in lanes 0 to 2. */
-typedef struct fetch_span {
+typedef struct fetch_float_box {
     vec4 lower, upper;
-} fetch_span;
+} fetch_float_box;
 
-static inline fetch_span fetch_span_empty(void)
+static inline fetch_float_box fetch_float_box_empty(void)
 {
-    return (fetch_span){vec4_set1(INFINITY), vec4_set1(-INFINITY)};
+    return (fetch_float_box){vec4_set1(INFINITY), vec4_set1(-INFINITY)};
 }
 
-static inline void fetch_span_unite(fetch_span *to, const fetch_span *span)
+static inline void fetch_float_box_unite(fetch_float_box *to, const fetch_float_box *float_box)
 {
-    to->lower = vec4_min(span->lower, to->lower);
-    to->upper = vec4_max(span->upper, to->upper);
+    to->lower = vec4_min(float_box->lower, to->lower);
+    to->upper = vec4_max(float_box->upper, to->upper);
 }
 
-static inline fetch_box fetch_span_box(const fetch_span *span)
+static inline fetch_box fetch_float_box_widen(const fetch_float_box *float_box)
 {
     fetch_box box;
     for (int axis = 0; axis < 3; axis++) {
-        box.lower[axis] = (double)span->lower[axis];
-        box.upper[axis] = (double)span->upper[axis];
+        box.lower[axis] = (double)float_box->lower[axis];
+        box.upper[axis] = (double)float_box->upper[axis];
     }
     return box;
 }
 
 /* Extends the box by a cell whose coordinates are floats. */
-MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell, const fetch_shape shape,
-                                  const bool wide_index, const bool is_packed)
+MMBVH_INLINE void fetch_float_box_cell(fetch_float_box *float_box, const grid *g, int64_t cell, const fetch_shape shape,
+                                       const bool wide_index, const bool is_packed)
 {
     const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
     const int64_t stride = is_packed ? (int64_t)sizeof(float) : g->coordinates[0].stride;
@@ -228,8 +228,8 @@ MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell,
         const int64_t at = fetch_corner(g, first, i, shape, wide_index) * stride;
         const vec4 p = {*(const float *)(const void *)(x + at), *(const float *)(const void *)(y + at),
                         *(const float *)(const void *)(z + at), 0};
-        span->lower = vec4_min(p, span->lower);
-        span->upper = vec4_max(p, span->upper);
+        float_box->lower = vec4_min(p, float_box->lower);
+        float_box->upper = vec4_max(p, float_box->upper);
     }
 }
 
@@ -262,14 +262,14 @@ MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t 
         *box = all;
         return;
     }
-    fetch_span even = fetch_span_empty(), odd = even;
+    fetch_float_box even = fetch_float_box_empty(), odd = even;
     for (int64_t k = 0; k < cell_count / 2; k++) {
-        fetch_span_cell(&even, g, cells[2 * k], shape, wide_index, false);
-        fetch_span_cell(&odd, g, cells[2 * k + 1], shape, wide_index, false);
+        fetch_float_box_cell(&even, g, cells[2 * k], shape, wide_index, false);
+        fetch_float_box_cell(&odd, g, cells[2 * k + 1], shape, wide_index, false);
     }
-    if (cell_count & 1) fetch_span_cell(&even, g, cells[cell_count - 1], shape, wide_index, false);
-    fetch_span_unite(&even, &odd);
-    const fetch_box floats = fetch_span_box(&even);
+    if (cell_count & 1) fetch_float_box_cell(&even, g, cells[cell_count - 1], shape, wide_index, false);
+    fetch_float_box_unite(&even, &odd);
+    const fetch_box floats = fetch_float_box_widen(&even);
     fetch_box_unite(box, &floats);
 }
 
@@ -285,12 +285,12 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
 }
 
 /* Same as fetch_box_round(), to the same bits, for a box of floats. Lane 3 of the input is ignored. */
-MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3], double scale, vec4 *lower,
-                                   vec4 *upper)
+MMBVH_INLINE void fetch_float_box_round(const fetch_float_box *float_box, const double origin[3], double scale,
+                                        vec4 *lower, vec4 *upper)
 {
     const double from[4] = {origin[0], origin[1], origin[2], 0};
-    *lower = vec4_xyz(vec4_place_down(span->lower, from, scale));
-    *upper = vec4_xyz(0.0f - vec4_place_down(span->upper, from, -scale));
+    *lower = vec4_xyz(vec4_transform_down(float_box->lower, from, scale));
+    *upper = vec4_xyz(0.0f - vec4_transform_down(float_box->upper, from, -scale));
 }
 
 /* Checks whether fetch_box_cells() can read the grid: the coordinates are all floats or all doubles with the same

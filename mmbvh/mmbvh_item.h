@@ -22,8 +22,8 @@ typedef lanes item;
  * steps. */
 typedef struct item_grid {
     double origin[3];
-    double step;       /* 0 if no axis has a finite extent */
-    double inverse[3]; /* 1 / step, or 0 on an axis without a finite extent */
+    double step;       /* length of a step; 0 if no axis has a finite extent */
+    double inverse[3]; /* 1 / step for each axis, or 0 on an axis without a finite extent */
     bool is_finest;    /* true if a finer grid would not separate more cells */
 } item_grid;
 
@@ -47,7 +47,7 @@ static inline item item_of_index(uint32_t index)
 /* Returns twice the centroid minus TOP in lanes 4 to 6, and the negative of that in lanes 0 to 2. */
 static inline lanes item_centroid(item i)
 {
-    return (lanes)((ulanes)i - (ulanes)lanes_swap(i)); /* the lanes of the index may wrap around */
+    return (lanes)((ulanes)i - (ulanes)lanes_swap(i)); /* the lanes that hold the index may wrap around */
 }
 
 static inline item_set item_set_empty(void)
@@ -91,7 +91,7 @@ static inline lanes item_extent(lanes box)
 static inline ivec4 item_area_terms(lanes extents)
 {
     const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);
-    return lanes_pair_products(extents, turned & (lanes){-1, -1, -1, 0, -1, -1, -1, 0});
+    return lanes_multiply_add(extents, turned & (lanes){-1, -1, -1, 0, -1, -1, -1, 0});
 }
 
 /* Returns half the surface area of a box, in squared steps. */

@@ -34,7 +34,7 @@ static inline lanes lanes_swap(lanes a)
 }
 
 /* Returns the upper 16 bits of each lane's product, as unsigned numbers. */
-static inline lanes lanes_scale(lanes a, lanes factor)
+static inline lanes lanes_multiply_high(lanes a, lanes factor)
 {
 #if defined(__SSE2__)
     return (lanes)_mm_mulhi_epu16((__m128i)a, (__m128i)factor);
@@ -75,7 +75,7 @@ static inline lanes lanes_pack(ivec4 a, ivec4 b)
 }
 
 /* Multiplies the lanes and returns the sum of each even lane's product and the next one's. */
-static inline ivec4 lanes_pair_products(lanes a, lanes b)
+static inline ivec4 lanes_multiply_add(lanes a, lanes b)
 {
 #if defined(__SSE2__)
     return (ivec4)_mm_madd_epi16((__m128i)a, (__m128i)b);

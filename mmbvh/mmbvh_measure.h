@@ -15,34 +15,36 @@ static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4
     return (x * y + y * z + z * x) * (count ? count : 2);
 }
 
-/* Stores the node's box. If the tree's grid cannot represent the box, increments *misfits. If s->is_measured, adds the
- * change of the node's area to *grown. */
-static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4 upper, int64_t *misfits, double *grown)
+/* Stores the node's box. If the tree's grid cannot represent the box, increments *outside_grid. If s->measures_area,
+ * adds the change of the node's area to *area_change. */
+static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4 upper, int64_t *outside_grid,
+                                  double *area_change)
 {
     const mmbvh *tree = s->tree;
     vec4 old[2];
-    if (s->is_measured) {
+    if (s->measures_area) {
         store_decode(tree, node, &old[0], &old[1]);
-        *grown -= node_area(tree, node, old[0], old[1]);
+        *area_change -= node_area(tree, node, old[0], old[1]);
     }
-    *misfits += !store_box(tree, node, lower, upper);
-    if (s->is_measured) {
+    *outside_grid += !store_box(tree, node, lower, upper);
+    if (s->measures_area) {
         store_decode(tree, node, &old[0], &old[1]);
-        *grown += node_area(tree, node, old[0], old[1]);
+        *area_change += node_area(tree, node, old[0], old[1]);
     }
 }
 
 /* Stores the union of the children's boxes. If the sweep visited only one child, that child's box is used alone. */
-static inline void store_children(const sweep *s, int64_t node, int64_t pair, int64_t *misfits, double *grown)
+static inline void store_children(const sweep *s, int64_t node, int64_t pair, int64_t *outside_grid,
+                                  double *area_change)
 {
     vec4 lower[2], upper[2];
     for (int side = 0; side < 2; side++) store_decode(s->tree, pair + side, &lower[side], &upper[side]);
     if (s->visible_count) {
-        const bool shows[2] = {sweep_shows(s, pair), sweep_shows(s, pair + 1)};
+        const bool is_visited[2] = {sweep_visits(s, pair), sweep_visits(s, pair + 1)};
         for (int side = 0; side < 2; side++)
-            if (shows[side] && !shows[!side]) lower[!side] = lower[side], upper[!side] = upper[side];
+            if (is_visited[side] && !is_visited[!side]) lower[!side] = lower[side], upper[!side] = upper[side];
     }
-    store_measured(s, node, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]), misfits, grown);
+    store_measured(s, node, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]), outside_grid, area_change);
 }
 
 #endif

@@ -17,7 +17,7 @@ int sweep_threads(const mmbvh_options *options)
     return options && options->threads > 0 ? options->threads : omp_get_max_threads();
 }
 
-bool sweep_shows(const sweep *s, int64_t node)
+bool sweep_visits(const sweep *s, int64_t node)
 {
     for (int v = 0; v < s->visible_count; v++) {
         const mmbvh_visible *visible = &s->visible[v];
@@ -29,10 +29,10 @@ bool sweep_shows(const sweep *s, int64_t node)
     return s->visible_count == 0;
 }
 
-static sweep_sum run_all(const sweep *s, int64_t first, int64_t end)
+static sweep_sum run_with_followers(const sweep *s, int64_t first, int64_t end)
 {
     const sweep_sum sum = s->run(s, first, end);
-    return s->then ? run_all(s->then, first, end) : sum;
+    return s->follower ? run_with_followers(s->follower, first, end) : sum;
 }
 
 /* Returns the index of the first descendant of the pair's right node; `end` if that node is a leaf. */
@@ -44,12 +44,12 @@ static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
 /* Sweeps a pair and its descendants, nodes[first .. end), in runs of at most s->run_max nodes. */
 static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
-    if (!s->run_max || end - first <= s->run_max) return run_all(s, first, end);
+    if (!s->run_max || end - first <= s->run_max) return run_with_followers(s, first, end);
     const int64_t right_first = right_begin(s, first, end);
     sweep_sum left = {0}, right = {0};
-    if (sweep_shows(s, first + 1)) right = sweep_runs(s, right_first, end);
-    if (sweep_shows(s, first)) left = sweep_runs(s, first + 2, right_first);
-    return sweep_add(sweep_add(left, right), run_all(s, first, first + 2));
+    if (sweep_visits(s, first + 1)) right = sweep_runs(s, right_first, end);
+    if (sweep_visits(s, first)) left = sweep_runs(s, first + 2, right_first);
+    return sweep_add(sweep_add(left, right), run_with_followers(s, first, first + 2));
 }
 
 /* Sweeps the descendants of the pair in parallel tasks of at most RUN_MAX nodes each, and then the pair itself. */
@@ -58,20 +58,20 @@ static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
     if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
     const int64_t right_first = right_begin(s, first, end);
     sweep_sum left = {0}, right = {0};
-    if (sweep_shows(s, first)) {
+    if (sweep_visits(s, first)) {
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
         left = sweep_below(s, first + 2, right_first);
     }
-    if (sweep_shows(s, first + 1)) right = sweep_below(s, right_first, end);
+    if (sweep_visits(s, first + 1)) right = sweep_below(s, right_first, end);
 #pragma omp taskwait
-    return sweep_add(sweep_add(left, right), run_all(s, first, first + 2));
+    return sweep_add(sweep_add(left, right), run_with_followers(s, first, first + 2));
 }
 
 sweep_sum sweep_tree(const sweep *s, int threads)
 {
     sweep_sum sum = {0};
     const int64_t node_count = s->tree->node_count;
-    if (!node_count || !sweep_shows(s, 0)) return sum;
+    if (!node_count || !sweep_visits(s, 0)) return sum;
     if (node_count <= RUN_MAX) {
         sum = sweep_runs(s, 1, node_count);
     } else {
@@ -83,7 +83,7 @@ sweep_sum sweep_tree(const sweep *s, int threads)
             region_leave();
         }
     }
-    return sweep_add(sum, run_all(s, 0, 1)); /* the root is processed after its children */
+    return sweep_add(sum, run_with_followers(s, 0, 1)); /* the root is processed after its children */
 }
 
 /* Prefetches the connectivity of a leaf that is visited later; the sweep processes the cells in descending order. If a
@@ -95,8 +95,8 @@ MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape
     const int64_t later = s->tree->cells[entry - distance];
     const int count = fetch_vertex_count(s->g, later, shape);
     const int64_t first = fetch_first(s->g, later, count, shape);
-    fetch_soon(s->g, first, shape);
-    if (shape != FETCH_TETS || wide_index) fetch_soon(s->g, first + count - 1, shape);
+    prefetch_connectivity(s->g, first, shape);
+    if (shape != FETCH_TETS || wide_index) prefetch_connectivity(s->g, first + count - 1, shape);
 }
 
 /* Rounds a range outward. If no cell was read, the range stays empty. */
@@ -136,8 +136,8 @@ MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const 
         low = vec4_min(vec4_min(v[0], v[1]), low);
         high = vec4_max(vec4_max(v[0], v[1]), high);
     }
-    return (range){vec4_least(low) + 0.0f,
-                   vec4_most(high) + 0.0f}; /* adding 0 makes a negative zero positive, as round_down() does */
+    return (range){vec4_min_lane(low) + 0.0f,
+                   vec4_max_lane(high) + 0.0f}; /* adding 0 makes a negative zero positive, as round_down() does */
 }
 
 MMBVH_INLINE sweep_sum run_ranges(const sweep *s, int64_t first, int64_t end, const fetch_shape shape,
@@ -167,7 +167,7 @@ FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
 /* Returns the range of a leaf for fields and cells that the specialized functions above cannot read. */
-static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
+static range generic_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
 {
     fetch_range leaf = {(double)INFINITY, -(double)INFINITY, true};
     for (int64_t k = 0; k < count; k++) {
@@ -180,12 +180,12 @@ static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusa
     return rounded_range(&leaf);
 }
 
-static sweep_sum run_any(const sweep *s, int64_t first, int64_t end)
+static sweep_sum run_generic(const sweep *s, int64_t first, int64_t end)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
-        set_range(s, i, count ? any_leaf(s, ref, count, &unusable) : children_range(s, ref));
+        set_range(s, i, count ? generic_leaf(s, ref, count, &unusable) : children_range(s, ref));
     }
     return (sweep_sum){.count = unusable};
 }
@@ -203,7 +203,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
         range r = count ? range_empty() : children_range(s, ref);
         for (int64_t k = 0; k < count; k++) {
             const float *of_box = s->box_ranges + 2 * (int64_t)s->tree->cells[ref + k];
-            r = united((range){of_box[0], of_box[1]}, r);
+            r = range_union((range){of_box[0], of_box[1]}, r);
         }
         set_range(s, i, r);
     }
@@ -225,7 +225,7 @@ bool sweep_reads_floats(const sweep *ranges)
 static sweep_run choose_run(const grid *g, const grid_field *field)
 {
     if (!field) return run_infinite;
-    if (!is_plain(g, field)) return run_any;
+    if (!is_plain(g, field)) return run_generic;
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 

@@ -12,7 +12,8 @@ enum {
                           they save */
 };
 
-static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *misfits, double *grown)
+static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *outside_grid,
+                        double *area_change)
 {
     const mmbvh *tree = s->tree;
     fetch_box box;
@@ -21,8 +22,8 @@ static void store_cells(const sweep *s, int64_t index, int64_t first, int count,
     const uint32_t *cells = tree->cells + first; /* the sweep processes the cells in descending order */
     s->source->unite(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
     fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
-    store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0}, misfits,
-                   grown);
+    store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0},
+                   outside_grid, area_change);
 }
 
 static sweep_sum run_bounds(const sweep *s, int64_t first, int64_t end)
@@ -32,9 +33,9 @@ static sweep_sum run_bounds(const sweep *s, int64_t first, int64_t end)
         const int count = mmbvh_node_count(s->tree, i);
         const int64_t ref = mmbvh_node_ref(s->tree, i);
         if (count)
-            store_cells(s, i, ref, count, &sum.count, &sum.grown);
+            store_cells(s, i, ref, count, &sum.count, &sum.area_change);
         else
-            store_children(s, i, ref, &sum.count, &sum.grown);
+            store_children(s, i, ref, &sum.count, &sum.area_change);
     }
     return sum;
 }
@@ -51,7 +52,7 @@ sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep 
     sweep both;
     if (sweep_both_as_floats(ranges, source, &both)) return both;
     both = sweep_of_bounds(tree, source);
-    both.then = ranges;
+    both.follower = ranges;
     return both;
 }
 
@@ -100,7 +101,7 @@ static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, in
 }
 
 /* Checks whether the mesh has shrunk so much that it uses only a small part of its grid's steps. */
-static bool is_grid_wasted(const mmbvh *tree)
+static bool is_grid_too_coarse(const mmbvh *tree)
 {
     const int few = COMPACT_LOWER_MAX / 8;
     float lower[4], upper[4];
@@ -117,7 +118,7 @@ static sweep sweep_of_visible_bounds(const mmbvh *tree, const bounds_source *sou
                                      int visible_count)
 {
     sweep s = sweep_of_bounds(tree, source);
-    s.is_measured = true;
+    s.measures_area = true;
     s.visible = visible;
     s.visible_count = visible_count;
     if (visible_count) s.run_max = VISIBLE_NODES;
@@ -134,8 +135,8 @@ insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh
     const bounds_source source = bounds_source_make(g, NULL, NULL, g->cell_count, tree->origin, tree->scale);
     const sweep s = sweep_of_visible_bounds(tree, &source, visible, visible_count);
     const sweep_sum sum = sweep_tree(&s, threads);
-    tree->area += sum.grown;
-    if (!tree->compact || !(sum.count || (*is_whole && is_grid_wasted(tree)))) return INSITU_OK;
+    tree->area += sum.area_change;
+    if (!tree->compact || !(sum.count || (*is_whole && is_grid_too_coarse(tree)))) return INSITU_OK;
     *is_whole = true;
     return sweep_new_grid(tree, &source, threads);
 }

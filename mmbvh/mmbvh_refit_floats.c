@@ -15,59 +15,59 @@ enum {
 /* The boxes of consecutive cells of the tree's list. Lane 3 holds the range of the values. */
 typedef struct part {
     int64_t first;
-    int64_t unusable; /* number of cells with non-finite values */
-    int64_t misfits;  /* number of boxes that the tree's grid cannot represent */
-    double grown;     /* change of the tree's area, as in sweep_sum */
-    fetch_span spans[PART_CELLS];
+    int64_t unusable;     /* number of cells with non-finite values */
+    int64_t outside_grid; /* number of boxes that the tree's grid cannot represent */
+    double area_change;   /* change of the tree's area, as in sweep_sum */
+    fetch_float_box float_boxes[PART_CELLS];
 } part;
 
 /* Parameters of a pass that are compile-time constants in each instance. */
-typedef struct reading {
+typedef struct pass_constants {
     fetch_shape shape;
     bool wide_index, with_values, is_packed;
-} reading;
+} pass_constants;
 
-MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading how, int64_t *unusable)
+MMBVH_INLINE fetch_float_box read_cell(const sweep *s, int64_t cell, const pass_constants pass, int64_t *unusable)
 {
     const grid *g = s->source->g;
-    const int64_t stride = how.is_packed ? 4 : g->coordinates[0].stride;
-    const int64_t value_stride = how.is_packed ? 4 : s->values.stride;
+    const int64_t stride = pass.is_packed ? 4 : g->coordinates[0].stride;
+    const int64_t value_stride = pass.is_packed ? 4 : s->values.stride;
     const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
-    const int count = fetch_vertex_count(g, cell, how.shape);
-    const int64_t first = fetch_first(g, cell, count, how.shape);
-    fetch_span span = fetch_span_empty();
-    vec4 poison = {0};
+    const int count = fetch_vertex_count(g, cell, pass.shape);
+    const int64_t first = fetch_first(g, cell, count, pass.shape);
+    fetch_float_box float_box = fetch_float_box_empty();
+    vec4 nonfinite = {0};
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_corner(g, first, i, how.shape, how.wide_index);
+        const int64_t vertex = fetch_corner(g, first, i, pass.shape, pass.wide_index);
         const vec4 p = {*(const float *)(const void *)(x + vertex * stride),
                         *(const float *)(const void *)(y + vertex * stride),
                         *(const float *)(const void *)(z + vertex * stride),
-                        how.with_values ? *(const float *)(const void *)(s->values.data + vertex * value_stride) : 0};
-        span.lower = vec4_min(p, span.lower);
-        span.upper = vec4_max(p, span.upper);
-        if (how.with_values) poison += p - p; /* 0 while all values are finite, otherwise NaN */
+                        pass.with_values ? *(const float *)(const void *)(s->values.data + vertex * value_stride) : 0};
+        float_box.lower = vec4_min(p, float_box.lower);
+        float_box.upper = vec4_max(p, float_box.upper);
+        if (pass.with_values) nonfinite += p - p; /* 0 while all values are finite, otherwise NaN */
     }
-    if (poison[3] == 0) return span;
+    if (nonfinite[3] == 0) return float_box;
     ++*unusable;
-    span.lower[3] = INFINITY;
-    span.upper[3] = -INFINITY;
-    return span;
+    float_box.lower[3] = INFINITY;
+    float_box.upper[3] = -INFINITY;
+    return float_box;
 }
 
 /* Prefetches one vertex of a cell whose connectivity was prefetched earlier; the other vertices are near it. Not needed
  * for tets: each vertex is shared by so many of them that it is usually in the cache already. */
-MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading how)
+MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const pass_constants pass)
 {
     const grid *g = s->source->g;
-    if (how.shape != FETCH_HEXES) return;
-    const int64_t vertex = fetch_index(&g->connectivity, fetch_first(g, cell, 8, how.shape), how.wide_index);
+    if (pass.shape != FETCH_HEXES) return;
+    const int64_t vertex = fetch_index(&g->connectivity, fetch_first(g, cell, 8, pass.shape), pass.wide_index);
     for (int axis = 0; axis < 3; axis++) {
-        __builtin_prefetch(g->coordinates[axis].data + vertex * (how.is_packed ? 4 : g->coordinates[0].stride));
+        __builtin_prefetch(g->coordinates[axis].data + vertex * (pass.is_packed ? 4 : g->coordinates[0].stride));
     }
-    if (how.with_values) __builtin_prefetch(s->values.data + vertex * (how.is_packed ? 4 : s->values.stride));
+    if (pass.with_values) __builtin_prefetch(s->values.data + vertex * (pass.is_packed ? 4 : s->values.stride));
 }
 
-MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
+MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
 {
     const uint32_t *cells = s->tree->cells;
     p->first = first;
@@ -75,50 +75,50 @@ MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end
         const int64_t later =
             cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep processes the cells in descending order */
         const int64_t entry =
-            fetch_first(s->source->g, later, fetch_vertex_count(s->source->g, later, how.shape), how.shape);
-        fetch_soon(s->source->g, entry, how.shape);
-        prefetch_vertex(s, cells[i > PREFETCH_VERTICES ? i - PREFETCH_VERTICES : 0], how);
-        p->spans[i - first] = read_cell(s, cells[i], how, &p->unusable);
+            fetch_first(s->source->g, later, fetch_vertex_count(s->source->g, later, pass.shape), pass.shape);
+        prefetch_connectivity(s->source->g, entry, pass.shape);
+        prefetch_vertex(s, cells[i > PREFETCH_VERTICES ? i - PREFETCH_VERTICES : 0], pass);
+        p->float_boxes[i - first] = read_cell(s, cells[i], pass, &p->unusable);
     }
 }
 
-MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t first, int count, const reading how)
+MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t first, int count, const pass_constants pass)
 {
     const mmbvh *tree = s->tree;
-    const fetch_span *spans = p->spans + (first - p->first);
-    fetch_span all = spans[0];
-    for (int i = 1; i < count; i++) fetch_span_unite(&all, &spans[i]);
+    const fetch_float_box *float_boxes = p->float_boxes + (first - p->first);
+    fetch_float_box all = float_boxes[0];
+    for (int i = 1; i < count; i++) fetch_float_box_unite(&all, &float_boxes[i]);
     vec4 lower, upper;
-    fetch_span_round(&all, tree->origin, tree->scale, &lower, &upper);
-    store_measured(s, node, lower, upper, &p->misfits, &p->grown);
-    if (how.with_values)
+    fetch_float_box_round(&all, tree->origin, tree->scale, &lower, &upper);
+    store_measured(s, node, lower, upper, &p->outside_grid, &p->area_change);
+    if (pass.with_values)
         set_range(s, node,
                   (range){all.lower[3] + 0.0f,
                           all.upper[3] + 0.0f}); /* adding 0 makes a negative zero positive, as in bounds */
 }
 
-MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
+MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
 {
     for (int64_t i = end - 1; i >= first; i--) {
         const int count = mmbvh_node_count(s->tree, i);
         const int64_t ref = mmbvh_node_ref(s->tree, i);
         if (count) {
-            store_leaf(s, p, i, ref, count, how);
+            store_leaf(s, p, i, ref, count, pass);
         } else {
-            store_children(s, i, ref, &p->misfits, &p->grown);
-            if (how.with_values) set_range(s, i, children_range(s, ref));
+            store_children(s, i, ref, &p->outside_grid, &p->area_change);
+            if (pass.with_values) set_range(s, i, children_range(s, ref));
         }
     }
 }
 
 /* Sweeps a pair, or the root, without its descendants. */
-MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
+MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
 {
     for (int64_t i = first; i < end; i++) {
         const int count = mmbvh_node_count(s->tree, i);
         const int64_t ref = mmbvh_node_ref(s->tree, i);
-        if (count) read_cells(s, p, ref, ref + count, how);
-        store_nodes(s, p, i, i + 1, how);
+        if (count) read_cells(s, p, ref, ref + count, pass);
+        store_nodes(s, p, i, i + 1, pass);
     }
 }
 
@@ -135,26 +135,26 @@ static int64_t end_of_cells(const mmbvh *tree, int64_t node)
     return mmbvh_node_ref(tree, node) + mmbvh_node_count(tree, node);
 }
 
-MMBVH_INLINE sweep_sum run(const sweep *s, int64_t first, int64_t end, const reading how)
+MMBVH_INLINE sweep_sum run(const sweep *s, int64_t first, int64_t end, const pass_constants pass)
 {
     part p;
-    p.unusable = p.misfits = 0;
-    p.grown = 0;
+    p.unusable = p.outside_grid = 0;
+    p.area_change = 0;
     if (end - first <= 2) {
-        run_nodes(s, &p, first, end, how);
+        run_nodes(s, &p, first, end, pass);
     } else {
-        read_cells(s, &p, first_cell(s->tree, first), end_of_cells(s->tree, first + 1), how);
-        store_nodes(s, &p, first, end, how);
+        read_cells(s, &p, first_cell(s->tree, first), end_of_cells(s->tree, first + 1), pass);
+        store_nodes(s, &p, first, end, pass);
     }
-    return (sweep_sum){how.with_values ? p.unusable : p.misfits, p.grown};
+    return (sweep_sum){pass.with_values ? p.unusable : p.outside_grid, p.area_change};
 }
 
 #define DEFINE_RUN_BOUNDS(name, shape, wide_index, wide_number)                                                        \
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_packed(&s->source->g->coordinates[0])                                                          \
-                   ? run(s, first, end, (reading){shape, wide_index, false, true})                                     \
-                   : run(s, first, end, (reading){shape, wide_index, false, false});                                   \
+                   ? run(s, first, end, (pass_constants){shape, wide_index, false, true})                              \
+                   : run(s, first, end, (pass_constants){shape, wide_index, false, false});                            \
     }
 FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
 
@@ -162,8 +162,8 @@ FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_packed(&s->source->g->coordinates[0]) && fetch_is_packed(&s->values)                           \
-                   ? run(s, first, end, (reading){shape, wide_index, true, true})                                      \
-                   : run(s, first, end, (reading){shape, wide_index, true, false});                                    \
+                   ? run(s, first, end, (pass_constants){shape, wide_index, true, true})                               \
+                   : run(s, first, end, (pass_constants){shape, wide_index, true, false});                             \
     }
 FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOTH, run_both)
 
@@ -173,14 +173,14 @@ static const sweep_run run_both_table[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(run_b
 void sweep_bounds_as_floats(sweep *bounds)
 {
     const grid *g = bounds->source->g;
-    if (!bounds->source->read_spans) return;
+    if (!bounds->source->read_float_boxes) return;
     bounds->run = run_bounds_table[fetch_grid_shape(g)][g->connectivity.is_wide];
     bounds->run_max = PART_NODES;
 }
 
 bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both)
 {
-    if (!source->read_spans || !sweep_reads_floats(ranges)) return false;
+    if (!source->read_float_boxes || !sweep_reads_floats(ranges)) return false;
     *both = *ranges;
     both->source = source;
     both->run = run_both_table[fetch_grid_shape(source->g)][source->g->connectivity.is_wide];

@@ -8,35 +8,35 @@
 #include "mmbvh_fetch.h"
 
 /* The range of the values of all rows at each position along a row of vertices. */
-typedef struct row_places {
-    double low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], poison[ROWS_CELLS + 1];
-} row_places;
+typedef struct row_doubles {
+    double low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], nonfinite[ROWS_CELLS + 1];
+} row_doubles;
 
 typedef struct row_floats {
-    float low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], poison[ROWS_CELLS + 1];
+    float low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], nonfinite[ROWS_CELLS + 1];
 } row_floats;
 
-bool rows_fit(const grid *g, const grid_field *field)
+bool rows_can_read(const grid *g, const grid_field *field)
 {
     return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !field->own &&
            grid_lattice_row_axis(g->lattice) >= 0;
 }
 
 /* The smaller and the larger of two numbers. */
-#define LESS(a, b) ((a) < (b) ? (a) : (b))
-#define MORE(a, b) ((a) > (b) ? (a) : (b))
+#define SMALLER(a, b) ((a) < (b) ? (a) : (b))
+#define LARGER(a, b) ((a) > (b) ? (a) : (b))
 
-/* Computes the range of four rows' values at each position. poison is 0 if all values are finite, otherwise NaN. */
-#define UNITE_ROWS(number, to, rows, stride, count)                                                                    \
+/* Computes the range of four rows' values at each position. nonfinite is 0 if all values are finite, otherwise NaN. */
+#define ROW_RANGES(number, to, rows, stride, count)                                                                    \
     for (int64_t n = 0; n < (count); n++) {                                                                            \
         const number a = *(const number *)(const void *)((rows)[0] + n * (stride));                                    \
         const number b = *(const number *)(const void *)((rows)[1] + n * (stride));                                    \
         const number c = *(const number *)(const void *)((rows)[2] + n * (stride));                                    \
         const number d = *(const number *)(const void *)((rows)[3] + n * (stride));                                    \
-        const number ab = LESS(a, b), cd = LESS(c, d), most_ab = MORE(a, b), most_cd = MORE(c, d);                     \
-        (to)->low[n] = LESS(ab, cd);                                                                                   \
-        (to)->high[n] = MORE(most_ab, most_cd);                                                                        \
-        (to)->poison[n] = ((a - a) + (b - b)) + ((c - c) + (d - d));                                                   \
+        const number ab = SMALLER(a, b), cd = SMALLER(c, d), most_ab = LARGER(a, b), most_cd = LARGER(c, d);           \
+        (to)->low[n] = SMALLER(ab, cd);                                                                                \
+        (to)->high[n] = LARGER(most_ab, most_cd);                                                                      \
+        (to)->nonfinite[n] = ((a - a) + (b - b)) + ((c - c) + (d - d));                                                \
     }
 
 #define DEFINE_RANGES(name, number, places)                                                                            \
@@ -45,53 +45,53 @@ bool rows_fit(const grid *g, const grid_field *field)
         places of;                                                                                                     \
         const int64_t count = out->count + 1;                                                                          \
         if (stride == (int64_t)sizeof(number)) {                                                                       \
-            UNITE_ROWS(number, &of, rows, (int64_t)sizeof(number), count)                                              \
+            ROW_RANGES(number, &of, rows, (int64_t)sizeof(number), count)                                              \
         } else {                                                                                                       \
-            UNITE_ROWS(number, &of, rows, stride, count)                                                               \
+            ROW_RANGES(number, &of, rows, stride, count)                                                               \
         }                                                                                                              \
         memset(out->is_finite, 0, (size_t)(out->count + 7) & ~(size_t)7);                                              \
         for (int64_t n = 0; n < out->count; n++) {                                                                     \
-            out->low[n] = (float)LESS(of.low[n], of.low[n + 1]);                                                       \
-            out->high[n] = (float)MORE(of.high[n], of.high[n + 1]);                                                    \
-            out->is_finite[n] = of.poison[n] + of.poison[n + 1] == 0;                                                  \
+            out->low[n] = (float)SMALLER(of.low[n], of.low[n + 1]);                                                    \
+            out->high[n] = (float)LARGER(of.high[n], of.high[n + 1]);                                                  \
+            out->is_finite[n] = of.nonfinite[n] + of.nonfinite[n + 1] == 0;                                            \
         }                                                                                                              \
     }
 DEFINE_RANGES(float_ranges, float, row_floats)
-DEFINE_RANGES(double_ranges, double, row_places)
+DEFINE_RANGES(double_ranges, double, row_doubles)
 
 enum { EXTENT_LANES = 16 };
 
-/* Computes the range of an array; returns false if a number is not finite. poison is 0 while all numbers are finite,
+/* Computes the range of an array; returns false if a number is not finite. nonfinite is 0 while all numbers are finite,
  * otherwise NaN. */
 #define DEFINE_EXTENT(name, number)                                                                                    \
     static bool name(const char *data, int64_t count, float *low, float *high)                                         \
     {                                                                                                                  \
         const number *v = (const number *)(const void *)data;                                                          \
-        number least[EXTENT_LANES], most[EXTENT_LANES], poison[EXTENT_LANES];                                          \
+        number least[EXTENT_LANES], most[EXTENT_LANES], nonfinite[EXTENT_LANES];                                       \
         for (int k = 0; k < EXTENT_LANES; k++) {                                                                       \
             least[k] = most[k] = v[0];                                                                                 \
-            poison[k] = v[0] - v[0];                                                                                   \
+            nonfinite[k] = v[0] - v[0];                                                                                \
         }                                                                                                              \
         int64_t n = 0;                                                                                                 \
         for (; n + EXTENT_LANES <= count; n += EXTENT_LANES)                                                           \
             for (int k = 0; k < EXTENT_LANES; k++) {                                                                   \
-                least[k] = LESS(v[n + k], least[k]);                                                                   \
-                most[k] = MORE(v[n + k], most[k]);                                                                     \
-                poison[k] += v[n + k] - v[n + k];                                                                      \
+                least[k] = SMALLER(v[n + k], least[k]);                                                                \
+                most[k] = LARGER(v[n + k], most[k]);                                                                   \
+                nonfinite[k] += v[n + k] - v[n + k];                                                                   \
             }                                                                                                          \
         for (; n < count; n++) {                                                                                       \
-            least[0] = LESS(v[n], least[0]);                                                                           \
-            most[0] = MORE(v[n], most[0]);                                                                             \
-            poison[0] += v[n] - v[n];                                                                                  \
+            least[0] = SMALLER(v[n], least[0]);                                                                        \
+            most[0] = LARGER(v[n], most[0]);                                                                           \
+            nonfinite[0] += v[n] - v[n];                                                                               \
         }                                                                                                              \
         for (int k = 1; k < EXTENT_LANES; k++) {                                                                       \
-            least[0] = LESS(least[k], least[0]);                                                                       \
-            most[0] = MORE(most[k], most[0]);                                                                          \
-            poison[0] += poison[k];                                                                                    \
+            least[0] = SMALLER(least[k], least[0]);                                                                    \
+            most[0] = LARGER(most[k], most[0]);                                                                        \
+            nonfinite[0] += nonfinite[k];                                                                              \
         }                                                                                                              \
         *low = (float)least[0];                                                                                        \
         *high = (float)most[0];                                                                                        \
-        return poison[0] == 0;                                                                                         \
+        return nonfinite[0] == 0;                                                                                      \
     }
 DEFINE_EXTENT(float_extent, float)
 DEFINE_EXTENT(double_extent, double)

@@ -10,14 +10,14 @@ enum { ROWS_CELLS = 64 };
 /* The ranges of neighbouring cells of one row. */
 typedef struct rows_ranges {
     int64_t first, count;
-    float low[ROWS_CELLS], high[ROWS_CELLS]; /* rounded to float as a cast does */
+    float low[ROWS_CELLS], high[ROWS_CELLS]; /* range of each cell's values, rounded to float as a cast does */
     unsigned char is_finite[ROWS_CELLS];     /* 1 if all values of the cell are finite; 0 behind count, up to the next
                                                 multiple of 8 */
 } rows_ranges;
 
 /* Checks whether rows_read() can read the grid and field: consecutive cells lie along an axis of a lattice, and the
  * values at vertices are floats or doubles. */
-bool rows_fit(const grid *g, const grid_field *field);
+bool rows_can_read(const grid *g, const grid_field *field);
 
 /* Computes the ranges of the next drawn cells of one row, whose numbers are at least `from` and less than `end`.
  * Padding and ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */

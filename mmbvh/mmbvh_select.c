@@ -25,46 +25,46 @@ struct selector {
     selector_run run;
     const grid *g;
     const mmbvh_wish *wish;
-    grid_array values; /* values of the field's component */
+    grid_array values; /* array of the field's component */
     uint64_t *bits;
 };
 
 /* The result for one cell: whether its values are finite, and whether their range intersects an interval. */
-typedef struct finding {
-    bool is_finite, meets;
-} finding;
+typedef struct match_result {
+    bool is_finite, intersects;
+} match_result;
 
-MMBVH_INLINE finding find_range(const selector *s, const fetch_range e)
+MMBVH_INLINE match_result match_range(const selector *s, const fetch_range e)
 {
     const float low = (float)e.low, high = (float)e.high;
-    finding out = {e.is_finite, false};
+    match_result out = {e.is_finite, false};
     for (int i = 0; i < s->wish->interval_count; i++)
-        out.meets |= (low <= s->wish->intervals[i].high) & (high >= s->wish->intervals[i].low);
+        out.intersects |= (low <= s->wish->intervals[i].high) & (high >= s->wish->intervals[i].low);
     return out;
 }
 
 /* A range intersects an interval if one value is not above the interval and one is not below it. */
-MMBVH_INLINE finding find_floats(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
-                                 const bool is_packed)
+MMBVH_INLINE match_result match_floats(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
+                                       const bool is_packed)
 {
     vec4 v[2];
-    finding out = {fetch_cell_floats(s->g, &s->values, cell, shape, wide_index, is_packed, v), false};
+    match_result out = {fetch_cell_floats(s->g, &s->values, cell, shape, wide_index, is_packed, v), false};
     const vec4 low = vec4_min(v[0], v[1]), high = vec4_max(v[0], v[1]);
     for (int i = 0; i < s->wish->interval_count; i++) {
         const mmbvh_interval *interval = &s->wish->intervals[i];
         const bool reaches = vec4_any((ivec4)(low <= vec4_set1(interval->high)));
         const bool rises = vec4_any((ivec4)(high >= vec4_set1(interval->low)));
-        out.meets |= reaches & rises;
+        out.intersects |= reaches & rises;
     }
     return out;
 }
 
-MMBVH_INLINE finding find_doubles(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
-                                  const bool is_packed)
+MMBVH_INLINE match_result match_doubles(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
+                                        const bool is_packed)
 {
     fetch_doubles v;
     const bool is_finite = fetch_cell_doubles(s->g, &s->values, cell, shape, wide_index, is_packed, &v);
-    return find_range(s, fetch_doubles_range(&v, is_finite));
+    return match_range(s, fetch_doubles_range(&v, is_finite));
 }
 
 /* Returns the lanes' sign bits; bit i is that of lane i. */
@@ -78,76 +78,78 @@ static inline int sign_bits(ivec4 a)
 }
 
 /* Parameters of a pass that are compile-time constants in each instance. */
-typedef struct reading {
+typedef struct pass_constants {
     fetch_shape shape;
     bool wide_index, wide_number, is_packed;
-} reading;
+} pass_constants;
 
 /* Returns the address of the value at vertex number `at` of a cell. */
-MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const reading how, const int64_t stride)
+MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const pass_constants pass,
+                                   const int64_t stride)
 {
     const grid_array *connectivity = &s->g->connectivity;
     const uintptr_t data = (uintptr_t)s->values.data - (uintptr_t)(connectivity->base * stride);
     const char *entry =
-        connectivity->data + (cell * fetch_vertex_count(s->g, cell, how.shape) + at) * connectivity->stride;
+        connectivity->data + (cell * fetch_vertex_count(s->g, cell, pass.shape) + at) * connectivity->stride;
     const int64_t index =
-        how.wide_index ? *(const int64_t *)(const void *)entry : *(const int32_t *)(const void *)entry;
+        pass.wide_index ? *(const int64_t *)(const void *)entry : *(const int32_t *)(const void *)entry;
     return data + (uintptr_t)(index * stride);
 }
 
-/* The value ranges of four cells, one per lane. poison is 0 if all values of the cell are finite. */
+/* The value ranges of four cells, one per lane. nonfinite is 0 if all values of the cell are finite. */
 typedef struct four_ranges {
-    vec4 low, high, poison;
+    vec4 low, high, nonfinite;
 } four_ranges;
 
-MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const reading how)
+MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const pass_constants pass)
 {
-    const int64_t stride = how.is_packed ? (int64_t)sizeof(float) : s->values.stride;
+    const int64_t stride = pass.is_packed ? (int64_t)sizeof(float) : s->values.stride;
     four_ranges r = {vec4_set1(INFINITY), vec4_set1(-INFINITY), {0}};
-    for (int at = 0; at < fetch_vertex_count(s->g, cell, how.shape); at++) {
+    for (int at = 0; at < fetch_vertex_count(s->g, cell, pass.shape); at++) {
         float v[4];
-        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_place(s, cell + i, at, how, stride);
+        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_place(s, cell + i, at, pass, stride);
         const vec4 values = {v[0], v[1], v[2], v[3]};
         r.low = vec4_min(values, r.low);
         r.high = vec4_max(values, r.high);
-        r.poison += values - values; /* 0 while all values are finite, otherwise NaN */
+        r.nonfinite += values - values; /* 0 while all values are finite, otherwise NaN */
     }
     return r;
 }
 
 /* Reads the ranges of four cells whose values are doubles, and rounds them to float. */
-MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, const reading how)
+MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, const pass_constants pass)
 {
-    const int64_t stride = how.is_packed ? (int64_t)sizeof(double) : s->values.stride;
-    vec2 low[2], high[2], poison[2] = {{0}};
+    const int64_t stride = pass.is_packed ? (int64_t)sizeof(double) : s->values.stride;
+    vec2 low[2], high[2], nonfinite[2] = {{0}};
     for (int pair = 0; pair < 2; pair++) {
         low[pair] = vec2_set1((double)INFINITY);
         high[pair] = -low[pair];
-        for (int at = 0; at < fetch_vertex_count(s->g, cell, how.shape); at++) {
+        for (int at = 0; at < fetch_vertex_count(s->g, cell, pass.shape); at++) {
             const int64_t first = cell + 2 * pair;
-            const vec2 values = {*(const double *)value_place(s, first, at, how, stride),
-                                 *(const double *)value_place(s, first + 1, at, how, stride)};
+            const vec2 values = {*(const double *)value_place(s, first, at, pass, stride),
+                                 *(const double *)value_place(s, first + 1, at, pass, stride)};
             low[pair] = vec2_min(values, low[pair]);
             high[pair] = vec2_max(values, high[pair]);
-            poison[pair] += values - values;
+            nonfinite[pair] += values - values;
         }
     }
-    return (four_ranges){{(float)low[0][0], (float)low[0][1], (float)low[1][0], (float)low[1][1]},
-                         {(float)high[0][0], (float)high[0][1], (float)high[1][0], (float)high[1][1]},
-                         {(float)poison[0][0], (float)poison[0][1], (float)poison[1][0], (float)poison[1][1]}};
+    return (four_ranges){
+        {(float)low[0][0], (float)low[0][1], (float)low[1][0], (float)low[1][1]},
+        {(float)high[0][0], (float)high[0][1], (float)high[1][0], (float)high[1][1]},
+        {(float)nonfinite[0][0], (float)nonfinite[0][1], (float)nonfinite[1][0], (float)nonfinite[1][1]}};
 }
 
-/* Sets a bit in *unusable for each cell whose values are not finite, and in *meeting for each other cell whose range
- * intersects an interval. */
-MMBVH_INLINE void find_four(const selector *s, const four_ranges *r, uint64_t *unusable, uint64_t *meeting)
+/* Sets a bit in *unusable for each cell whose values are not finite, and in *intersecting for each other cell whose
+ * range intersects an interval. */
+MMBVH_INLINE void match_four(const selector *s, const four_ranges *r, uint64_t *unusable, uint64_t *intersecting)
 {
-    ivec4 meets = {0};
+    ivec4 intersects = {0};
     for (int i = 0; i < s->wish->interval_count; i++)
-        meets |= (ivec4)(r->low <= vec4_set1(s->wish->intervals[i].high)) &
-                 (ivec4)(r->high >= vec4_set1(s->wish->intervals[i].low));
-    const int poisoned = sign_bits((ivec4)(r->poison != vec4_set1(0)));
-    *unusable = (uint64_t)poisoned;
-    *meeting = (uint64_t)(sign_bits(meets) & ~poisoned);
+        intersects |= (ivec4)(r->low <= vec4_set1(s->wish->intervals[i].high)) &
+                      (ivec4)(r->high >= vec4_set1(s->wish->intervals[i].low));
+    const int not_finite = sign_bits((ivec4)(r->nonfinite != vec4_set1(0)));
+    *unusable = (uint64_t)not_finite;
+    *intersecting = (uint64_t)(sign_bits(intersects) & ~not_finite);
 }
 
 /* Returns a bit mask of the cells in [first, first + count) that are drawn. */
@@ -159,10 +161,10 @@ static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
     return bits;
 }
 
-typedef finding (*const finder)(const selector *s, int64_t cell, const bool is_packed);
+typedef match_result (*const matcher)(const selector *s, int64_t cell, const bool is_packed);
 
 /* Sets the bits of cells of any type. Cells that are not drawn are skipped. */
-MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder find, const bool is_packed)
+MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, matcher match, const bool is_packed)
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -170,9 +172,9 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
         uint64_t word = s->bits[first / WORD_CELLS];
         for (int64_t i = 0; i < count; i++) {
             if (!grid_is_drawn(s->g, first + i)) continue;
-            const finding cell = find(s, first + i, is_packed);
+            const match_result cell = match(s, first + i, is_packed);
             unusable += !cell.is_finite;
-            word |= (uint64_t)(cell.is_finite & cell.meets) << i;
+            word |= (uint64_t)(cell.is_finite & cell.intersects) << i;
         }
         s->bits[first / WORD_CELLS] = word;
     }
@@ -180,61 +182,62 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
 }
 
 /* Same as mark(), four cells at a time, for cells that all have the same type. */
-MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, finder find, const reading how)
+MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, matcher match, const pass_constants pass)
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
         const int64_t count = end - first < WORD_CELLS ? end - first : WORD_CELLS;
         const uint64_t drawn = drawn_bits(s->g, first, count);
-        uint64_t poisoned = 0, meeting = 0, p, m;
+        uint64_t not_finite = 0, intersecting = 0, p, m;
         int64_t i = 0;
         for (; i + 4 <= count && drawn; i += 4) {
             for (int ahead = 0; ahead < 4; ahead += s->g->connectivity.is_wide ? 1 : 2)
-                fetch_ahead(s->g, first + i + ahead, how.shape);
+                prefetch_later_cell(s->g, first + i + ahead, pass.shape);
             const four_ranges r =
-                how.wide_number ? read_four_doubles(s, first + i, how) : read_four_floats(s, first + i, how);
-            find_four(s, &r, &p, &m);
-            poisoned |= p << i;
-            meeting |= m << i;
+                pass.wide_number ? read_four_doubles(s, first + i, pass) : read_four_floats(s, first + i, pass);
+            match_four(s, &r, &p, &m);
+            not_finite |= p << i;
+            intersecting |= m << i;
         }
         for (; i < count && drawn; i++) {
-            const finding cell = find(s, first + i, how.is_packed);
-            poisoned |= (uint64_t)!cell.is_finite << i;
-            meeting |= (uint64_t)(cell.is_finite & cell.meets) << i;
+            const match_result cell = match(s, first + i, pass.is_packed);
+            not_finite |= (uint64_t)!cell.is_finite << i;
+            intersecting |= (uint64_t)(cell.is_finite & cell.intersects) << i;
         }
-        unusable += __builtin_popcountll(poisoned & drawn);
-        s->bits[first / WORD_CELLS] |= meeting & drawn;
+        unusable += __builtin_popcountll(not_finite & drawn);
+        s->bits[first / WORD_CELLS] |= intersecting & drawn;
     }
     return unusable;
 }
 
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
-    MMBVH_INLINE finding name##_find(const selector *s, int64_t cell, const bool is_packed)                            \
+    MMBVH_INLINE match_result name##_find(const selector *s, int64_t cell, const bool is_packed)                       \
     {                                                                                                                  \
-        fetch_ahead(s->g, cell, shape);                                                                                \
-        return wide_number ? find_doubles(s, cell, shape, wide_index, is_packed)                                       \
-                           : find_floats(s, cell, shape, wide_index, is_packed);                                       \
+        prefetch_later_cell(s->g, cell, shape);                                                                        \
+        return wide_number ? match_doubles(s, cell, shape, wide_index, is_packed)                                      \
+                           : match_floats(s, cell, shape, wide_index, is_packed);                                      \
     }                                                                                                                  \
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
         if (shape < FETCH_BY_CELL)                                                                                     \
-            return fetch_is_packed(&s->values)                                                                         \
-                       ? mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, true})       \
-                       : mark_fours(s, begin, end, name##_find, (reading){shape, wide_index, wide_number, false});     \
+            return fetch_is_packed(&s->values) ? mark_fours(s, begin, end, name##_find,                                \
+                                                            (pass_constants){shape, wide_index, wide_number, true})    \
+                                               : mark_fours(s, begin, end, name##_find,                                \
+                                                            (pass_constants){shape, wide_index, wide_number, false});  \
         return fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find, true)                                    \
                                            : mark(s, begin, end, name##_find, false);                                  \
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
-MMBVH_INLINE finding find_any(const selector *s, int64_t cell, const bool is_packed)
+MMBVH_INLINE match_result match_any(const selector *s, int64_t cell, const bool is_packed)
 {
     (void)is_packed;
-    return find_range(s, fetch_any_cell_range(s->g, s->wish->field, cell));
+    return match_range(s, fetch_any_cell_range(s->g, s->wish->field, cell));
 }
 
 static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
 {
-    return mark(s, begin, end, find_any, false);
+    return mark(s, begin, end, match_any, false);
 }
 
 /* Packs bytes with values 0 or 1 into bits. The bytes up to the next multiple of 8 must be readable and 0 or 1. The
@@ -252,13 +255,13 @@ static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
 /* Returns a bit mask of the row's cells whose range intersects an interval. */
 static uint64_t row_bits(const selector *s, const rows_ranges *r)
 {
-    unsigned char meets[ROWS_CELLS] = {0};
+    unsigned char intersects[ROWS_CELLS] = {0};
     for (int i = 0; i < s->wish->interval_count; i++) {
         const mmbvh_interval of = s->wish->intervals[i];
         for (int64_t n = 0; n < r->count; n++)
-            meets[n] = (unsigned char)(meets[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
+            intersects[n] = (unsigned char)(intersects[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
     }
-    return packed_bits(meets, r->count);
+    return packed_bits(intersects, r->count);
 }
 
 /* Sets the bits of a lattice's cells, row by row. Both words that a row's bits may fall into belong to the block of the
@@ -269,18 +272,18 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
     rows_ranges r;
     int64_t unusable = 0;
     for (int64_t from = begin; rows_read(g, s->wish->field, from, end, &r); from = r.first + r.count) {
-        uint64_t meeting = row_bits(s, &r), finite = packed_bits(r.is_finite, r.count), drawn = 0;
+        uint64_t intersecting = row_bits(s, &r), finite = packed_bits(r.is_finite, r.count), drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
             drawn |= (uint64_t) !((g->ghosts && grid_is_flagged(g, cell)) || grid_is_flat(g, cell)) << n;
         }
         if (!g->ghosts && !g->flat) drawn = r.count < WORD_CELLS ? (UINT64_C(1) << r.count) - 1 : ~UINT64_C(0);
         unusable += __builtin_popcountll(drawn & ~finite);
-        meeting &= drawn & finite;
+        intersecting &= drawn & finite;
         const int64_t shift = r.first % WORD_CELLS;
-        s->bits[r.first / WORD_CELLS] |= meeting << shift;
-        if (shift && meeting >> (WORD_CELLS - shift))
-            s->bits[r.first / WORD_CELLS + 1] |= meeting >> (WORD_CELLS - shift);
+        s->bits[r.first / WORD_CELLS] |= intersecting << shift;
+        if (shift && intersecting >> (WORD_CELLS - shift))
+            s->bits[r.first / WORD_CELLS + 1] |= intersecting >> (WORD_CELLS - shift);
     }
     return unusable;
 }
@@ -293,7 +296,7 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
     if (is_float && !field->own && !grid_has_faces(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
-    if (rows_fit(g, field)) s.run = mark_rows;
+    if (rows_can_read(g, field)) s.run = mark_rows;
     if (field->component > 0) s.values.data += field->component * field->component_stride;
     return s;
 }
@@ -303,17 +306,17 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
 enum { MOST_READ_TWICE = 1 << 16 };
 
 /* Checks whether the range of all values shows that a small lattice has no visible cell and no non-finite value. */
-static bool shows_nothing(const selector *s)
+static bool has_no_visible_cell(const selector *s)
 {
     float low, high;
     if (s->run != mark_rows || s->g->cell_count > MOST_READ_TWICE || !rows_extent(s->g, s->wish->field, &low, &high))
         return false;
-    return !find_range(s, (fetch_range){.low = (double)low, .high = (double)high, .is_finite = true}).meets;
+    return !match_range(s, (fetch_range){.low = (double)low, .high = (double)high, .is_finite = true}).intersects;
 }
 
-static int64_t mark_wish(const selector *s, int threads)
+static int64_t mark_query(const selector *s, int threads)
 {
-    if (shows_nothing(s)) return 0;
+    if (has_no_visible_cell(s)) return 0;
     const int64_t block = (int64_t)WORD_CELLS * BLOCK_WORDS, cells = s->g->cell_count;
     int64_t unusable = 0;
 #pragma omp parallel num_threads(threads)
@@ -382,7 +385,7 @@ insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_cou
     bool is_listed = bits != NULL;
     for (int i = 0; i < wish_count && is_listed; i++) {
         const selector s = make_selector(g, &wishes[i], bits);
-        unusable[i] = mark_wish(&s, threads);
+        unusable[i] = mark_query(&s, threads);
     }
     is_listed = is_listed && list_cells(bits, words, threads, out);
     base_free(bits);

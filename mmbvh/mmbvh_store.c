@@ -3,7 +3,7 @@
 #include <math.h>
 
 /* Returns the smallest power of two that is not below x, or 0 for 0. */
-static double power_above(double x)
+static double ceil_power_of_two(double x)
 {
     int exponent;
     const double fraction = frexp(x, &exponent);
@@ -19,7 +19,7 @@ mmbvh_grid store_grid(const float lower[3], const float upper[3])
     for (int axis = 0; axis < 3; axis++) {
         const double low = (double)lower[axis], high = (double)upper[axis];
         const double far = fmax(fabs(low), fabs(high));
-        const double step = fmax(power_above(fmax((high - low) / STEPS, far * 0x1p-23)), 0x1p-100);
+        const double step = fmax(ceil_power_of_two(fmax((high - low) / STEPS, far * 0x1p-23)), 0x1p-100);
         grid.step[axis] = (float)step;
         grid.origin[axis] = (float)(floor(low / step) * step);
         if (grid.origin[axis] > lower[axis]) grid.origin[axis] = nextafterf(grid.origin[axis], -INFINITY);

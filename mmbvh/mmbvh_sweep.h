@@ -14,8 +14,8 @@ typedef struct sweep sweep;
 typedef struct bounds_source bounds_source;
 
 typedef struct sweep_sum {
-    int64_t count; /* number of unusable cells, or of boxes that the nodes cannot represent */
-    double grown;  /* change of the tree's area (mmbvh.area), if the sweep measures it */
+    int64_t count;      /* number of unusable cells, or of boxes that the nodes cannot represent */
+    double area_change; /* change of the tree's area (mmbvh.area), if the sweep measures it */
 } sweep_sum;
 
 /* Processes nodes end - 1 down to first: the root, a pair, or a pair and its descendants. The range may be empty. */
@@ -26,16 +26,16 @@ struct sweep {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    grid_array values;           /* values of the field's component */
-    const float *box_ranges;     /* ranges of the boxes of a parent tree, low and high for each */
-    const bounds_source *source; /* source of the cells' boxes, for a sweep of bounds */
-    mmbvh_ranges ranges;         /* receives the result of a sweep of ranges */
+    grid_array values;           /* array of the field's component */
+    const float *box_ranges;     /* ranges of the boxes of a parent tree: low and high for each box */
+    const bounds_source *source; /* reads the cells' boxes in a sweep of bounds */
+    mmbvh_ranges ranges;         /* receives the results of a sweep of ranges */
     int64_t run_max;             /* maximum number of nodes per run; 0: no limit other than the size of a task */
-    bool is_measured;  /* for a sweep of bounds of nodes that have bounds already: the change of area is measured */
-    int visible_count; /* 0: all nodes are swept; otherwise only the visible nodes and their children */
+    bool measures_area; /* for a sweep of bounds of nodes that have bounds already: the change of area is measured */
+    int visible_count;  /* 0: all nodes are swept; otherwise only the visible nodes and their children */
     const mmbvh_visible *visible;
-    const sweep *then; /* another sweep of the same tree, which is applied to each run after this sweep while the run is
-                          in the cache; may be NULL */
+    const sweep *follower; /* another sweep of the same tree, which is applied to each run after this sweep while the
+                          run is in the cache; may be NULL */
 };
 
 /* Sweeps the whole tree. Returns the sum of the runs' results (those of the last sweep, if one follows another); its
@@ -70,11 +70,11 @@ int sweep_threads(const mmbvh_options *options);
 
 static inline sweep_sum sweep_add(sweep_sum a, sweep_sum b)
 {
-    return (sweep_sum){a.count + b.count, a.grown + b.grown};
+    return (sweep_sum){a.count + b.count, a.area_change + b.area_change};
 }
 
 /* Checks whether the sweep visits the node's descendants. */
-bool sweep_shows(const sweep *s, int64_t node);
+bool sweep_visits(const sweep *s, int64_t node);
 
 /* ---- ranges of nodes --------------------------------------------------------------------------------------------- */
 
@@ -99,14 +99,14 @@ static inline void set_range(const sweep *s, int64_t node, range r)
     *(float *)(void *)(uintptr_t)(s->ranges.high + node * s->ranges.stride) = r.high;
 }
 
-static inline range united(range a, range b)
+static inline range range_union(range a, range b)
 {
     return (range){a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
 }
 
 static inline range children_range(const sweep *s, int64_t left)
 {
-    return united(get_range(s, left), get_range(s, left + 1));
+    return range_union(get_range(s, left), get_range(s, left + 1));
 }
 
 #endif

@@ -40,13 +40,13 @@ static inline vec4 vec4_max(vec4 a, vec4 b)
 #endif
 }
 
-static inline float vec4_least(vec4 a)
+static inline float vec4_min_lane(vec4 a)
 {
     const vec4 two = vec4_min(a, (vec4){a[2], a[3], a[2], a[3]});
     return two[0] < two[1] ? two[0] : two[1];
 }
 
-static inline float vec4_most(vec4 a)
+static inline float vec4_max_lane(vec4 a)
 {
     const vec4 two = vec4_max(a, (vec4){a[2], a[3], a[2], a[3]});
     return two[0] > two[1] ? two[0] : two[1];
@@ -114,7 +114,8 @@ static inline float round_down(double x)
     float f = (float)x;
     uint32_t bits;
     memcpy(&bits, &f, sizeof bits);
-    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX; /* a step towards -inf: the bits of negative floats grow */
+    const uint32_t step =
+        bits >> 31 ? 1u : UINT32_MAX;  /* moves the result one float towards -inf: the bits of negative floats grow */
     bits += (double)f > x ? step : 0u; /* f is never +0 if it exceeds x: a tiny negative x rounds to -0 */
     memcpy(&f, &bits, sizeof f);
     return f + 0.0f;
@@ -126,7 +127,7 @@ static inline float round_up(double x)
 }
 
 /* Returns round_down() of (a - origin) * scale, which is computed in double. */
-static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
+static inline vec4 vec4_transform_down(vec4 a, const double origin[4], double scale)
 {
 #if defined(__SSE2__)
     const __m128 both = (__m128)a;

@@ -265,9 +265,10 @@ static void check_grid(uint32_t width, uint32_t height, int ranks)
     const comp_grid grid = comp_grid_of(width, height, ranks);
     const uint32_t every = grid.strips / 5000000 + 1; /* of more strips a part */
     uint64_t area = 0;
-    assert_true(grid.blocks >= 1 && grid.blocks <= comp_most_blocks(ranks));
+    assert_true(grid.blocks >= 1 && grid.blocks <= comp_max_blocks(ranks));
     assert_true(ranks == 1 ||
-                grid.blocks >= COMP_RANK_BLOCKS * (uint32_t)(ranks < COMP_EVEN_RANKS ? ranks : COMP_EVEN_RANKS) ||
+                grid.blocks >= COMP_BLOCKS_PER_RANK *
+                                   (uint32_t)(ranks < COMP_COUNTED_RANKS_MAX ? ranks : COMP_COUNTED_RANKS_MAX) ||
                 (grid.row_shift == 0 && grid.blocks == grid.strips));
     for (uint64_t s64 = 0; s64 < grid.strips; s64 += every) {
         const uint32_t s = (uint32_t)s64;
@@ -367,7 +368,7 @@ typedef span span_function(double y);
 
 enum { MOST_RANKS = 1000 };
 
-static comp_claim claims[2 * COMP_RANK_BLOCKS * MOST_RANKS];
+static comp_claim claims[2 * COMP_BLOCKS_PER_RANK * MOST_RANKS];
 
 static void cover(const comp_grid *grid, uint32_t y, double from, double to)
 {
@@ -414,7 +415,7 @@ static double check_levels(uint32_t blocks, int ranks)
         all += claims[b].fragments;
         fullest = claims[b].fragments > fullest ? claims[b].fragments : fullest;
     }
-    comp_claims_level(claims, blocks, loads, ranks);
+    comp_claims_balance(claims, blocks, loads, ranks);
     for (uint32_t b = 0; b < blocks; b++)
         if (claims[b].vote) owned[comp_vote_rank(claims[b].vote)] += claims[b].fragments;
     for (int r = 0; r < ranks; r++) {
@@ -556,7 +557,7 @@ static void unfair_lots_are_levelled(void **context)
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++)
         for (int winners = 0; winners < 6; winners++)
             for (int fragments = 0; fragments < 6; fragments++)
-                for (uint32_t blocks = 1; blocks <= COMP_RANK_BLOCKS * MOST_RANKS; blocks *= 11) {
+                for (uint32_t blocks = 1; blocks <= COMP_BLOCKS_PER_RANK * MOST_RANKS; blocks *= 11) {
                     for (uint32_t b = 0; b < blocks; b++) {
                         claims[b].fragments = unfair_fragments(fragments, b, blocks);
                         claims[b].vote = comp_vote(b, unfair_winner(winners, b, blocks, ranks[n]), claims[b].fragments);

@@ -89,7 +89,7 @@ typedef struct sheet_pair {
 static sheet_pair make_pair(void)
 {
     const sheet_pair p = {base_calloc(1, sizeof *p.sheet), base_calloc(1, sizeof *p.back),
-                          base_alloc(comp_sheet_bound(COMP_STRIP_PIXELS, COMP_WORDS))};
+                          base_alloc(comp_sheet_max_bytes(COMP_STRIP_PIXELS, COMP_WORDS))};
     assert_true(p.sheet && p.back && p.bytes);
     return p;
 }
@@ -116,12 +116,12 @@ static void sheets_come_back(void **context)
             comp_sheet_head head;
             const unsigned char *const end = comp_sheet_write_by(isa, p.sheet, words, p.bytes);
             assert_true((size_t)(end - p.bytes) == length &&
-                        length + COMP_SHEET_SLACK <= comp_sheet_bound(count, words));
+                        length + COMP_SHEET_SLACK <= comp_sheet_max_bytes(count, words));
             assert_memory_equal(p.bytes, plain, length);
             assert_ptr_equal(comp_sheet_read_by(isa, p.bytes, words, p.back), end);
             assert_int_equal(count_differences(p.sheet, p.back, words), 0);
             assert_true(p.back->strip == p.sheet->strip && p.back->is_opaque == p.sheet->is_opaque);
-            assert_ptr_equal(comp_sheet_look(p.bytes, &head), end);
+            assert_ptr_equal(comp_sheet_read_head(p.bytes, &head), end);
             assert_true(head.count == count && !memcmp(p.back->masks, p.sheet->masks, sizeof p.back->masks));
         }
     }
@@ -329,11 +329,11 @@ static void the_cheapest_route_is_chosen(void **context)
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         const int ranks = counts[i], node = ranks % 8 == 0 && ranks > 8 ? 8 : 1;
         const comp_load load = {(int64_t)(4e6 / pow(ranks, 2.0 / 3)), 11, 256};
-        const comp_route best = comp_cheapest_route(ranks, (comp_nodes){node, false}, &load, &comp_usual_machine);
-        const comp_cost cost = comp_cost_of(&best, &load, &comp_usual_machine);
+        const comp_route best = comp_cheapest_route(ranks, (comp_nodes){node, false}, &load, &comp_default_machine);
+        const comp_cost cost = comp_cost_of(&best, &load, &comp_default_machine);
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
             const comp_route other = comp_route_of(s, ranks, (comp_nodes){node, false}, 8);
-            assert_true(cost.seconds <= comp_cost_of(&other, &load, &comp_usual_machine).seconds);
+            assert_true(cost.seconds <= comp_cost_of(&other, &load, &comp_default_machine).seconds);
         }
         if (ranks <= 8) assert_int_equal(best.schedule, COMP_DIRECT);
         assert_true(cost.messages < 300);

@@ -18,7 +18,7 @@ const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
 
 /* Plans a compacted sheet: count values stored one after the other in rows of 16. Sheets with many gaps are compacted
  * before packing, because a vector with few values takes as long as a full one. */
-static void plan_closed(int count, sheet_plan *plan)
+static void plan_compact(int count, sheet_plan *plan)
 {
     plan->rows = (count + COMP_LANES - 1) / COMP_LANES;
     plan->count = count;
@@ -31,7 +31,7 @@ static void plan_closed(int count, sheet_plan *plan)
     }
 }
 
-size_t comp_sheet_bound(int pixels, int words)
+size_t comp_sheet_max_bytes(int pixels, int words)
 {
     return COMP_SHEET_HEAD + COMP_ROWS * sizeof(uint16_t) +
            (size_t)words * (sizeof(uint32_t) * (size_t)(pixels + 1) + COMP_ROWS / 2) + COMP_SHEET_SLACK;
@@ -64,11 +64,11 @@ unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int wor
     }
     head.count = (uint16_t)plan.count;
     if (plan.is_sparse) {
-        comp_sheet closed;
-        sheet_plan closed_plan;
-        loops->close(sheet, &plan, words, &closed);
-        plan_closed(plan.count, &closed_plan);
-        at = loops->write(&closed, &closed_plan, words, &head.kinds, at);
+        comp_sheet compact;
+        sheet_plan compact_plan;
+        loops->compress(sheet, &plan, words, &compact);
+        plan_compact(plan.count, &compact_plan);
+        at = loops->write(&compact, &compact_plan, words, &head.kinds, at);
     } else if (plan.count) {
         at = loops->write(sheet, &plan, words, &head.kinds, at);
     }
@@ -91,7 +91,7 @@ static const unsigned char *read_masks(const unsigned char *in, const comp_sheet
     return in;
 }
 
-const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head)
+const unsigned char *comp_sheet_read_head(const unsigned char *in, comp_sheet_head *head)
 {
     memcpy(head, in, sizeof *head);
     return in + head->bytes;
@@ -102,16 +102,16 @@ const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, in
     const comp_sheet_loops *const loops = comp_sheet_loops_of(isa);
     comp_sheet_head head;
     sheet_plan plan;
-    const unsigned char *const end = comp_sheet_look(in, &head), *const at = read_masks(in, &head, sheet->masks);
+    const unsigned char *const end = comp_sheet_read_head(in, &head), *const at = read_masks(in, &head, sheet->masks);
     sheet->strip = head.strip;
     sheet->is_opaque = head.kinds >> OPAQUE_BIT;
     loops->plan(sheet->masks, &plan);
     if (plan.is_sparse) {
-        comp_sheet closed;
-        sheet_plan closed_plan;
-        plan_closed(plan.count, &closed_plan);
-        loops->read(at, &closed_plan, head.kinds, words, &closed);
-        loops->open(&closed, &plan, words, sheet);
+        comp_sheet compact;
+        sheet_plan compact_plan;
+        plan_compact(plan.count, &compact_plan);
+        loops->read(at, &compact_plan, head.kinds, words, &compact);
+        loops->expand(&compact, &plan, words, sheet);
     } else if (plan.count) {
         loops->read(at, &plan, head.kinds, words, sheet);
     }

@@ -29,7 +29,7 @@ enum { COMP_WORDS = 7, COMP_PIXEL_WORDS = 5, COMP_SHEET_HEAD = 20, COMP_SHEET_SL
  * are its depth and RGBA. */
 typedef struct comp_sheet {
     uint32_t words[COMP_WORDS][COMP_STRIP_PIXELS]; /* indexed by comp_grid_at(); words of absent pixels are undefined */
-    uint16_t masks[COMP_ROWS];                     /* one bit per pixel: the pixel is present */
+    uint16_t masks[COMP_ROWS];                     /* bit mask per row: the pixels that are present */
     uint32_t strip;
     bool is_opaque; /* all fragments are hits of opaque surfaces, so that only the nearest one is visible when sheets
                        are merged */
@@ -78,14 +78,14 @@ static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint
 /* The header of a packed sheet, as stored in messages. */
 typedef struct comp_sheet_head {
     uint32_t strip;
-    uint16_t bytes, count; /* size of the packed sheet in bytes; number of its pixels */
-    uint32_t rows, full;   /* bit masks of rows: those with any pixel, and those with all 16 */
-    uint32_t kinds;        /* a word_kind per word, in two bits each */
+    uint16_t bytes, count; /* size of the packed sheet in bytes, and number of its pixels */
+    uint32_t rows, full;   /* bit masks of rows: those with any pixel, and those with all 16 pixels */
+    uint32_t kinds;        /* kind of each word (word_kind), in two bits each */
 } comp_sheet_head;
 
 /* Returns an upper bound of the bytes that comp_sheet_write() writes for this number of pixels and words. It includes
  * the slack that may be written behind the end. */
-size_t comp_sheet_bound(int pixels, int words);
+size_t comp_sheet_max_bytes(int pixels, int words);
 
 int comp_sheet_count(const comp_sheet *sheet);
 
@@ -94,7 +94,7 @@ int comp_sheet_count(const comp_sheet *sheet);
 unsigned char *comp_sheet_write(const comp_sheet *sheet, int words, unsigned char *out);
 
 /* Reads only the header; returns the end of the packed sheet. */
-const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head);
+const unsigned char *comp_sheet_read_head(const unsigned char *in, comp_sheet_head *head);
 
 /* Unpacks a sheet that comp_sheet_write() packed. `in` must be followed by COMP_SHEET_SLACK readable bytes. Returns the
  * end of the packed data. */

@@ -24,12 +24,12 @@ ROWS_INLINE lanes nearer_lanes(const comp_sheet *all, const comp_sheet *other, i
     const float_lanes old = (float_lanes)load_lanes(&all->words[WORD_T_IN][at]);
     const float_lanes new = (float_lanes)load_lanes(&other->words[WORD_T_IN][at]);
     const lanes is_in_both = mask_lanes(both), nearer = (lanes)(new < old) & is_in_both;
-    const lanes open = is_in_both & ~nearer & ~(lanes)(old < new);
-    if (!any_bits(open)) return nearer;
+    const lanes undecided = is_in_both & ~nearer & ~(lanes)(old < new);
+    if (!any_bits(undecided)) return nearer;
     uint32_t decided[COMP_LANES];
     store_lanes(decided, nearer);
     for (int l = 0; l < COMP_LANES; l++) {
-        if (!open[l]) continue;
+        if (!undecided[l]) continue;
         const fragment a = comp_sheet_get(other, (uint32_t)(at + l), 0), b = comp_sheet_get(all, (uint32_t)(at + l), 0);
         decided[l] = fragment_compare(&a, &b) < 0 ? 0xffffffffu : 0;
     }
@@ -58,25 +58,25 @@ static void join_sheets(comp_sheet *all, const comp_sheet *other, uint16_t left[
 
 static void finish_pixels(const comp_sheet *fragments, const float background[4], comp_sheet *pixels)
 {
-    const float_lanes none = {0};
+    const float_lanes zero = {0};
     float infinity = INFINITY;
-    uint32_t endless;
-    memcpy(&endless, &infinity, sizeof endless);
+    uint32_t infinity_bits;
+    memcpy(&infinity_bits, &infinity, sizeof infinity_bits);
     memcpy(pixels->masks, fragments->masks, sizeof pixels->masks);
     pixels->strip = fragments->strip;
     pixels->is_opaque = false;
     for (int r = 0; r < COMP_ROWS; r++) {
         if (!fragments->masks[r]) continue;
         const int at = r * COMP_LANES;
-        const float_lanes through = (float_lanes)load_lanes(&fragments->words[WORD_TRANSMITTANCE][at]);
+        const float_lanes transmittance = (float_lanes)load_lanes(&fragments->words[WORD_TRANSMITTANCE][at]);
         for (int c = 0; c < 3; c++) {
             const float_lanes colour = (float_lanes)load_lanes(&fragments->words[WORD_COLOUR + c][at]);
-            store_lanes(&pixels->words[WORD_RGBA + c][at], (lanes)(none + colour + through * background[c]));
+            store_lanes(&pixels->words[WORD_RGBA + c][at], (lanes)(zero + colour + transmittance * background[c]));
         }
-        store_lanes(&pixels->words[WORD_RGBA + 3][at], (lanes)(1 - through + through * background[3]));
+        store_lanes(&pixels->words[WORD_RGBA + 3][at], (lanes)(1 - transmittance + transmittance * background[3]));
         const lanes is_hit = (lanes)(load_lanes(&fragments->words[WORD_KIND][at]) >= FRAGMENT_SURFACE);
         store_lanes(&pixels->words[WORD_DEPTH][at],
-                    select_lanes(is_hit, load_lanes(&fragments->words[WORD_T_IN][at]), (lanes){0} + endless));
+                    select_lanes(is_hit, load_lanes(&fragments->words[WORD_T_IN][at]), (lanes){0} + infinity_bits));
     }
 }
 
@@ -84,7 +84,7 @@ static void finish_pixels(const comp_sheet *fragments, const float background[4]
 
 /* The addresses of a row of the picture. */
 typedef struct picture_row {
-    float *rgba, *depth; /* depth may be NULL */
+    float *rgba, *depth; /* addresses of the row's first pixel; depth may be NULL */
     bool is_aligned;
 } picture_row;
 

@@ -14,13 +14,13 @@ typedef struct sheet_plan {
     uint8_t row[COMP_ROWS],
         number[COMP_ROWS]; /* for each row that contains pixels: its index in the strip, and its number of pixels */
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
-    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose previous value predicts it */
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose last value predicts it */
 } sheet_plan;
 
 typedef struct comp_sheet_loops {
     void (*plan)(const uint16_t masks[COMP_ROWS], sheet_plan *plan);
-    void (*close)(const comp_sheet *sheet, const sheet_plan *plan, int words, comp_sheet *closed);
-    void (*open)(const comp_sheet *closed, const sheet_plan *plan, int words, comp_sheet *sheet);
+    void (*compress)(const comp_sheet *sheet, const sheet_plan *plan, int words, comp_sheet *compact);
+    void (*expand)(const comp_sheet *compact, const sheet_plan *plan, int words, comp_sheet *sheet);
     unsigned char *(*write)(const comp_sheet *sheet, const sheet_plan *plan, int words, uint32_t *kinds,
                             unsigned char *out);
     const unsigned char *(*read)(const unsigned char *in, const sheet_plan *plan, uint32_t kinds, int words,

@@ -7,7 +7,7 @@
 
 /* How a word is stored. The first two predict a word by linear extrapolation from the two rows above, or as equal to
  * the row above. The others store one value for all pixels, or nothing because the word equals the preceding one. */
-enum word_kind { WORD_LINE, WORD_ABOVE, WORD_SAME, WORD_AS_BEFORE };
+enum word_kind { WORD_LINEAR, WORD_CONSTANT, WORD_UNIFORM, WORD_REPEATED };
 
 /* Returns the nearest lane in `known` to the left of `lane`, or the nearest to the right if there is none. */
 static uint8_t nearest_lane(unsigned known, int lane)
@@ -17,7 +17,7 @@ static uint8_t nearest_lane(unsigned known, int lane)
 }
 
 /* Sets plan->fresh to the lanes that have no pixel above them, and plan->source to the lanes that predict these. */
-static void find_fresh(sheet_plan *plan)
+static void find_fresh_lanes(sheet_plan *plan)
 {
     unsigned known = plan->mask[0];
     plan->fresh[0] = 0;
@@ -43,15 +43,15 @@ static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
         plan->rows += masks[r] != 0;
     }
     plan->is_sparse = 2 * plan->count < plan->rows * COMP_LANES;
-    if (plan->rows && !plan->is_sparse) find_fresh(plan);
+    if (plan->rows && !plan->is_sparse) find_fresh_lanes(plan);
 }
 
 /* The state of the prediction: the last value of each lane, and its difference from the one before. */
-typedef struct forecast {
+typedef struct prediction {
     lanes last, slope;
-} forecast;
+} prediction;
 
-ROWS_INLINE void begin_fresh(const sheet_plan *plan, int i, forecast *f)
+ROWS_INLINE void predict_fresh_lanes(const sheet_plan *plan, int i, prediction *f)
 {
     for (unsigned left = plan->fresh[i]; left; left &= left - 1) {
         const int lane = __builtin_ctz(left);
@@ -61,18 +61,18 @@ ROWS_INLINE void begin_fresh(const sheet_plan *plan, int i, forecast *f)
 }
 
 /* Zigzag encoding: maps signed integers near 0 to small unsigned ones. */
-ROWS_INLINE lanes fold(lanes value)
+ROWS_INLINE lanes zigzag_encode(lanes value)
 {
     return value << 1 ^ (lanes)((signed_lanes)value >> 31);
 }
 
-ROWS_INLINE lanes unfold(lanes value)
+ROWS_INLINE lanes zigzag_decode(lanes value)
 {
     return value >> 1 ^ -(value & 1);
 }
 
 /* Updates the prediction with the values of a row. In fresh lanes the slope stays 0. */
-ROWS_INLINE void learn(forecast *f, lanes values, unsigned mask, unsigned fresh)
+ROWS_INLINE void update_prediction(prediction *f, lanes values, unsigned mask, unsigned fresh)
 {
     const lanes step = values - f->last;
     if (mask == 0xffff && !fresh) {
@@ -84,7 +84,7 @@ ROWS_INLINE void learn(forecast *f, lanes values, unsigned mask, unsigned fresh)
     f->last = select_lanes(mask_lanes(mask), values, f->last);
 }
 
-ROWS_INLINE void learn_first(forecast *f, lanes values)
+ROWS_INLINE void start_prediction(prediction *f, lanes values)
 {
     f->last = values;
     f->slope = (lanes){0};
@@ -92,131 +92,131 @@ ROWS_INLINE void learn_first(forecast *f, lanes values)
 
 /* ---- nibbles --------------------------------------------------------------------------------------------------- */
 
-static inline unsigned half_bytes(uint32_t greatest)
+static inline unsigned nibble_count(uint32_t greatest)
 {
     return greatest ? (35 - (unsigned)__builtin_clz(greatest)) / 4 : 0;
 }
 
-/* Returns the number of bytes of `count` residuals with `halves` nibbles each. The nibbles of a residual are stored in
- * planes of two bytes, one byte and half a byte, as in the binary digits of `halves`. In the plane of half bytes, lane
+/* Returns the number of bytes of `count` residuals with `nibbles` nibbles each. The nibbles of a residual are stored in
+ * planes of two bytes, one byte and half a byte, as in the binary digits of `nibbles`. In the plane of half bytes, lane
  * i and lane i + 8 share a byte. */
-static inline size_t packed_bytes(unsigned halves, int count)
+static inline size_t packed_bytes(unsigned nibbles, int count)
 {
     const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
-    if (halves == 8) return 4 * (size_t)count;
-    return (halves & 4) / 2 * (size_t)count + (halves & 2) / 2 * (size_t)count + (halves & 1) * (size_t)pairs;
+    if (nibbles == 8) return 4 * (size_t)count;
+    return (nibbles & 4) / 2 * (size_t)count + (nibbles & 2) / 2 * (size_t)count + (nibbles & 1) * (size_t)pairs;
 }
 
 /* Packs `count` residuals; the lanes behind them must be 0. */
-ROWS_INLINE unsigned char *pack(lanes remains, unsigned halves, int count, unsigned char *out)
+ROWS_INLINE unsigned char *pack(lanes residuals, unsigned nibbles, int count, unsigned char *out)
 {
-    if (halves == 8) {
-        memcpy(out, &remains, sizeof remains);
+    if (nibbles == 8) {
+        memcpy(out, &residuals, sizeof residuals);
         return out + 4 * (size_t)count;
     }
     const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
-    const two_byte_lanes twos = __builtin_convertvector(remains, two_byte_lanes);
-    const lanes behind_twos = remains >> (halves & 4) * 4;
+    const two_byte_lanes twos = __builtin_convertvector(residuals, two_byte_lanes);
+    const lanes behind_twos = residuals >> (nibbles & 4) * 4;
     const byte_lanes ones = __builtin_convertvector(behind_twos, byte_lanes);
-    const byte_lanes half = __builtin_convertvector(behind_twos >> (halves & 2) * 4, byte_lanes);
+    const byte_lanes half = __builtin_convertvector(behind_twos >> (nibbles & 2) * 4, byte_lanes);
     uint64_t low, high;
     memcpy(&low, &half, sizeof low);
     memcpy(&high, (const unsigned char *)&half + sizeof low, sizeof high);
-    low |= high << 4; /* lanes behind count are 0 */
+    low |= high << 4; /* the lanes behind `count` are 0, so nothing is overwritten */
     memcpy(out, &twos, sizeof twos);
-    out += (halves & 4) / 2 * (size_t)count;
+    out += (nibbles & 4) / 2 * (size_t)count;
     memcpy(out, &ones, sizeof ones);
-    out += (halves & 2) / 2 * (size_t)count;
+    out += (nibbles & 2) / 2 * (size_t)count;
     memcpy(out, &low, sizeof low);
-    return out + (halves & 1) * (size_t)pairs;
+    return out + (nibbles & 1) * (size_t)pairs;
 }
 
 /* Unpacks `count` residuals; the lanes behind them are undefined. */
-ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned halves, int count, lanes *remains)
+ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned nibbles, int count, lanes *residuals)
 {
-    if (halves == 8) {
-        memcpy(remains, in, sizeof *remains);
+    if (nibbles == 8) {
+        memcpy(residuals, in, sizeof *residuals);
         return in + 4 * (size_t)count;
     }
     const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
-    const unsigned behind_twos = (halves & 4) * 4, behind_ones = behind_twos + (halves & 2) * 4;
+    const unsigned behind_twos = (nibbles & 4) * 4, behind_ones = behind_twos + (nibbles & 2) * 4;
     two_byte_lanes twos;
     byte_lanes ones, half;
     uint64_t pair[2];
     memcpy(&twos, in, sizeof twos);
-    in += (halves & 4) / 2 * (size_t)count;
+    in += (nibbles & 4) / 2 * (size_t)count;
     memcpy(&ones, in, sizeof ones);
-    in += (halves & 2) / 2 * (size_t)count;
+    in += (nibbles & 2) / 2 * (size_t)count;
     memcpy(&pair[0], in, sizeof pair[0]);
     pair[1] = pair[0] >> 4 & 0x0f0f0f0f0f0f0f0fu;
     pair[0] &= 0x0f0f0f0f0f0f0f0fu;
     memcpy(&half, pair, sizeof half);
-    *remains = (__builtin_convertvector(twos, lanes) & (halves & 4 ? 0xffffu : 0)) |
-               (__builtin_convertvector(ones, lanes) & (halves & 2 ? 0xffu : 0)) << behind_twos |
-               (__builtin_convertvector(half, lanes) & (halves & 1 ? 15u : 0)) << behind_ones;
-    return in + (halves & 1) * (size_t)pairs;
+    *residuals = (__builtin_convertvector(twos, lanes) & (nibbles & 4 ? 0xffffu : 0)) |
+                 (__builtin_convertvector(ones, lanes) & (nibbles & 2 ? 0xffu : 0)) << behind_twos |
+                 (__builtin_convertvector(half, lanes) & (nibbles & 1 ? 15u : 0)) << behind_ones;
+    return in + (nibbles & 1) * (size_t)pairs;
 }
 
 /* Moves the lanes in the mask to the front (compress); the other lanes become 0. */
-ROWS_INLINE lanes close_gaps(lanes from, unsigned mask)
+ROWS_INLINE lanes compress_lanes(lanes from, unsigned mask)
 {
 #if defined(__AVX512F__)
     return (lanes)_mm512_maskz_compress_epi32((__mmask16)mask, (__m512i)from);
 #endif
-    uint32_t gapped[COMP_LANES], closed[COMP_LANES] = {0};
+    uint32_t gapped[COMP_LANES], compact[COMP_LANES] = {0};
     store_lanes(gapped, from);
-    for (int n = 0; mask; mask &= mask - 1) closed[n++] = gapped[__builtin_ctz(mask)];
-    return load_lanes(closed);
+    for (int n = 0; mask; mask &= mask - 1) compact[n++] = gapped[__builtin_ctz(mask)];
+    return load_lanes(compact);
 }
 
-ROWS_INLINE lanes open_gaps(lanes from, unsigned mask)
+ROWS_INLINE lanes expand_lanes(lanes from, unsigned mask)
 {
 #if defined(__AVX512F__)
     return (lanes)_mm512_maskz_expand_epi32((__mmask16)mask, (__m512i)from);
 #endif
-    uint32_t gapped[COMP_LANES] = {0}, closed[COMP_LANES];
-    store_lanes(closed, from);
-    for (int n = 0; mask; mask &= mask - 1) gapped[__builtin_ctz(mask)] = closed[n++];
+    uint32_t gapped[COMP_LANES] = {0}, compact[COMP_LANES];
+    store_lanes(compact, from);
+    for (int n = 0; mask; mask &= mask - 1) gapped[__builtin_ctz(mask)] = compact[n++];
     return load_lanes(gapped);
 }
 
 /* These compress and expand a row in memory. They may read and write all 16 values of `to` or `from`. */
-ROWS_INLINE void close_row(const uint32_t *row, unsigned mask, uint32_t *to)
+ROWS_INLINE void compress_row(const uint32_t *row, unsigned mask, uint32_t *to)
 {
 #if defined(__AVX512F__)
-    store_lanes(to, close_gaps(load_lanes(row), mask));
+    store_lanes(to, compress_lanes(load_lanes(row), mask));
 #else
     for (; mask; mask &= mask - 1) *to++ = row[__builtin_ctz(mask)];
 #endif
 }
 
-ROWS_INLINE void open_row(const uint32_t *from, unsigned mask, uint32_t *row)
+ROWS_INLINE void expand_row(const uint32_t *from, unsigned mask, uint32_t *row)
 {
 #if defined(__AVX512F__)
-    store_lanes(row, open_gaps(load_lanes(from), mask));
+    store_lanes(row, expand_lanes(load_lanes(from), mask));
 #else
     for (; mask; mask &= mask - 1) row[__builtin_ctz(mask)] = *from++;
 #endif
 }
 
-static void close_sheet(const comp_sheet *sheet, const sheet_plan *plan, int words, comp_sheet *closed)
+static void compress_sheet(const comp_sheet *sheet, const sheet_plan *plan, int words, comp_sheet *compact)
 {
     for (int w = 0; w < words; w++) {
         uint32_t gathered[COMP_STRIP_PIXELS + COMP_LANES], *to = gathered;
         for (int i = 0; i < plan->rows; i++) {
-            close_row(&sheet->words[w][plan->row[i] * COMP_LANES], plan->mask[i], to);
+            compress_row(&sheet->words[w][plan->row[i] * COMP_LANES], plan->mask[i], to);
             to += plan->number[i];
         }
-        memcpy(closed->words[w], gathered, (size_t)plan->count * sizeof *gathered);
+        memcpy(compact->words[w], gathered, (size_t)plan->count * sizeof *gathered);
     }
 }
 
-static void open_sheet(const comp_sheet *closed, const sheet_plan *plan, int words, comp_sheet *sheet)
+static void expand_sheet(const comp_sheet *compact, const sheet_plan *plan, int words, comp_sheet *sheet)
 {
     for (int w = 0; w < words; w++) {
-        const uint32_t *from = closed->words[w];
+        const uint32_t *from = compact->words[w];
         for (int i = 0; i < plan->rows; i++) {
-            open_row(from, plan->mask[i], &sheet->words[w][plan->row[i] * COMP_LANES]);
+            expand_row(from, plan->mask[i], &sheet->words[w][plan->row[i] * COMP_LANES]);
             from += plan->number[i];
         }
     }
@@ -224,66 +224,66 @@ static void open_sheet(const comp_sheet *closed, const sheet_plan *plan, int wor
 
 /* ---- writing ------------------------------------------------------------------------------------------------- */
 
-/* The residuals of a word for both predictions, indexed by WORD_LINE or WORD_ABOVE. */
-typedef struct word_remains {
-    lanes of[2][COMP_ROWS];
-    uint8_t halves[2][COMP_ROWS];
-} word_remains;
+/* The residuals of a word for both predictions, indexed by WORD_LINEAR or WORD_CONSTANT. */
+typedef struct word_residuals {
+    lanes rows[2][COMP_ROWS];
+    uint8_t nibbles[2][COMP_ROWS];
+} word_residuals;
 
 /* Returns the residuals of the first row, where each value is predicted from its left neighbour. */
-ROWS_INLINE lanes remains_of_first(lanes values, unsigned mask)
+ROWS_INLINE lanes first_row_residuals(lanes values, unsigned mask)
 {
     uint32_t own[COMP_LANES + 1];
-    const lanes closed = mask == 0xffff ? values : close_gaps(values, mask);
-    own[0] = closed[0];
-    store_lanes(own + 1, closed);
-    return fold(closed - load_lanes(own)) & mask_lanes((1u << __builtin_popcount(mask)) - 1);
+    const lanes compact = mask == 0xffff ? values : compress_lanes(values, mask);
+    own[0] = compact[0];
+    store_lanes(own + 1, compact);
+    return zigzag_encode(compact - load_lanes(own)) & mask_lanes((1u << __builtin_popcount(mask)) - 1);
 }
 
 /* Computes the residuals of both predictions; returns the one that takes fewer bytes. */
-ROWS_INLINE enum word_kind foretell(const uint32_t *words, const sheet_plan *plan, word_remains *out)
+ROWS_INLINE enum word_kind predict_word(const uint32_t *words, const sheet_plan *plan, word_residuals *out)
 {
-    forecast f;
+    prediction f;
     size_t bytes[2] = {0, 0};
     for (int i = 0; i < plan->rows; i++) {
         const lanes values = load_lanes(words + plan->row[i] * COMP_LANES);
         const unsigned mask = plan->mask[i];
         lanes above, line;
         if (i) {
-            if (plan->fresh[i]) begin_fresh(plan, i, &f);
-            above = fold(values - f.last);
-            line = fold(values - f.last - f.slope);
-            if (mask != 0xffff) above = close_gaps(above, mask);
-            if (mask != 0xffff) line = close_gaps(line, mask);
-            learn(&f, values, mask, plan->fresh[i]);
+            if (plan->fresh[i]) predict_fresh_lanes(plan, i, &f);
+            above = zigzag_encode(values - f.last);
+            line = zigzag_encode(values - f.last - f.slope);
+            if (mask != 0xffff) above = compress_lanes(above, mask);
+            if (mask != 0xffff) line = compress_lanes(line, mask);
+            update_prediction(&f, values, mask, plan->fresh[i]);
         } else {
-            above = line = remains_of_first(values, mask);
-            learn_first(&f, values);
+            above = line = first_row_residuals(values, mask);
+            start_prediction(&f, values);
         }
-        out->of[WORD_ABOVE][i] = above;
-        out->of[WORD_LINE][i] = line;
-        for (int way = 0; way < 2; way++) {
-            out->halves[way][i] = (uint8_t)half_bytes(any_bits(out->of[way][i]));
-            bytes[way] += packed_bytes(out->halves[way][i], plan->number[i]);
+        out->rows[WORD_CONSTANT][i] = above;
+        out->rows[WORD_LINEAR][i] = line;
+        for (int predictor = 0; predictor < 2; predictor++) {
+            out->nibbles[predictor][i] = (uint8_t)nibble_count(any_bits(out->rows[predictor][i]));
+            bytes[predictor] += packed_bytes(out->nibbles[predictor][i], plan->number[i]);
         }
     }
-    return bytes[WORD_ABOVE] < bytes[WORD_LINE] ? WORD_ABOVE : WORD_LINE;
+    return bytes[WORD_CONSTANT] < bytes[WORD_LINEAR] ? WORD_CONSTANT : WORD_LINEAR;
 }
 
 ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *plan, enum word_kind *kind,
                                       unsigned char *out)
 {
-    word_remains remains;
-    *kind = foretell(words, plan, &remains);
-    const uint8_t *halves = remains.halves[*kind];
+    word_residuals residuals;
+    *kind = predict_word(words, plan, &residuals);
+    const uint8_t *nibbles = residuals.nibbles[*kind];
     for (int i = 0; i < plan->rows; i += 2)
-        *out++ = (unsigned char)(halves[i] | (i + 1 < plan->rows ? halves[i + 1] : 0) << 4);
-    for (int i = 0; i < plan->rows; i++) out = pack(remains.of[*kind][i], halves[i], plan->number[i], out);
+        *out++ = (unsigned char)(nibbles[i] | (i + 1 < plan->rows ? nibbles[i + 1] : 0) << 4);
+    for (int i = 0; i < plan->rows; i++) out = pack(residuals.rows[*kind][i], nibbles[i], plan->number[i], out);
     return out;
 }
 
-/* Returns WORD_SAME if all pixels have the first pixel's value, WORD_AS_BEFORE if all equal the preceding word, and
- * otherwise WORD_LINE. */
+/* Returns WORD_UNIFORM if all pixels have the first pixel's value, WORD_REPEATED if all equal the preceding word, and
+ * otherwise WORD_LINEAR. */
 ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *plan, int word, uint32_t first)
 {
     const uint32_t *own = sheet->words[word], *before = sheet->words[word ? word - 1 : 0];
@@ -293,8 +293,8 @@ ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *
         others |= (values ^ first) & is_there;
         next |= (values ^ load_lanes(before + plan->row[i] * COMP_LANES)) & is_there;
     }
-    if (!any_bits(others)) return WORD_SAME;
-    return word && !any_bits(next) ? WORD_AS_BEFORE : WORD_LINE;
+    if (!any_bits(others)) return WORD_UNIFORM;
+    return word && !any_bits(next) ? WORD_REPEATED : WORD_LINEAR;
 }
 
 static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *plan, int words, uint32_t *kinds,
@@ -304,11 +304,11 @@ static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *pla
     *kinds = 0;
     for (int w = 0; w < words; w++) {
         enum word_kind kind = find_kind(sheet, plan, w, sheet->words[w][first]);
-        if (kind != WORD_AS_BEFORE) {
+        if (kind != WORD_REPEATED) {
             memcpy(out, &sheet->words[w][first], sizeof(uint32_t));
             out += sizeof(uint32_t);
         }
-        if (kind == WORD_LINE) out = write_word(sheet->words[w], plan, &kind, out);
+        if (kind == WORD_LINEAR) out = write_word(sheet->words[w], plan, &kind, out);
         *kinds |= (uint32_t)kind << 2 * w;
     }
     return out;
@@ -316,34 +316,34 @@ static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *pla
 
 /* ---- reading ------------------------------------------------------------------------------------------------- */
 
-ROWS_INLINE lanes read_first(lanes remains, unsigned mask, uint32_t value)
+ROWS_INLINE lanes read_first(lanes residuals, unsigned mask, uint32_t value)
 {
     uint32_t steps[COMP_LANES];
     const int count = __builtin_popcount(mask);
-    store_lanes(steps, unfold(remains));
+    store_lanes(steps, zigzag_decode(residuals));
     for (int n = 0; n < count; n++) steps[n] = value += steps[n];
-    return mask == 0xffff ? load_lanes(steps) : open_gaps(load_lanes(steps), mask);
+    return mask == 0xffff ? load_lanes(steps) : expand_lanes(load_lanes(steps), mask);
 }
 
 ROWS_INLINE const unsigned char *read_word(const unsigned char *in, const sheet_plan *plan, bool has_slope,
                                            uint32_t value, uint32_t *words)
 {
-    forecast f;
-    const unsigned char *const halves = in;
+    prediction f;
+    const unsigned char *const nibbles = in;
     const uint32_t slopes = has_slope ? 0xffffffffu : 0;
     in += (plan->rows + 1) / 2;
     for (int i = 0; i < plan->rows; i++) {
         const unsigned mask = plan->mask[i];
-        lanes remains, values;
-        in = unpack(in, halves[i / 2] >> (i & 1) * 4 & 15, plan->number[i], &remains);
+        lanes residuals, values;
+        in = unpack(in, nibbles[i / 2] >> (i & 1) * 4 & 15, plan->number[i], &residuals);
         if (i) {
-            if (mask != 0xffff) remains = open_gaps(remains, mask);
-            if (plan->fresh[i]) begin_fresh(plan, i, &f);
-            values = f.last + (f.slope & slopes) + unfold(remains);
-            learn(&f, values, mask, plan->fresh[i]);
+            if (mask != 0xffff) residuals = expand_lanes(residuals, mask);
+            if (plan->fresh[i]) predict_fresh_lanes(plan, i, &f);
+            values = f.last + (f.slope & slopes) + zigzag_decode(residuals);
+            update_prediction(&f, values, mask, plan->fresh[i]);
         } else {
-            values = read_first(remains, mask, value);
-            learn_first(&f, values);
+            values = read_first(residuals, mask, value);
+            start_prediction(&f, values);
         }
         store_lanes(words + plan->row[i] * COMP_LANES, values);
     }
@@ -362,16 +362,16 @@ static const unsigned char *read_words(const unsigned char *in, const sheet_plan
     for (int w = 0; w < words; w++) {
         const enum word_kind kind = (enum word_kind)(kinds >> 2 * w & 3);
         uint32_t value;
-        if (kind == WORD_AS_BEFORE) {
+        if (kind == WORD_REPEATED) {
             memcpy(out->words[w], out->words[w - 1], sizeof out->words[w]);
             continue;
         }
         memcpy(&value, in, sizeof value);
         in += sizeof value;
-        if (kind == WORD_SAME)
+        if (kind == WORD_UNIFORM)
             fill_word(plan, value, out->words[w]);
         else
-            in = read_word(in, plan, kind == WORD_LINE, value, out->words[w]);
+            in = read_word(in, plan, kind == WORD_LINEAR, value, out->words[w]);
     }
     return in;
 }

@@ -4,8 +4,8 @@
 #include "comp_sheet_rows.h"
 
 const comp_sheet_loops COMP_SHEET_TABLE = {.plan = make_plan,
-                                           .close = close_sheet,
-                                           .open = open_sheet,
+                                           .compress = compress_sheet,
+                                           .expand = expand_sheet,
                                            .write = write_words,
                                            .read = read_words,
                                            .join = join_sheets,

@@ -15,24 +15,24 @@ insitu_status comp_mpi_status(int code, base_error *error)
 }
 
 /* Returns the worst status. On ranks whose own status differs, the error message names the rank that failed. */
-static insitu_status tell(insitu_status own, insitu_status worst, int64_t rank, base_error *error)
+static insitu_status report_status(insitu_status own, insitu_status worst, int64_t rank, base_error *error)
 {
     if (worst == INSITU_OK || worst == own) return worst;
     const char *what = worst == INSITU_ERROR_MEMORY ? "ran out of memory" : "failed";
     return base_fail(error, worst, "compositing: rank %lld %s (status %d)", (long long)rank, what, (int)worst);
 }
 
-insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, base_error *error)
+insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *maximum, base_error *error)
 {
     int rank = 0;
     MPI_Comm_rank(comm, &rank);
-    const int64_t mine[2] = {own ? ((int64_t)own << 32) - rank : 0, greatest ? *greatest : 0};
+    const int64_t mine[2] = {own ? ((int64_t)own << 32) - rank : 0, maximum ? *maximum : 0};
     int64_t all[2] = {0, 0};
     const insitu_status status = comp_mpi_status(MPI_Allreduce(mine, all, 2, MPI_INT64_T, MPI_MAX, comm), error);
     if (status != INSITU_OK) return status;
-    if (greatest) *greatest = all[1];
+    if (maximum) *maximum = all[1];
     const insitu_status worst = (insitu_status)((all[0] + INT32_MAX) >> 32);
-    return tell(own, worst, ((int64_t)worst << 32) - all[0], error);
+    return report_status(own, worst, ((int64_t)worst << 32) - all[0], error);
 }
 
 /* The MPI_User_function that adds claims, each of which is a pair of int. */
@@ -48,7 +48,7 @@ _Static_assert(sizeof(comp_claim) == 2 * sizeof(int), "a claim is MPI_2INT");
 
 comp_claims *comp_claims_create(int ranks)
 {
-    comp_claims *claims = base_alloc(sizeof *claims + (comp_most_blocks(ranks) + 2) * sizeof *claims->items);
+    comp_claims *claims = base_alloc(sizeof *claims + (comp_max_blocks(ranks) + 2) * sizeof *claims->items);
     if (!claims || MPI_Op_create(add_claims, 1, &claims->add) == MPI_SUCCESS) return claims;
     base_free(claims);
     return NULL;
@@ -62,7 +62,7 @@ void comp_claims_free(comp_claims *claims)
     base_free(claims);
 }
 
-insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claims *claims, int count,
+insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maximum, comp_claims *claims, int count,
                                 base_error *error)
 {
     enum { SHIFT = 20, MASK = (1 << SHIFT) - 1 };
@@ -70,10 +70,10 @@ insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *great
     int rank = 0;
     MPI_Comm_rank(comm, &rank);
     items[count] = (comp_claim){own ? (int32_t)own << SHIFT | (MASK - (rank & MASK)) : 0, 0};
-    items[count + 1] = (comp_claim){(int32_t)(*greatest < INT32_MAX ? *greatest : INT32_MAX), 0};
+    items[count + 1] = (comp_claim){(int32_t)(*maximum < INT32_MAX ? *maximum : INT32_MAX), 0};
     const insitu_status status =
         comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
     if (status != INSITU_OK) return status;
-    *greatest = items[count + 1].vote;
-    return tell(own, (insitu_status)(items[count].vote >> SHIFT), MASK - (items[count].vote & MASK), error);
+    *maximum = items[count + 1].vote;
+    return report_status(own, (insitu_status)(items[count].vote >> SHIFT), MASK - (items[count].vote & MASK), error);
 }

@@ -14,7 +14,7 @@
  * status. */
 typedef struct comp_claims {
     MPI_Op add;
-    comp_claim items[]; /* one per block; two more carry the status and the maximum */
+    comp_claim items[]; /* one claim per block; two more carry the status and the maximum */
 } comp_claims;
 
 /* Allocates the claims of any picture for this number of ranks; returns NULL if memory ran out. Local.
@@ -23,12 +23,12 @@ comp_claims *comp_claims_create(int ranks);
 void comp_claims_free(comp_claims *claims);
 
 /* Returns the largest status of all ranks. Ranks whose own status differs get a message that names the failed rank.
- * *greatest, unless NULL, becomes its maximum over all ranks. Collective: one reduction. */
-insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, base_error *error);
+ * *maximum, unless NULL, becomes its maximum over all ranks. Collective: one reduction. */
+insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *maximum, base_error *error);
 
-/* Same as comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction. *greatest is
+/* Same as comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction. *maximum is
  * limited to INT32_MAX. With more than 2^20 ranks the message may name a wrong rank. */
-insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *greatest, comp_claims *claims, int count,
+insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maximum, comp_claims *claims, int count,
                                 base_error *error);
 
 /* Converts an MPI error code: returns INSITU_OK, or INSITU_ERROR_MPI with the text of MPI_Error_string(). Local. */

@@ -8,27 +8,27 @@
 #include "comp_pack.h"
 
 /* Runs the rounds of the route. Each round after the first forwards parcels that were received in earlier rounds. */
-static insitu_status run_rounds(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *held,
-                                insitu_status status, base_error *error)
+static insitu_status run_rounds(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                comp_messages *held, insitu_status status, base_error *error)
 {
     for (int i = 0; i < route->round_count; i++) {
         comp_messages on_the_way = {NULL, NULL};
-        if (!status) status = comp_forward(held, route, i, room->rank, &on_the_way, error);
+        if (!status) status = comp_forward(held, route, i, transport->rank, &on_the_way, error);
         if (i == 0) comp_messages_append(&on_the_way, out);
-        status = comp_mail_round(room, route, i, &on_the_way, held, status, error);
+        status = comp_messages_round(transport, route, i, &on_the_way, held, status, error);
     }
     return status;
 }
 
-insitu_status comp_exchange(comp_mailroom *room, const comp_route *route, const comp_strips *strips,
+insitu_status comp_exchange(comp_transport *transport, const comp_route *route, const comp_strips *strips,
                             const comp_owners *owners, comp_messages *held, insitu_status status, base_error *error)
 {
-    const bool is_owner = comp_route_place(route, room->rank) < route->owners;
+    const bool is_owner = comp_route_place(route, transport->rank) < route->owners;
     comp_messages out = {NULL, NULL};
     *held = (comp_messages){NULL, NULL};
-    if (!status) status = comp_pack(strips, owners, route, room->rank, &out, held, error);
-    status = comp_mail_fold(room, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held, status, error);
-    status = run_rounds(room, route, &out, held, status, error);
+    if (!status) status = comp_pack(strips, owners, route, transport->rank, &out, held, error);
+    status = comp_messages_fold(transport, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held, status, error);
+    status = run_rounds(transport, route, &out, held, status, error);
     if (status) comp_messages_free(held);
     return status;
 }

@@ -2,7 +2,7 @@
 #ifndef COMP_COMP_EXCHANGE_H
 #define COMP_COMP_EXCHANGE_H
 
-#include "comp_mail.h"
+#include "comp_messages.h"
 #include "comp_pack.h"
 #include "comp_strips.h"
 
@@ -10,7 +10,7 @@
  * the strips that this rank owns; free them with comp_messages_free(). `status` is this rank's status before the call;
  * a rank with an error takes part in all rounds without sending fragments. Returns this rank's own status; if it is an
  * error, *held is empty. Collective. */
-insitu_status comp_exchange(comp_mailroom *room, const comp_route *route, const comp_strips *strips,
+insitu_status comp_exchange(comp_transport *transport, const comp_route *route, const comp_strips *strips,
                             const comp_owners *owners, comp_messages *held, insitu_status status, base_error *error);
 
 #endif

@@ -30,104 +30,107 @@ int comp_gather_children(const comp_route *route, int place)
 /* ---- to the parent ------------------------------------------------------------------------------------------- */
 
 /* The connection to the parent in the gather tree. */
-typedef struct upward {
-    comp_mailroom *room;
-    int parent; /* rank of the parent */
+typedef struct parent_link {
+    comp_transport *transport;
+    int parent; /* rank of the parent in the gather tree */
     int code;
-} upward;
+} parent_link;
 
-static void pass_up(upward *up, const unsigned char *message, int bytes)
+static void send_to_parent(parent_link *link, const unsigned char *message, int bytes)
 {
-    if (up->code != MPI_SUCCESS) return;
-    up->code = MPI_Send(message, bytes, MPI_BYTE, up->parent, TAG_PIXELS, up->room->comm);
-    up->room->sent_bytes += bytes;
-    up->room->sent_messages++;
+    if (link->code != MPI_SUCCESS) return;
+    link->code = MPI_Send(message, bytes, MPI_BYTE, link->parent, TAG_PIXELS, link->transport->comm);
+    link->transport->sent_bytes += bytes;
+    link->transport->sent_messages++;
 }
 
 /* Sends this rank's finished pixels, in batches of COMP_LONGEST_DENSE messages because the request buffer has no more
  * entries. */
-static void send_own(upward *up, const comp_messages *finished)
+static void send_own(parent_link *link, const comp_messages *finished)
 {
-    MPI_Request *const requests = up->room->reserve;
-    for (comp_message *m = finished->first; m && up->code == MPI_SUCCESS;) {
+    MPI_Request *const requests = link->transport->reserved_requests;
+    for (comp_message *m = finished->first; m && link->code == MPI_SUCCESS;) {
         int count = 0;
-        for (; m && count < COMP_LONGEST_DENSE && up->code == MPI_SUCCESS; m = m->next) {
+        for (; m && count < COMP_LONGEST_DENSE && link->code == MPI_SUCCESS; m = m->next) {
             m->data[0] = 1;
-            up->code = MPI_Isend(m->data, m->bytes, MPI_BYTE, up->parent, TAG_PIXELS, up->room->comm, &requests[count]);
-            count += up->code == MPI_SUCCESS;
-            up->room->sent_bytes += m->bytes;
-            up->room->sent_messages++;
+            link->code = MPI_Isend(m->data, m->bytes, MPI_BYTE, link->parent, TAG_PIXELS, link->transport->comm,
+                                   &requests[count]);
+            count += link->code == MPI_SUCCESS;
+            link->transport->sent_bytes += m->bytes;
+            link->transport->sent_messages++;
         }
         const int code = MPI_Waitall(count, requests, MPI_STATUSES_IGNORE);
-        if (up->code == MPI_SUCCESS) up->code = code;
+        if (link->code == MPI_SUCCESS) link->code = code;
     }
 }
 
 /* ---- from the children --------------------------------------------------------------------------------------- */
 
-static int receive(comp_mailroom *room, int *bytes)
+static int receive(comp_transport *transport, int *bytes)
 {
     MPI_Status status;
-    const int code =
-        MPI_Recv(room->waste, COMP_MESSAGE_BYTES, MPI_BYTE, MPI_ANY_SOURCE, TAG_PIXELS, room->comm, &status);
+    const int code = MPI_Recv(transport->receive_buffer, COMP_MESSAGE_BYTES, MPI_BYTE, MPI_ANY_SOURCE, TAG_PIXELS,
+                              transport->comm, &status);
     if (code == MPI_SUCCESS) MPI_Get_count(&status, MPI_BYTE, bytes);
     return code;
 }
 
-static void store_message(comp_mailroom *room, int bytes, const comp_canvas *canvas)
+static void store_message(comp_transport *transport, int bytes, const comp_canvas *canvas)
 {
-    for (const unsigned char *at = room->waste + COMP_MESSAGE_HEAD, *end = room->waste + bytes; at < end;) {
+    for (const unsigned char *at = transport->receive_buffer + COMP_MESSAGE_HEAD,
+                             *end = transport->receive_buffer + bytes;
+         at < end;) {
         uint32_t head[3];
         memcpy(head, at, sizeof head);
         at += sizeof head;
         for (const unsigned char *parcel_end = at + head[2]; at < parcel_end;) {
-            at = comp_sheet_read(at, COMP_PIXEL_WORDS, room->sheet);
-            comp_sheet_store(room->sheet, canvas->grid, canvas->background, canvas->out);
+            at = comp_sheet_read(at, COMP_PIXEL_WORDS, transport->sheet);
+            comp_sheet_store(transport->sheet, canvas->grid, canvas->background, canvas->out);
         }
     }
 }
 
-static int receive_at_root(comp_mailroom *room, int children, const comp_canvas *canvas)
+static int receive_at_root(comp_transport *transport, int children, const comp_canvas *canvas)
 {
     int code = MPI_SUCCESS;
     while (children > 0 && code == MPI_SUCCESS) {
         int bytes = 0;
-        code = receive(room, &bytes);
+        code = receive(transport, &bytes);
         if (code != MPI_SUCCESS) break;
-        children -= !room->waste[0];
-        store_message(room, bytes, canvas);
+        children -= !transport->receive_buffer[0];
+        store_message(transport, bytes, canvas);
     }
     return code;
 }
 
-static void pass_on(upward *up, int children)
+static void forward_children(parent_link *link, int children)
 {
-    comp_mailroom *const room = up->room;
-    while (children > 0 && up->code == MPI_SUCCESS) {
+    comp_transport *const transport = link->transport;
+    while (children > 0 && link->code == MPI_SUCCESS) {
         int bytes = 0;
-        up->code = receive(room, &bytes);
-        if (up->code != MPI_SUCCESS) break;
-        children -= !room->waste[0];
+        link->code = receive(transport, &bytes);
+        if (link->code != MPI_SUCCESS) break;
+        children -= !transport->receive_buffer[0];
         if (bytes == COMP_MESSAGE_HEAD) continue;
-        room->waste[0] = 1;
-        pass_up(up, room->waste, bytes);
+        transport->receive_buffer[0] = 1;
+        send_to_parent(link, transport->receive_buffer, bytes);
     }
-    memset(room->waste, 0, COMP_MESSAGE_HEAD);
-    pass_up(up, room->waste, COMP_MESSAGE_HEAD);
+    memset(transport->receive_buffer, 0, COMP_MESSAGE_HEAD);
+    send_to_parent(link, transport->receive_buffer, COMP_MESSAGE_HEAD);
 }
 
-insitu_status comp_gather(comp_mailroom *room, const comp_route *route, const comp_canvas *canvas,
+insitu_status comp_gather(comp_transport *transport, const comp_route *route, const comp_canvas *canvas,
                           comp_messages *finished, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, room->rank);
+    const int place = comp_route_place(route, transport->rank);
     int code = MPI_SUCCESS;
     if (place < route->owners && place > 0) {
-        upward up = {room, comp_route_rank(route, comp_gather_parent(route, place)), MPI_SUCCESS};
-        if (!status) send_own(&up, finished);
-        pass_on(&up, comp_gather_children(route, place));
-        code = up.code;
+        parent_link link = {transport, comp_route_rank(route, comp_gather_parent(route, place)), MPI_SUCCESS};
+        if (!status) send_own(&link, finished);
+        forward_children(&link, comp_gather_children(route, place));
+        code = link.code;
     } else if (place == 0) {
-        code = receive_at_root(room, comp_gather_children(route, place), canvas);
+        code = receive_at_root(transport, comp_gather_children(route, place), canvas);
     }
     comp_messages_free(finished);
     return status ? status : comp_mpi_status(code, error);

@@ -16,13 +16,13 @@ static insitu_status no_memory(base_error *error, const char *what)
 /* ---- fragments into messages --------------------------------------------------------------------------------- */
 
 /* The strips in which this rank has fragments, sorted by owner. */
-typedef struct cargo {
+typedef struct owner_strips {
     const comp_strips *strips;
-    uint32_t *order;  /* indices of strips */
-    uint32_t *starts; /* first index in order for each owner, and the total at the end */
-} cargo;
+    uint32_t *order;  /* indices of strips, sorted by owner */
+    uint32_t *starts; /* for each owner its first index in order, and the total at the end */
+} owner_strips;
 
-static bool sort_strips(const comp_owners *owners, cargo *c)
+static bool sort_strips(const comp_owners *owners, owner_strips *c)
 {
     const uint32_t *const ranges = c->strips->starts;
     const comp_grid *const grid = c->strips->grid;
@@ -46,12 +46,12 @@ typedef struct packing {
     int64_t left; /* estimated number of fragments for the owner that are not written yet */
 } packing;
 
-static bool take_sheet(void *state, const comp_sheet *sheet, int count)
+static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
 {
     packing *p = state;
-    const size_t bound = comp_sheet_bound(count, COMP_WORDS);
+    const size_t bound = comp_sheet_max_bytes(count, COMP_WORDS);
     const size_t left = (size_t)(p->left > 0 ? p->left : 0);
-    unsigned char *at = comp_writer_room(p->writer, p->owner, bound, left * EXPECTED_BYTES + bound);
+    unsigned char *at = comp_writer_reserve(p->writer, p->owner, bound, left * EXPECTED_BYTES + bound);
     if (!at) return false;
     comp_writer_commit(p->writer, comp_sheet_write(sheet, COMP_WORDS, at), (uint32_t)count);
     p->left -= count;
@@ -59,17 +59,18 @@ static bool take_sheet(void *state, const comp_sheet *sheet, int count)
 }
 
 /* Packs one thread's share of the fragments for an owner; returns false if memory ran out. */
-static bool pack_owner(const cargo *c, uint32_t owner, int share, int shares, comp_layers *layers, comp_writer *writer)
+static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int shares, comp_layers *layers,
+                       comp_writer *writer)
 {
     const uint32_t begin = c->starts[owner], count = c->starts[owner + 1] - begin;
     const uint32_t first = begin + (uint32_t)((uint64_t)count * (uint32_t)share / (uint32_t)shares);
     const uint32_t end = begin + (uint32_t)((uint64_t)count * ((uint32_t)share + 1) / (uint32_t)shares);
     packing p = {writer, owner, 0};
-    bool is_well = true;
+    bool is_ok = true;
     for (uint32_t i = first; i < end; i++) p.left += comp_strips_count(c->strips, c->order[i]);
-    for (uint32_t i = first; i < end && is_well; i++)
-        is_well = comp_strips_sheets(c->strips, c->order[i], layers, take_sheet, &p);
-    return is_well;
+    for (uint32_t i = first; i < end && is_ok; i++)
+        is_ok = comp_strips_sheets(c->strips, c->order[i], layers, pack_sheet, &p);
+    return is_ok;
 }
 
 /* The work to pack for one partner in the first round: the fragments for all owners with the partner's digit, except
@@ -79,26 +80,26 @@ typedef struct batch {
     int share, shares;
 } batch;
 
-static bool pack_batch(const cargo *c, int owners, const batch *b, comp_layers *layers, comp_writer *writer)
+static bool pack_batch(const owner_strips *c, int owners, const batch *b, comp_layers *layers, comp_writer *writer)
 {
-    bool is_well = true;
-    for (int owner = b->digit; owner < owners && is_well; owner += b->radix)
-        is_well = owner == b->place || pack_owner(c, (uint32_t)owner, b->share, b->shares, layers, writer);
-    return is_well;
+    bool is_ok = true;
+    for (int owner = b->digit; owner < owners && is_ok; owner += b->radix)
+        is_ok = owner == b->place || pack_owner(c, (uint32_t)owner, b->share, b->shares, layers, writer);
+    return is_ok;
 }
 
-static bool pack_all(const cargo *c, const comp_route *route, int place, comp_messages *out, comp_messages *kept)
+static bool pack_all(const owner_strips *c, const comp_route *route, int place, comp_messages *out, comp_messages *kept)
 {
     const int radix = route->round_count ? route->radix[0] : 1, threads = c->strips->grid->threads;
     const bool is_beyond = place >= route->owners;
     const int own = is_beyond ? -1 : comp_route_digit(route, 0, 1, place);
     const int shares = (threads + radix - 1) / radix;
-    bool is_well = true;
-#pragma omp parallel num_threads(threads) reduction(&& : is_well)
+    bool is_ok = true;
+#pragma omp parallel num_threads(threads) reduction(&& : is_ok)
     {
         region_enter();
         comp_layers *const layers = base_calloc(1, sizeof *layers);
-        is_well = layers != NULL;
+        is_ok = layers != NULL;
 #pragma omp for schedule(dynamic, 1)
         for (int i = 0; i < radix * shares; i++) {
             const int digit = is_beyond ? i / shares : (own + i / shares) % radix;
@@ -106,7 +107,7 @@ static bool pack_all(const cargo *c, const comp_route *route, int place, comp_me
             comp_writer writer = {.rank = comp_route_rank(route, is_beyond
                                                                      ? place - route->owners
                                                                      : comp_route_partner(route, 0, 1, place, digit))};
-            if (is_well) is_well = pack_batch(c, route->owners, &b, layers, &writer);
+            if (is_ok) is_ok = pack_batch(c, route->owners, &b, layers, &writer);
 #pragma omp critical(comp_pack)
             comp_messages_append(digit == own ? kept : out, &writer.messages);
         }
@@ -114,17 +115,17 @@ static bool pack_all(const cargo *c, const comp_route *route, int place, comp_me
         base_free(layers);
         region_leave();
     }
-    return is_well;
+    return is_ok;
 }
 
 insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, const comp_route *route, int rank,
                         comp_messages *out, comp_messages *kept, base_error *error)
 {
-    cargo c = {.strips = strips};
-    const bool is_well = sort_strips(owners, &c) && pack_all(&c, route, comp_route_place(route, rank), out, kept);
+    owner_strips c = {.strips = strips};
+    const bool is_ok = sort_strips(owners, &c) && pack_all(&c, route, comp_route_place(route, rank), out, kept);
     base_free(c.order);
     base_free(c.starts);
-    if (is_well) return INSITU_OK;
+    if (is_ok) return INSITU_OK;
     comp_messages_free(out);
     comp_messages_free(kept);
     return no_memory(error, "send");
@@ -143,7 +144,7 @@ static bool forward_to(const comp_messages *in, const comp_route *route, int rou
         for (size_t at = COMP_MESSAGE_HEAD; comp_next_parcel(m, &at, &parcel);) {
             const int owner = (int)parcel.owner;
             if (owner % stride != place % stride || comp_route_digit(route, round, stride, owner) != digit) continue;
-            unsigned char *to = comp_writer_room(writer, parcel.owner, parcel.bytes, (size_t)m->bytes);
+            unsigned char *to = comp_writer_reserve(writer, parcel.owner, parcel.bytes, (size_t)m->bytes);
             if (!to) return false;
             memcpy(to, parcel.data, parcel.bytes);
             comp_writer_commit(writer, to + parcel.bytes, parcel.records);
@@ -161,9 +162,9 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
     for (int i = 1; i < route->radix[round] && place < route->owners; i++) {
         const int digit = (own + i) % route->radix[round];
         comp_writer writer = {.rank = comp_route_rank(route, comp_route_partner(route, round, stride, place, digit))};
-        const bool is_well = forward_to(in, route, round, place, digit, &writer);
+        const bool is_ok = forward_to(in, route, round, place, digit, &writer);
         comp_messages_append(out, &writer.messages);
-        if (is_well) continue;
+        if (is_ok) continue;
         comp_messages_free(out);
         return no_memory(error, "pass on");
     }
@@ -183,7 +184,7 @@ static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, c
             const unsigned char *const end = parcel.data + parcel.bytes;
             for (const unsigned char *sheet = parcel.data, *next; sheet < end; sheet = next) {
                 comp_sheet_head head;
-                next = comp_sheet_look(sheet, &head);
+                next = comp_sheet_read_head(sheet, &head);
                 if (sheets)
                     sheets[--starts[head.strip]] = sheet;
                 else
@@ -193,11 +194,11 @@ static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, c
     }
 }
 
-insitu_status comp_arrivals_find(const comp_grid *grid, int owner, const comp_messages *in, comp_arrivals *out,
+insitu_status comp_received_find(const comp_grid *grid, int owner, const comp_messages *in, comp_received *out,
                                  base_error *error)
 {
     uint32_t sum = 0;
-    *out = (comp_arrivals){NULL, base_calloc((size_t)grid->strips + 1, sizeof *out->starts)};
+    *out = (comp_received){NULL, base_calloc((size_t)grid->strips + 1, sizeof *out->starts)};
     if (out->starts) {
         visit_sheets(in, owner, out->starts, NULL);
         for (uint32_t s = 0; s < grid->strips; s++) out->starts[s] = sum += out->starts[s];
@@ -208,13 +209,13 @@ insitu_status comp_arrivals_find(const comp_grid *grid, int owner, const comp_me
         visit_sheets(in, owner, out->starts, out->sheets);
         return INSITU_OK;
     }
-    comp_arrivals_free(out);
+    comp_received_free(out);
     return no_memory(error, "receive");
 }
 
-void comp_arrivals_free(comp_arrivals *arrivals)
+void comp_received_free(comp_received *arrivals)
 {
     base_free(arrivals->sheets);
     base_free(arrivals->starts);
-    *arrivals = (comp_arrivals){NULL, NULL};
+    *arrivals = (comp_received){NULL, NULL};
 }

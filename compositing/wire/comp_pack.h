@@ -2,14 +2,14 @@
 #ifndef COMP_COMP_PACK_H
 #define COMP_COMP_PACK_H
 
-#include "comp_mail.h"
+#include "comp_messages.h"
 #include "comp_route.h"
 #include "comp_strips.h"
 
 /* The owners of the blocks of a picture. */
 typedef struct comp_owners {
     int32_t *places; /* place of each block's owner; -1 if no rank has a fragment in the block */
-    int count;       /* number of places that may own blocks */
+    int count;       /* number of places that may own blocks of the picture */
 } comp_owners;
 
 /* Packs this rank's fragments for other owners into messages. *out receives the messages to the partners of the first
@@ -23,15 +23,15 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
                            base_error *error);
 
 /* The received sheets of an owner, sorted by strip. They point into the messages. */
-typedef struct comp_arrivals {
+typedef struct comp_received {
     const unsigned char **sheets;
-    uint32_t *starts; /* first index in sheets for each strip, and the total at the end */
-} comp_arrivals;
+    uint32_t *starts; /* for each strip its first index in sheets, and the total at the end */
+} comp_received;
 
 /* Finds the sheets in `in` that are for this owner. Local; after an error *out is empty. */
-insitu_status comp_arrivals_find(const comp_grid *grid, int owner, const comp_messages *in, comp_arrivals *out,
+insitu_status comp_received_find(const comp_grid *grid, int owner, const comp_messages *in, comp_received *out,
                                  base_error *error);
 
-void comp_arrivals_free(comp_arrivals *arrivals);
+void comp_received_free(comp_received *arrivals);
 
 #endif

@@ -197,7 +197,8 @@ static int fill_layer(const comp_layers *layers, uint32_t n, comp_sheet *sheet, 
     return count;
 }
 
-bool comp_strips_sheets(const comp_strips *s, uint32_t strip, comp_layers *layers, comp_sheet_taker *take, void *state)
+bool comp_strips_sheets(const comp_strips *s, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
+                        void *state)
 {
     if (s->starts[strip] == s->starts[strip + 1]) return true;
     if (fill_single(s, strip, &layers->sheet)) return take(state, &layers->sheet, (int)comp_strips_count(s, strip));

@@ -16,9 +16,9 @@ typedef struct comp_range {
 
 typedef struct comp_strips {
     const comp_grid *grid;
-    const fragment *items; /* borrowed from the fragment list */
-    comp_range *ranges;    /* sorted by strip */
-    uint32_t *starts;      /* first index in ranges for each strip, and the total at the end */
+    const fragment *items; /* fragments, borrowed from the fragment list */
+    comp_range *ranges;    /* ranges of fragments, sorted by strip */
+    uint32_t *starts;      /* for each strip its first index in ranges, and the total at the end */
 } comp_strips;
 
 /* Finds the ranges of each strip's fragments. The list and the grid must outlive *out. A fragment whose pixel is not in
@@ -41,12 +41,12 @@ typedef struct comp_layers {
 void comp_layers_free(comp_layers *layers);
 
 /* Callback that receives a sheet with `count` fragments; a return value of false ends the iteration. */
-typedef bool comp_sheet_taker(void *state, const comp_sheet *sheet, int count);
+typedef bool comp_sheet_callback(void *state, const comp_sheet *sheet, int count);
 
 /* Passes a strip's fragments to the callback in sheets: first the nearest fragment of every pixel, then the second of
  * those that have one, and so on. Returns false if memory ran out or the callback returned false. Local; several
  * threads may call it at once. */
-bool comp_strips_sheets(const comp_strips *strips, uint32_t strip, comp_layers *layers, comp_sheet_taker *take,
+bool comp_strips_sheets(const comp_strips *strips, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
                         void *state);
 
 #endif

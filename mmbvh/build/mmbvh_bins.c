@@ -15,7 +15,7 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
     /* If the quotient is below 2^15, its rounding error is too small to reach the next integer; larger quotients are
      * clamped. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
-    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* one grid step is at most one bin */
+    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* limits a grid step to one bin */
     return (bin_mapping){(ulanes)lanes_pack(least, least),
                          lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
 }
@@ -44,9 +44,9 @@ void bins_merge(bins *b, const bins *other, int count)
 static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
 {
     const lanes upper = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
-    const lanes lower =
-        __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); /* stored as ITEM_TOP - lower, hence the subtraction */
-    const ulanes places = (ulanes)lanes_scale((lanes)((ulanes)upper - (ulanes)lower - m->origin), m->factor);
+    const lanes lower = __builtin_shufflevector(
+        a, b, 0, 1, 2, 3, 8, 9, 10, 11); /* the lower bound is stored as ITEM_TOP - lower, hence the subtraction */
+    const ulanes places = (ulanes)lanes_multiply_high((lanes)((ulanes)upper - (ulanes)lower - m->origin), m->factor);
     return places * (uint16_t)sizeof(bin);
 }
 
@@ -62,7 +62,7 @@ static inline void add(bins *b, const uint16_t offsets[3], item i)
 }
 
 /* Adds the counts in lane 3 of the boxes to the bins' counters, and sets lane 3 to 0. */
-static void keep_counts(bins *b, int count)
+static void add_lane_counts(bins *b, int count)
 {
     for (int i = 0; i < count; i++) {
         bin *of = &b->of[i];
@@ -75,7 +75,7 @@ static void keep_counts(bins *b, int count)
 
 /* Adds `count` items, every stride-th one, in pairs: one from each half of the list. Neighbouring items often belong to
  * the same bin, and would then stall on each other's store. */
-static void fill_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
+static void bin_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
 {
     const int64_t half = count / 2;
     const item *halves = items + half * stride;
@@ -98,8 +98,8 @@ void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, 
     const int64_t samples = (count + stride - 1) / stride;
     for (int64_t begin = 0; begin < samples; begin += RUN_MAX) {
         const int64_t n = samples - begin < RUN_MAX ? samples - begin : RUN_MAX;
-        fill_run(b, m, items + begin * stride, n, stride);
-        keep_counts(b, m->count);
+        bin_run(b, m, items + begin * stride, n, stride);
+        add_lane_counts(b, m->count);
     }
 }
 
@@ -118,14 +118,14 @@ static inline vec4 side_cost(const lanes boxes[3], ivec4 counts)
     return (vec4)((ivec4)(half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
 }
 
-static inline void grow(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
+static inline void extend_side(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
 {
     for (int axis = 0; axis < 3; axis++) boxes[axis] = lanes_max(boxes[axis], b->of[bin].boxes[axis]);
     *counts += *(const ivec4 *)b->of[bin].counts;
 }
 
 /* Returns the cheapest of the three axes' splits, without unpredictable branches. */
-static bin_split least(vec4 costs, ivec4 borders)
+static bin_split cheapest_axis(vec4 costs, ivec4 borders)
 {
     float cost = costs[0];
     int axis = 0, border = borders[0];
@@ -145,7 +145,7 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     lanes boxes[3] = {none, none, none};
     ivec4 counts = {0};
     for (int border = m->count - 1; border > 0; border--) {
-        grow(boxes, &counts, b, border);
+        extend_side(boxes, &counts, b, border);
         right_cost[border] = side_cost(boxes, counts);
     }
     for (int axis = 0; axis < 3; axis++) boxes[axis] = none;
@@ -153,13 +153,13 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     vec4 best = vec4_set1(INFINITY);
     ivec4 best_border = {0};
     for (int border = 1; border < m->count; border++) {
-        grow(boxes, &counts, b, border - 1);
+        extend_side(boxes, &counts, b, border - 1);
         const vec4 cost = side_cost(boxes, counts) + right_cost[border];
         const ivec4 better = (ivec4)(cost < best);
         best = (vec4)(((ivec4)cost & better) | ((ivec4)best & ~better));
         best_border = (border & better) | (best_border & ~better);
     }
-    return least(best, best_border);
+    return cheapest_axis(best, best_border);
 }
 
 /* The box of a side is at least as large as that of each of its items, so no plane costs less than the sum of the
@@ -173,7 +173,7 @@ float bins_least_cost(const item *items, int64_t count)
 
 /* Partitions without unpredictable branches: every item is swapped with the first item of the right side, and the left
  * side then grows by one if the item belongs to it. */
-int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count)
+int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64_t count)
 {
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
@@ -181,9 +181,9 @@ int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t co
                       (split.border * 65536 + factor - 1) / factor; /* lowest value of the right side */
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
     char *base = (char *)items;
-    int64_t left = 0; /* in bytes */
+    int64_t left = 0; /* size of the left side in bytes */
     for (int64_t i = 0; i < count; i++) {
-        const int before = upper[8 * i] - lower[8 * i] - first; /* negative for an item of the left side */
+        const int before = upper[8 * i] - lower[8 * i] - first; /* is negative if the item belongs to the left side */
         const item moved = items[i];
         item *place = (item *)(void *)(base + left);
         items[i] = *place;

@@ -28,7 +28,7 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count);
 
 /* A plane between two bins. Items whose bin on the axis is below the border belong to the left side. */
 typedef struct bin_split {
-    int axis; /* -1 if no plane leaves items on both sides */
+    int axis; /* axis of the split; -1 if no plane leaves items on both sides */
     int border;
     float cost; /* sum over both sides of half the surface area (in squared grid steps) times the number of items */
 } bin_split;
@@ -63,13 +63,13 @@ float bins_least_cost(const item *items, int64_t count);
 
 /* Checks whether a split at this cost is cheaper than a leaf. The split adds two box tests. Items that do not fit in a
  * leaf are always split. */
-static inline bool bins_worth_splitting(float cost, int64_t count, lanes bounds)
+static inline bool bins_is_split_cheaper(float cost, int64_t count, lanes bounds)
 {
     return count > MMBVH_MAX_LEAF || cost < (float)(count - 2) * item_half_area(bounds);
 }
 
 /* Moves the items of the left side to the front; returns their number. The result depends only on the order of the
  * items. */
-int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count);
+int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64_t count);
 
 #endif

@@ -28,7 +28,7 @@ typedef struct branch_node {
 } branch_node;
 
 /* The state of the split of one node. */
-typedef struct splitting {
+typedef struct node_split {
     item *items;
     int64_t count;
     int64_t chunk_size;
@@ -37,13 +37,13 @@ typedef struct splitting {
     int64_t left_count;
     branch_node node;
     bin_mapping mapping;
-    int64_t stride; /* one item in this many is binned */
+    int64_t stride; /* one item in this many is binned (bins_stride()) */
     bin_split split;
     bins total;
     item_set sides[2];
-} splitting;
+} node_split;
 
-static void choose_chunks(splitting *s)
+static void choose_chunks(node_split *s)
 {
     s->chunk_size = s->count;
     if (s->count > PARALLEL_MIN) {
@@ -53,15 +53,15 @@ static void choose_chunks(splitting *s)
     s->chunk_count = (int)((s->count + s->chunk_size - 1) / s->chunk_size);
 }
 
-static int64_t chunk_end(const splitting *s, int chunk)
+static int64_t chunk_end(const node_split *s, int chunk)
 {
     const int64_t end = (chunk + 1) * s->chunk_size;
     return end < s->count ? end : s->count;
 }
 
 /* Calls act() for every chunk, in parallel tasks. */
-static void for_chunks(splitting *s, const branch_builder *builder,
-                       void (*act)(splitting *, const branch_builder *, int chunk, int64_t begin, int64_t end))
+static void for_chunks(node_split *s, const branch_builder *builder,
+                       void (*act)(node_split *, const branch_builder *, int chunk, int64_t begin, int64_t end))
 {
 #pragma omp taskgroup
     for (int chunk = 0; chunk < s->chunk_count; chunk++) {
@@ -70,16 +70,16 @@ static void for_chunks(splitting *s, const branch_builder *builder,
     }
 }
 
-static void place_chunk(splitting *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
+static void place_chunk(node_split *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
 {
     (void)chunk;
     item_set own = item_set_empty();
-    bounds_place(builder->source, &s->node.grid, s->items + begin, end - begin, &own, NULL);
+    bounds_fill_items(builder->source, &s->node.grid, s->items + begin, end - begin, &own, NULL);
 #pragma omp critical(mmbvh_merge)
     item_set_merge(&s->node.set, &own);
 }
 
-static void bin_chunk(splitting *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
+static void bin_chunk(node_split *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
 {
     (void)builder;
     (void)chunk;
@@ -90,11 +90,11 @@ static void bin_chunk(splitting *s, const branch_builder *builder, int chunk, in
     bins_merge(&s->total, &own, s->mapping.count);
 }
 
-static void part_chunk(splitting *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
+static void partition_chunk(node_split *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
 {
     (void)builder;
     item *items = s->items + begin;
-    const int64_t count = end - begin, left = bins_part(&s->mapping, s->split, items, count);
+    const int64_t count = end - begin, left = bins_partition(&s->mapping, s->split, items, count);
     const item_set sides[2] = {item_set_of(items, left), item_set_of(items + left, count - left)};
     s->left[chunk] = left;
 #pragma omp critical(mmbvh_merge)
@@ -102,14 +102,14 @@ static void part_chunk(splitting *s, const branch_builder *builder, int chunk, i
 }
 
 /* Iterates over the ranges of items on the wrong side of the border, in order. */
-typedef struct strays {
-    const splitting *s;
+typedef struct misplaced_items {
+    const node_split *s;
     bool is_left; /* true: left items behind the border; false: right items in front of it */
     int chunk;
     int64_t next, end;
-} strays;
+} misplaced_items;
 
-static bool strays_advance(strays *w)
+static bool misplaced_advance(misplaced_items *w)
 {
     while (w->next >= w->end) {
         if (++w->chunk >= w->s->chunk_count) return false;
@@ -130,11 +130,11 @@ static void exchange(item *a, item *b, int64_t count)
     }
 }
 
-static void exchange_strays(splitting *s)
+static void exchange_misplaced(node_split *s)
 {
-    strays right = {.s = s, .chunk = -1}, left = {.s = s, .is_left = true, .chunk = -1};
+    misplaced_items right = {.s = s, .chunk = -1}, left = {.s = s, .is_left = true, .chunk = -1};
 #pragma omp taskgroup
-    while (strays_advance(&right) && strays_advance(&left)) {
+    while (misplaced_advance(&right) && misplaced_advance(&left)) {
         const int64_t rights = right.end - right.next, lefts = left.end - left.next;
         const int64_t count = rights < lefts ? rights : lefts;
         item *a = s->items + right.next, *b = s->items + left.next;
@@ -145,22 +145,22 @@ static void exchange_strays(splitting *s)
     }
 }
 
-static void part(splitting *s, const branch_builder *builder)
+static void partition_items(node_split *s, const branch_builder *builder)
 {
-    for_chunks(s, builder, part_chunk);
+    for_chunks(s, builder, partition_chunk);
     s->left_count = 0;
     for (int chunk = 0; chunk < s->chunk_count; chunk++) s->left_count += s->left[chunk];
-    exchange_strays(s);
+    exchange_misplaced(s);
 }
 
-static void halve(splitting *s)
+static void halve(node_split *s)
 {
     s->left_count = s->count / 2;
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
 }
 
 /* Chooses the plane from a sample of the items, or from all items if the sample allows no split. */
-static void choose(splitting *s, const branch_builder *builder)
+static void choose(node_split *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);
     for (s->stride = bins_stride(s->count);; s->stride = 1) {
@@ -171,10 +171,10 @@ static void choose(splitting *s, const branch_builder *builder)
     }
 }
 
-static void split_branch(splitting *s, const branch_builder *builder)
+static void split_branch(node_split *s, const branch_builder *builder)
 {
     choose_chunks(s);
-    if (subtree_wants_finer_grid(s->node.set.bounds, &s->node.grid)) {
+    if (subtree_needs_finer_grid(s->node.set.bounds, &s->node.grid)) {
         s->node.grid = subtree_finer_grid(s->node.set.bounds, &s->node.grid);
         s->node.set = item_set_empty();
         for_chunks(s, builder, place_chunk);
@@ -185,11 +185,11 @@ static void split_branch(splitting *s, const branch_builder *builder)
     if (s->split.axis < 0) {
         halve(s);
     } else {
-        part(s, builder);
+        partition_items(s, builder);
     }
 }
 
-static void grow(const branch_builder *builder, topology *t, branch_node node)
+static void build_top(const branch_builder *builder, topology *t, branch_node node)
 {
     topology_build *build = builder->build;
     if (atomic_load(&build->failed)) return;
@@ -197,10 +197,10 @@ static void grow(const branch_builder *builder, topology *t, branch_node node)
     if (t->count <= TOPOLOGY_SUBTREE_CELLS) {
         topology_scratch *scratch = &build->scratch[omp_get_thread_num()];
         const topology_link root = subtree_build(scratch, builder->source, items, t->count, &node.grid, node.depth);
-        topology_keep(build, t, scratch, root);
+        topology_copy_links(build, t, scratch, root);
         return;
     }
-    splitting s = {.items = items, .count = t->count, .node = node};
+    node_split s = {.items = items, .count = t->count, .node = node};
     split_branch(&s, builder);
     for (int side = 0; side < 2; side++) {
         const int64_t begin = side ? s.left_count : 0, end = side ? t->count : s.left_count;
@@ -208,7 +208,7 @@ static void grow(const branch_builder *builder, topology *t, branch_node node)
         if (!child) return;
         const branch_node below = {s.sides[side], s.node.grid, node.depth + 1};
 #pragma omp task default(none) firstprivate(builder, child, below)
-        grow(builder, child, below);
+        build_top(builder, child, below);
     }
 }
 
@@ -221,7 +221,7 @@ topology *branch_build(const branch_builder *builder, const item_set *set, const
     {
         region_enter();
 #pragma omp single
-        grow(builder, root, node);
+        build_top(builder, root, node);
         region_leave();
     }
     if (!atomic_load(&builder->build->failed)) return root;

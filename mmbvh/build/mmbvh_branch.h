@@ -8,7 +8,7 @@
 typedef struct branch_builder {
     topology_build *build;
     const bounds_source *source;
-    item *items; /* reordered to the order of the leaves */
+    item *items; /* items, which are reordered to the order of the leaves */
     int64_t count;
 } branch_builder;
 

@@ -19,12 +19,12 @@ typedef struct bricks {
     uint32_t *cells;
 } bricks;
 
-static int64_t cells_of(const brick *b)
+static int64_t brick_cell_count(const brick *b)
 {
     return b->count[0] * b->count[1] * b->count[2];
 }
 
-static brick whole_of(const grid_lattice *l)
+static brick drawn_brick(const grid_lattice *l)
 {
     brick out;
     for (int axis = 0; axis < 3; axis++) {
@@ -36,8 +36,8 @@ static brick whole_of(const grid_lattice *l)
 
 int64_t bricks_count(const grid_lattice *lattice)
 {
-    const brick all = whole_of(lattice);
-    return cells_of(&all);
+    const brick all = drawn_brick(lattice);
+    return brick_cell_count(&all);
 }
 
 /* Returns the length of the edge from the vertex to the next one along the axis. */
@@ -54,7 +54,7 @@ static double edge_length(const grid *g, int64_t vertex, int axis)
 static void measure_edges(const grid *g, double out[3])
 {
     enum { SAMPLES = 5 };
-    const brick all = whole_of(g->lattice);
+    const brick all = drawn_brick(g->lattice);
     for (int axis = 0; axis < 3; axis++) {
         out[axis] = 0;
         for (int sample = 0; sample < SAMPLES * SAMPLES * SAMPLES; sample++) {
@@ -68,12 +68,13 @@ static void measure_edges(const grid *g, double out[3])
 }
 
 /* Halves a box of at least two cells along its longest axis. */
-static void halve(const bricks *s, const brick *b, brick halves[2])
+static void split_brick(const bricks *s, const brick *b, brick halves[2])
 {
-    double reach[3];
-    for (int axis = 0; axis < 3; axis++) reach[axis] = b->count[axis] > 1 ? (double)b->count[axis] * s->edge[axis] : -1;
-    int along = reach[1] > reach[0];
-    along = reach[2] > reach[along] ? 2 : along;
+    double extent[3];
+    for (int axis = 0; axis < 3; axis++)
+        extent[axis] = b->count[axis] > 1 ? (double)b->count[axis] * s->edge[axis] : -1;
+    int along = extent[1] > extent[0];
+    along = extent[2] > extent[along] ? 2 : along;
     halves[0] = halves[1] = *b;
     halves[0].count[along] = b->count[along] / 2;
     halves[1].first[along] += halves[0].count[along];
@@ -94,55 +95,55 @@ static void list_cells(const grid_lattice *l, const brick *b, uint32_t *out)
 static topology_link build_subtree(const bricks *s, topology_scratch *scratch, const brick *b, uint32_t *cells,
                                    int64_t first)
 {
-    const int64_t count = cells_of(b);
+    const int64_t count = brick_cell_count(b);
     if (count <= MMBVH_MAX_LEAF) {
         list_cells(s->lattice, b, cells + first);
         return topology_leaf(first, count);
     }
     brick halves[2];
-    halve(s, b, halves);
+    split_brick(s, b, halves);
     const int64_t pair = topology_new_pair(scratch);
     const topology_link left = build_subtree(s, scratch, &halves[0], cells, first);
-    const topology_link right = build_subtree(s, scratch, &halves[1], cells, first + cells_of(&halves[0]));
+    const topology_link right = build_subtree(s, scratch, &halves[1], cells, first + brick_cell_count(&halves[0]));
     scratch->links[pair] = left;
     scratch->links[pair + 1] = right;
     return topology_inner(pair);
 }
 
-static void grow(const bricks *s, topology *t, const brick b)
+static void build_top(const bricks *s, topology *t, const brick b)
 {
     if (atomic_load(&s->build->failed)) return;
     if (t->count <= TOPOLOGY_SUBTREE_CELLS) {
         topology_scratch *scratch = &s->build->scratch[omp_get_thread_num()];
         scratch->count = 0;
         const topology_link root = build_subtree(s, scratch, &b, s->cells + t->first, 0);
-        topology_keep(s->build, t, scratch, root);
+        topology_copy_links(s->build, t, scratch, root);
         return;
     }
     brick halves[2];
-    halve(s, &b, halves);
+    split_brick(s, &b, halves);
     for (int side = 0; side < 2; side++) {
-        const int64_t begin = side ? cells_of(&halves[0]) : 0;
-        topology *child = t->children[side] = topology_new(s->build, t->first + begin, cells_of(&halves[side]));
+        const int64_t begin = side ? brick_cell_count(&halves[0]) : 0;
+        topology *child = t->children[side] = topology_new(s->build, t->first + begin, brick_cell_count(&halves[side]));
         const brick half = halves[side];
         if (!child) return;
 #pragma omp task default(none) firstprivate(s, child, half)
-        grow(s, child, half);
+        build_top(s, child, half);
     }
 }
 
 topology *bricks_build(topology_build *build, const grid *g, uint32_t *cells)
 {
     bricks s = {.build = build, .lattice = g->lattice, .cells = cells};
-    const brick all = whole_of(g->lattice);
-    topology *root = topology_new(build, 0, cells_of(&all));
+    const brick all = drawn_brick(g->lattice);
+    topology *root = topology_new(build, 0, brick_cell_count(&all));
     if (!root) return NULL;
     measure_edges(g, s.edge);
 #pragma omp parallel num_threads(build->threads)
     {
         region_enter();
 #pragma omp single
-        grow(&s, root, all);
+        build_top(&s, root, all);
         region_leave();
     }
     if (!atomic_load(&build->failed)) return root;

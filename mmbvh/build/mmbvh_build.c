@@ -24,8 +24,8 @@ enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 typedef struct build {
     bounds_source source;
     const uint32_t
-        *selected;  /* indices of the cells to use, none of which may be a ghost; NULL: all cells that are drawn */
-    int64_t listed; /* length of selected, or the number of all cells including ghosts */
+        *selected; /* indices of the cells to use, none of which may be a ghost; NULL: all cells that are drawn */
+    int64_t candidate_count; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
     int threads;
     int64_t starts[FILL_CHUNKS + 1]; /* first position of each chunk's cells, not counting cells that are left out */
@@ -41,26 +41,26 @@ typedef struct build {
 
 static int64_t chunk_start(const build *b, int chunk)
 {
-    return b->listed * chunk / FILL_CHUNKS;
+    return b->candidate_count * chunk / FILL_CHUNKS;
 }
 
-static bool may_leave_out(const build *b)
+static bool may_skip_cells(const build *b)
 {
     return !b->selected && b->source.g && (grid_has_ghosts(b->source.g) || b->source.g->flat);
 }
 
-static bool is_left_out(const build *b, int64_t cell)
+static bool is_skipped(const build *b, int64_t cell)
 {
-    return may_leave_out(b) && !grid_is_drawn(b->source.g, cell);
+    return may_skip_cells(b) && !grid_is_drawn(b->source.g, cell);
 }
 
-static uint32_t listed_cell(const build *b, int64_t i)
+static uint32_t candidate_cell(const build *b, int64_t i)
 {
     return b->selected ? b->selected[i] : (uint32_t)i;
 }
 
 /* Checks whether the tree covers all cells of a lattice except ghost layers, so that mmbvh_bricks.h can build it. */
-static bool is_by_bricks(const build *b)
+static bool uses_bricks(const build *b)
 {
     const grid *g = b->source.g;
     return g && g->lattice && !b->selected && !g->ghosts && !g->flat;
@@ -68,7 +68,7 @@ static bool is_by_bricks(const build *b)
 
 static void count_cells(build *b)
 {
-    if (is_by_bricks(b)) {
+    if (uses_bricks(b)) {
         b->count = bricks_count(b->source.g->lattice);
         return;
     }
@@ -80,7 +80,7 @@ static void count_cells(build *b)
         for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) {
             const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
             int64_t count = end - begin;
-            for (int64_t cell = begin; may_leave_out(b) && cell < end; cell++) count -= is_left_out(b, cell);
+            for (int64_t cell = begin; may_skip_cells(b) && cell < end; cell++) count -= is_skipped(b, cell);
             b->starts[chunk + 1] = count;
         }
         region_leave();
@@ -97,9 +97,9 @@ static void fill_items(const build *b, int chunk, item_set *set, fetch_box *exac
     const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
     int64_t count = 0;
     for (int64_t cell = begin; cell < end; cell++) {
-        if (!is_left_out(b, cell)) items[count++] = item_of_index(listed_cell(b, cell));
+        if (!is_skipped(b, cell)) items[count++] = item_of_index(candidate_cell(b, cell));
     }
-    bounds_place(&b->source, &b->grid, items, count, set, exact);
+    bounds_fill_items(&b->source, &b->grid, items, count, set, exact);
 }
 
 static void fill_keys(const build *b, int chunk, fetch_box *exact)
@@ -108,13 +108,13 @@ static void fill_keys(const build *b, int chunk, fetch_box *exact)
     const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
     int64_t count = 0;
     for (int64_t cell = begin; cell < end; cell++) {
-        if (!is_left_out(b, cell)) keys[count++] = listed_cell(b, cell);
+        if (!is_skipped(b, cell)) keys[count++] = candidate_cell(b, cell);
     }
-    morton_place(&b->source, b->coder, keys, count, exact);
+    morton_make_keys(&b->source, b->coder, keys, count, exact);
 }
 
 /* Computes the items or keys of all cells, quantized by a grid over the box (in the tree's coordinates). */
-static void fill(build *b, const fetch_box *box)
+static void quantize_cells(build *b, const fetch_box *box)
 {
     b->grid = item_grid_make(box->lower, box->upper);
     b->set = item_set_empty();
@@ -145,7 +145,7 @@ static void fill(build *b, const fetch_box *box)
 
 /* Checks whether the guess is much larger than the exact bounds. This happens if vertices of ghosts, or vertices that
  * no cell uses, are far away. */
-static bool is_loose(const fetch_box *guess, const fetch_box *exact)
+static bool is_too_large(const fetch_box *guess, const fetch_box *exact)
 {
     for (int axis = 0; axis < 3; axis++) {
         const double is = exact->upper[axis] - exact->lower[axis], was = guess->upper[axis] - guess->lower[axis];
@@ -154,18 +154,18 @@ static bool is_loose(const fetch_box *guess, const fetch_box *exact)
     return false;
 }
 
-static void fill_fitting(build *b)
+static void quantize_tightly(build *b)
 {
     const fetch_box guess = bounds_guess(&b->source, b->threads);
-    fill(b, &guess);
+    quantize_cells(b, &guess);
     fetch_box exact = b->exact;
     bounds_transform(&b->source, &exact);
-    if (is_loose(&guess, &exact)) fill(b, &exact);
+    if (is_too_large(&guess, &exact)) quantize_cells(b, &exact);
 }
 
 /* ---- topology --------------------------------------------------------------------------------------------------- */
 
-static void release(build *b)
+static void free_buffers(build *b)
 {
     base_free(b->items);
     base_free(b->keys);
@@ -180,7 +180,7 @@ static topology *build_sah(build *b, topology_build *t)
 {
     b->items = base_alloc((size_t)b->count * sizeof *b->items);
     if (!b->items) return NULL;
-    fill_fitting(b);
+    quantize_tightly(b);
     const branch_builder builder = {.build = t, .source = &b->source, .items = b->items, .count = b->count};
     return branch_build(&builder, &b->set, &b->grid);
 }
@@ -191,7 +191,7 @@ static topology *build_morton(build *b, topology_build *t)
     b->keys = base_alloc((size_t)b->count * sizeof *b->keys);
     b->other_keys = base_alloc((size_t)b->count * sizeof *b->other_keys);
     if (!b->coder || !b->keys || !b->other_keys) return NULL;
-    fill_fitting(b);
+    quantize_tightly(b);
     if (!morton_sort(b->coder, b->keys, b->other_keys, b->count, t->threads)) return NULL;
     base_free(b->other_keys);
     b->other_keys = NULL;
@@ -247,16 +247,16 @@ static topology *build_topology(build *b, int threads)
     topology_build t;
     topology *root = NULL;
     if (topology_begin(&t, b->count, threads)) {
-        root = is_by_bricks(b)                      ? build_bricks(b, &t)
+        root = uses_bricks(b)                       ? build_bricks(b, &t)
                : b->options.builder == MMBVH_MORTON ? build_morton(b, &t)
                                                     : build_sah(b, &t);
     }
     topology_end(&t);
-    if (root && !is_by_bricks(b) && !list_cells(b)) {
+    if (root && !uses_bricks(b) && !list_cells(b)) {
         topology_free(root);
         root = NULL;
     }
-    release(b);
+    free_buffers(b);
     return root;
 }
 
@@ -293,7 +293,7 @@ static bool build_nodes(build *b)
 }
 
 /* Builds the tree except for the bounds and ranges of its nodes. */
-static insitu_status make(build *b, base_error *error)
+static insitu_status build_tree(build *b, base_error *error)
 {
     const int64_t count = b->source.box_count;
     if (count > UINT32_MAX) {
@@ -307,7 +307,7 @@ static insitu_status make(build *b, base_error *error)
     return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: a tree over %lld cells", (long long)count);
 }
 
-static void finish(build *b, const sweep *ranges, mmbvh *out)
+static void finish_tree(build *b, const sweep *ranges, mmbvh *out)
 {
     const sweep s = sweep_of_both(&b->tree, &b->source, ranges);
     b->tree.unusable_cells = sweep_tree(&s, b->threads).count;
@@ -316,14 +316,14 @@ static void finish(build *b, const sweep *ranges, mmbvh *out)
     *out = b->tree;
 }
 
-static build begin(const bounds_source *source, const mmbvh_options *options)
+static build init_build(const bounds_source *source, const mmbvh_options *options)
 {
-    build b = {.source = *source, .listed = source->box_count, .threads = sweep_threads(options)};
+    build b = {.source = *source, .candidate_count = source->box_count, .threads = sweep_threads(options)};
     if (!options) return b;
     b.options = *options;
     if (source->g && options->selection) {
         b.selected = options->selection->cells;
-        b.listed = options->selection->count;
+        b.candidate_count = options->selection->count;
     }
     return b;
 }
@@ -336,11 +336,11 @@ insitu_status mmbvh_build(const grid *g, const grid_field *field, const double o
     if (!g || !origin) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree needs a grid and an origin");
     if (!(scale > 0)) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree's scale must be above 0, not %g", scale);
     const bounds_source source = bounds_source_make(g, NULL, NULL, g->cell_count, origin, scale);
-    build b = begin(&source, options);
-    const insitu_status status = make(&b, error);
+    build b = init_build(&source, options);
+    const insitu_status status = build_tree(&b, error);
     if (status) return status;
     const sweep ranges = sweep_of_ranges(&b.tree, g, field, mmbvh_own_ranges(&b.tree));
-    finish(&b, &ranges, out);
+    finish_tree(&b, &ranges, out);
     return INSITU_OK;
 }
 
@@ -354,11 +354,11 @@ insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const fl
         return base_fail(error, INSITU_ERROR_ARGUMENT, "a parent tree needs boxes and ranges");
     }
     const bounds_source source = bounds_source_make(NULL, lower, upper, count, no_shift, 1);
-    build b = begin(&source, options);
-    const insitu_status status = make(&b, error);
+    build b = init_build(&source, options);
+    const insitu_status status = build_tree(&b, error);
     if (status) return status;
     const sweep of_ranges = sweep_of_box_ranges(&b.tree, ranges);
-    finish(&b, &of_ranges, out);
+    finish_tree(&b, &of_ranges, out);
     return INSITU_OK;
 }
 

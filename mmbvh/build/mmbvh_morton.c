@@ -112,9 +112,10 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
 }
 
 /* Returns the Morton code of a box of floats. A NaN coordinate is mapped to step 0. */
-static inline uint64_t code_of_span(const sum_mapping *m, const morton_coder *coder, const fetch_span *span)
+static inline uint64_t code_of_float_box(const sum_mapping *m, const morton_coder *coder,
+                                         const fetch_float_box *float_box)
 {
-    const vec4 place = ((span->lower + span->upper) * 0.5f - m->origin) * m->factor;
+    const vec4 place = ((float_box->lower + float_box->upper) * 0.5f - m->origin) * m->factor;
     _Alignas(16) int32_t steps[4];
     *(ivec4 *)(void *)steps = vec4_truncate(vec4_min(vec4_max(place, (vec4){0}), m->most));
     return code_of_steps(coder, steps);
@@ -128,20 +129,21 @@ static int list_block(const morton_coder *coder, const uint64_t *keys, int64_t c
     return n;
 }
 
-static fetch_box place_spans(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count)
+static fetch_box place_float_boxes(const bounds_source *source, const morton_coder *coder, uint64_t *keys,
+                                   int64_t count)
 {
     uint32_t cells[BOUNDS_BLOCK];
-    fetch_span spans[BOUNDS_BLOCK], all = fetch_span_empty();
+    fetch_float_box float_boxes[BOUNDS_BLOCK], all = fetch_float_box_empty();
     const sum_mapping m = sum_mapping_make(source, coder);
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
         const int n = list_block(coder, keys + begin, count - begin, cells);
-        source->read_spans(source, cells, n, spans);
+        source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
-            fetch_span_unite(&all, &spans[i]);
-            keys[begin + i] = code_of_span(&m, coder, &spans[i]) | cells[i];
+            fetch_float_box_unite(&all, &float_boxes[i]);
+            keys[begin + i] = code_of_float_box(&m, coder, &float_boxes[i]) | cells[i];
         }
     }
-    return fetch_span_box(&all);
+    return fetch_float_box_widen(&all);
 }
 
 static fetch_box place_boxes(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count)
@@ -162,11 +164,11 @@ static fetch_box place_boxes(const bounds_source *source, const morton_coder *co
     return all;
 }
 
-void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
-                  fetch_box *exact)
+void morton_make_keys(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
+                      fetch_box *exact)
 {
-    const fetch_box all =
-        source->read_spans ? place_spans(source, coder, keys, count) : place_boxes(source, coder, keys, count);
+    const fetch_box all = source->read_float_boxes ? place_float_boxes(source, coder, keys, count)
+                                                   : place_boxes(source, coder, keys, count);
     fetch_box_unite(exact, &all);
 }
 
@@ -179,7 +181,7 @@ typedef struct digit_counts {
 } digit_counts;
 
 typedef struct sorting {
-    int64_t large; /* larger parts are sorted by all threads together */
+    int64_t large; /* parts with more keys than this are sorted by all threads together */
     int chunks, threads;
     digit_counts *counts;
 } sorting;
@@ -235,7 +237,7 @@ static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, in
     }
 }
 
-static void insert(uint64_t *keys, int64_t count)
+static void insertion_sort(uint64_t *keys, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
         const uint64_t key = keys[i];
@@ -247,10 +249,10 @@ static void insert(uint64_t *keys, int64_t count)
 
 /* Sorts the keys in `from`, either in place or to `other`, on one thread. The digit is chosen so that each of its
  * values gets a few keys. All keys must be different. */
-static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
+static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
 {
     if (count <= SORT_INSERTED) {
-        insert(from, count);
+        insertion_sort(from, count);
         if (to_other) memcpy(other, from, (size_t)count * sizeof *from);
         return;
     }
@@ -270,12 +272,12 @@ static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_o
     }
     for (int64_t i = 0; i < count; i++) other[ends[from[i] >> shift & mask]++] = from[i];
     for (uint64_t digit = 0, begin = 0; digit <= mask; begin = ends[digit++]) {
-        sort_alone(other + begin, from + begin, ends[digit] - (int64_t)begin, !to_other);
+        sort_serial(other + begin, from + begin, ends[digit] - (int64_t)begin, !to_other);
     }
 }
 
-/* Same as sort_alone(), on all threads. Keys may differ only in their lowest `top` bits. */
-static void sort_together(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
+/* Same as sort_serial(), on all threads. Keys may differ only in their lowest `top` bits. */
+static void sort_parallel(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
 {
     int64_t starts[DIGITS + 1];
     const int shift = top > DIGIT_BITS ? top - DIGIT_BITS : 0;
@@ -288,20 +290,20 @@ static void sort_together(const sorting *s, uint64_t *from, uint64_t *other, int
 #pragma omp for schedule(dynamic, 8) nowait
         for (int digit = 0; digit < DIGITS; digit++) {
             const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
-            if (size <= s->large) sort_alone(other + begin, from + begin, size, !to_other);
+            if (size <= s->large) sort_serial(other + begin, from + begin, size, !to_other);
         }
         region_leave();
     }
     for (int digit = 0; digit < DIGITS; digit++) {
         const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
-        if (size > s->large) sort_together(s, other + begin, from + begin, size, shift, !to_other);
+        if (size > s->large) sort_parallel(s, other + begin, from + begin, size, shift, !to_other);
     }
 }
 
 bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads)
 {
     if (count <= SORT_LARGE_MIN) {
-        sort_alone(keys, other, count, false);
+        sort_serial(keys, other, count, false);
         return true;
     }
     sorting s = {.threads = threads};
@@ -309,7 +311,7 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
     s.large = count / SORT_LARGE > SORT_LARGE_MIN ? count / SORT_LARGE : SORT_LARGE_MIN;
     s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->of[0]);
     if (!s.counts) return false;
-    sort_together(&s, keys, other, count, coder->index_bits + coder->code_bits, false);
+    sort_parallel(&s, keys, other, count, coder->index_bits + coder->code_bits, false);
     base_free(s.counts);
     return true;
 }
@@ -318,7 +320,7 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
 
 /* Returns the number of keys in which the highest differing bit is 0. There must be at least two keys in ascending
  * order. */
-static int64_t split_of(const uint64_t *keys, int64_t count)
+static int64_t find_split(const uint64_t *keys, int64_t count)
 {
     const int bit = bits_of(keys[0] ^ keys[count - 1]) - 1;
     const uint64_t border = keys[count - 1] >> bit << bit;
@@ -337,7 +339,7 @@ static int64_t split_of(const uint64_t *keys, int64_t count)
 static topology_link build_subtree(topology_scratch *scratch, const uint64_t *keys, int64_t first, int64_t count)
 {
     if (count <= MMBVH_MAX_LEAF) return topology_leaf(first, count);
-    const int64_t left_count = split_of(keys + first, count), pair = topology_new_pair(scratch);
+    const int64_t left_count = find_split(keys + first, count), pair = topology_new_pair(scratch);
     const topology_link left = build_subtree(scratch, keys, first, left_count);
     const topology_link right = build_subtree(scratch, keys, first + left_count, count - left_count);
     scratch->links[pair] = left;
@@ -345,23 +347,23 @@ static topology_link build_subtree(topology_scratch *scratch, const uint64_t *ke
     return topology_inner(pair);
 }
 
-static void grow(topology_build *build, topology *t, const uint64_t *keys)
+static void build_top(topology_build *build, topology *t, const uint64_t *keys)
 {
     if (atomic_load(&build->failed)) return;
     if (t->count <= TOPOLOGY_SUBTREE_CELLS) {
         topology_scratch *scratch = &build->scratch[omp_get_thread_num()];
         scratch->count = 0;
         const topology_link root = build_subtree(scratch, keys + t->first, 0, t->count);
-        topology_keep(build, t, scratch, root);
+        topology_copy_links(build, t, scratch, root);
         return;
     }
-    const int64_t left_count = split_of(keys + t->first, t->count);
+    const int64_t left_count = find_split(keys + t->first, t->count);
     for (int side = 0; side < 2; side++) {
         const int64_t begin = side ? left_count : 0, end = side ? t->count : left_count;
         topology *child = t->children[side] = topology_new(build, t->first + begin, end - begin);
         if (!child) return;
 #pragma omp task default(none) firstprivate(build, child, keys)
-        grow(build, child, keys);
+        build_top(build, child, keys);
     }
 }
 
@@ -373,7 +375,7 @@ topology *morton_build(topology_build *build, const uint64_t *keys, int64_t coun
     {
         region_enter();
 #pragma omp single
-        grow(build, root, keys);
+        build_top(build, root, keys);
         region_leave();
     }
     if (!atomic_load(&build->failed)) return root;

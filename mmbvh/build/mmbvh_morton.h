@@ -12,8 +12,8 @@ enum { MORTON_PART_BITS = 7, MORTON_PARTS = 3, MORTON_AXIS_BITS = MORTON_PART_BI
  * low ones, so that no two keys are equal. */
 typedef struct morton_coder {
     double origin[3];
-    double factor[3]; /* code steps per unit length on each axis */
-    double most[3];   /* last step on each axis */
+    double factor[3]; /* number of code steps per unit length on each axis */
+    double most[3];   /* index of the last code step on each axis */
     int index_bits;
     int code_bits;
     uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* lookup tables that spread an axis's bits over the code */
@@ -24,8 +24,8 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
 
 /* Replaces the cell indices in `keys` by Morton keys, and extends *exact by the boxes of these cells in the source's
  * coordinates. */
-void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
-                  fetch_box *exact);
+void morton_make_keys(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
+                      fetch_box *exact);
 
 /* Sorts the keys in ascending order. `other` is scratch space of the same size. Returns false if memory ran out. */
 bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads);

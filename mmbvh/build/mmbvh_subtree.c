@@ -5,7 +5,7 @@
 
 enum { COARSE = 64 }; /* number of steps along the longest side at which rounding changes an area by 3 percent */
 
-bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid)
+bool subtree_needs_finer_grid(lanes bounds, const item_grid *grid)
 {
     const lanes extent = item_extent(bounds);
     return !grid->is_finest && extent[0] < COARSE && extent[1] < COARSE && extent[2] < COARSE;
@@ -40,9 +40,9 @@ static bin_split choose(subtree *s, lanes centroids, const item *items, int64_t 
     }
 }
 
-static bool is_leaf_for_sure(const item *items, int64_t count, lanes bounds)
+static bool is_certainly_leaf(const item *items, int64_t count, lanes bounds)
 {
-    return count <= MMBVH_MAX_LEAF && !bins_worth_splitting(bins_least_cost(items, count), count, bounds);
+    return count <= MMBVH_MAX_LEAF && !bins_is_split_cheaper(bins_least_cost(items, count), count, bounds);
 }
 
 static topology_link build(subtree *s, int64_t first, int64_t count, const item_grid *grid, int depth)
@@ -51,19 +51,19 @@ static topology_link build(subtree *s, int64_t first, int64_t count, const item_
     item *items = s->items + first;
     item_set set = item_set_of(items, count);
     item_grid finer;
-    if (subtree_wants_finer_grid(set.bounds, grid)) {
+    if (subtree_needs_finer_grid(set.bounds, grid)) {
         finer = subtree_finer_grid(set.bounds, grid);
         grid = &finer;
         set = item_set_empty();
-        bounds_place(s->source, grid, items, count, &set, NULL);
+        bounds_fill_items(s->source, grid, items, count, &set, NULL);
     }
-    if (is_leaf_for_sure(items, count, set.bounds)) return topology_leaf(first, count);
+    if (is_certainly_leaf(items, count, set.bounds)) return topology_leaf(first, count);
     bin_mapping mapping;
     bin_split split = {.axis = -1, .cost = INFINITY};
     if (depth < TOPOLOGY_MEDIAN_DEPTH) split = choose(s, set.centroids, items, count, &mapping);
-    if (!bins_worth_splitting(split.cost, count, set.bounds)) return topology_leaf(first, count);
+    if (!bins_is_split_cheaper(split.cost, count, set.bounds)) return topology_leaf(first, count);
 
-    const int64_t left_count = split.axis < 0 ? count / 2 : bins_part(&mapping, split, items, count);
+    const int64_t left_count = split.axis < 0 ? count / 2 : bins_partition(&mapping, split, items, count);
     const int64_t pair = topology_new_pair(s->scratch);
     const topology_link left = build(s, first, left_count, grid, depth + 1);
     const topology_link right = build(s, first + left_count, count - left_count, grid, depth + 1);

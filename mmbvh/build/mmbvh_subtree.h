@@ -7,7 +7,7 @@
 #include "mmbvh_topology.h"
 
 /* Checks whether the grid is too coarse to separate items with these bounds. */
-bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid);
+bool subtree_needs_finer_grid(lanes bounds, const item_grid *grid);
 
 /* Returns a grid over the bounds, which are given in steps of `grid`. */
 item_grid subtree_finer_grid(lanes bounds, const item_grid *grid);

@@ -37,7 +37,7 @@ topology *topology_new(topology_build *build, int64_t first, int64_t count)
     return t;
 }
 
-void topology_keep(topology_build *build, topology *t, const topology_scratch *scratch, topology_link root)
+void topology_copy_links(topology_build *build, topology *t, const topology_scratch *scratch, topology_link root)
 {
     t->root = root;
     if (!scratch->count) return;

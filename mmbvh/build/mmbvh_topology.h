@@ -46,17 +46,17 @@ static inline int64_t topology_new_pair(topology_scratch *s)
 
 typedef struct topology {
     int64_t first, count;         /* the node's range in the tree's cell list */
-    struct topology *children[2]; /* NULL if the node is a subtree */
+    struct topology *children[2]; /* children of an inner node; NULL if the node is a subtree */
     topology_link root;
-    topology_link *links; /* nodes below the root of the subtree */
+    topology_link *links; /* all nodes of the subtree below its root */
     int64_t link_count;
 } topology;
 
 /* The data that the tasks of a build share. */
 typedef struct topology_build {
     int threads;
-    topology_scratch *scratch; /* one per thread */
-    atomic_bool failed;        /* true after an allocation failed */
+    topology_scratch *scratch; /* one scratch buffer per thread */
+    atomic_bool failed;        /* set to true after an allocation failed */
 } topology_build;
 
 /* Allocates the threads' buffers; returns false if memory ran out. topology_end() must be called in either case. */
@@ -67,7 +67,7 @@ void topology_end(topology_build *build);
 topology *topology_new(topology_build *build, int64_t first, int64_t count);
 
 /* Copies the links in the thread's scratch to t, as the subtree with this root. */
-void topology_keep(topology_build *build, topology *t, const topology_scratch *scratch, topology_link root);
+void topology_copy_links(topology_build *build, topology *t, const topology_scratch *scratch, topology_link root);
 
 int64_t topology_node_count(const topology *t);
 

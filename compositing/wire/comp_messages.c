@@ -4,16 +4,16 @@
  * nonblocking barrier and continues to receive until all ranks have entered it; then no message is in flight (Hoefler,
  * Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse Data Exchange, 2010). This needs no exchange
  * of counts, only one barrier. */
-#include "comp_mail.h"
+#include "comp_messages.h"
 
 #include <string.h>
 
 #include "comp_agree.h"
 #include "memory.h"
 
-enum { TAG_ROUND = 32, TAG_FOLD = 8, NO_MORE_BYTES = COMP_MESSAGE_HEAD };
+enum { TAG_ROUND = 32, TAG_FOLD = 8, LAST_MESSAGE_BYTES = COMP_MESSAGE_HEAD };
 
-static const unsigned char no_more[NO_MORE_BYTES] = {0};
+static const unsigned char last_message[LAST_MESSAGE_BYTES] = {0};
 
 /* ---- messages ------------------------------------------------------------------------------------------------ */
 
@@ -54,7 +54,7 @@ static bool add_message(comp_writer *w, size_t bytes)
     *m = (comp_message){NULL, w->rank, COMP_MESSAGE_HEAD};
     memset(m->data, 0, COMP_MESSAGE_HEAD);
     comp_messages_append(&w->messages, &(comp_messages){m, m});
-    w->room = bytes;
+    w->capacity = bytes;
     w->parcel = 0;
     return true;
 }
@@ -72,11 +72,11 @@ static uint32_t owner_of(const comp_writer *w)
     return owner;
 }
 
-unsigned char *comp_writer_room(comp_writer *w, uint32_t owner, size_t bytes, size_t expected)
+unsigned char *comp_writer_reserve(comp_writer *w, uint32_t owner, size_t bytes, size_t expected)
 {
-    if (!w->messages.last || (size_t)w->messages.last->bytes + COMP_PARCEL_HEAD + bytes > w->room) {
-        const size_t wished = COMP_MESSAGE_HEAD + COMP_PARCEL_HEAD + (expected > bytes ? expected : bytes);
-        if (!add_message(w, wished < COMP_MESSAGE_BYTES ? wished : COMP_MESSAGE_BYTES)) return NULL;
+    if (!w->messages.last || (size_t)w->messages.last->bytes + COMP_PARCEL_HEAD + bytes > w->capacity) {
+        const size_t wanted = COMP_MESSAGE_HEAD + COMP_PARCEL_HEAD + (expected > bytes ? expected : bytes);
+        if (!add_message(w, wanted < COMP_MESSAGE_BYTES ? wanted : COMP_MESSAGE_BYTES)) return NULL;
     }
     comp_message *const m = w->messages.last;
     if (!w->parcel || owner_of(w) != owner) {
@@ -98,32 +98,32 @@ void comp_writer_commit(comp_writer *w, unsigned char *end, uint32_t records)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-insitu_status comp_mailroom_open(MPI_Comm comm, comp_mailroom *out, base_error *error)
+insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error *error)
 {
-    *out = (comp_mailroom){.comm = comm};
+    *out = (comp_transport){.comm = comm};
     MPI_Comm_rank(comm, &out->rank);
-    out->waste = base_alloc(COMP_MESSAGE_BYTES + COMP_SHEET_SLACK);
-    out->reserve = base_alloc(COMP_LONGEST_DENSE * sizeof(MPI_Request));
+    out->receive_buffer = base_alloc(COMP_MESSAGE_BYTES + COMP_SHEET_SLACK);
+    out->reserved_requests = base_alloc(COMP_LONGEST_DENSE * sizeof(MPI_Request));
     out->sheet = base_alloc(sizeof *out->sheet);
-    if (out->waste && out->reserve && out->sheet) return INSITU_OK;
-    comp_mailroom_close(out);
+    if (out->receive_buffer && out->reserved_requests && out->sheet) return INSITU_OK;
+    comp_transport_close(out);
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for messages (%d bytes)", COMP_MESSAGE_BYTES);
 }
 
-void comp_mailroom_close(comp_mailroom *room)
+void comp_transport_close(comp_transport *transport)
 {
-    base_free(room->waste);
-    base_free(room->reserve);
-    base_free(room->sheet);
-    *room = (comp_mailroom){0};
+    base_free(transport->receive_buffer);
+    base_free(transport->reserved_requests);
+    base_free(transport->sheet);
+    *transport = (comp_transport){0};
 }
 
 /* The state of one round on this rank. */
 typedef struct round {
-    comp_mailroom *room;
+    comp_transport *transport;
     int tag;
     bool is_sparse;
-    int open; /* number of partners that have not sent their last message; 0 in a sparse round */
+    int open_partners; /* number of partners that have not sent their last message; 0 in a sparse round */
     comp_messages *in;
     MPI_Request *requests;
     int request_count;
@@ -137,7 +137,7 @@ static void fail_memory(round *r, int bytes)
         r->status = base_fail(r->error, INSITU_ERROR_MEMORY, "compositing: no memory for a message of %d bytes", bytes);
 }
 
-static void check(round *r, int code)
+static void check_mpi(round *r, int code)
 {
     if (code != MPI_SUCCESS && r->status == INSITU_OK) r->status = comp_mpi_status(code, r->error);
 }
@@ -145,10 +145,10 @@ static void check(round *r, int code)
 static void send(round *r, const unsigned char *data, int bytes, int rank)
 {
     MPI_Request *const request = &r->requests[r->request_count++];
-    check(r, r->is_sparse ? MPI_Issend(data, bytes, MPI_BYTE, rank, r->tag, r->room->comm, request)
-                          : MPI_Isend(data, bytes, MPI_BYTE, rank, r->tag, r->room->comm, request));
-    r->room->sent_bytes += bytes;
-    r->room->sent_messages++;
+    check_mpi(r, r->is_sparse ? MPI_Issend(data, bytes, MPI_BYTE, rank, r->tag, r->transport->comm, request)
+                              : MPI_Isend(data, bytes, MPI_BYTE, rank, r->tag, r->transport->comm, request));
+    r->transport->sent_bytes += bytes;
+    r->transport->sent_messages++;
 }
 
 /* Allocates a request for each message. If memory runs out, the preallocated requests are used and the fragments are
@@ -161,7 +161,7 @@ static void make_requests(round *r, comp_messages *out, int partners)
     if (r->requests) return;
     fail_memory(r, count * (int)sizeof *r->requests);
     comp_messages_free(out);
-    r->requests = r->room->reserve;
+    r->requests = r->transport->reserved_requests;
 }
 
 /* Receives a message that MPI_Mprobe() or MPI_Improbe() has matched. If there is no memory for it, it is discarded. */
@@ -174,9 +174,9 @@ static void receive(round *r, MPI_Message *found, const MPI_Status *status)
         m = base_alloc(sizeof *m + (size_t)bytes + COMP_SHEET_SLACK);
         if (!m) fail_memory(r, bytes);
     }
-    unsigned char *const data = m ? m->data : r->room->waste;
-    check(r, MPI_Mrecv(data, bytes, MPI_BYTE, found, MPI_STATUS_IGNORE));
-    r->open -= !data[0];
+    unsigned char *const data = m ? m->data : r->transport->receive_buffer;
+    check_mpi(r, MPI_Mrecv(data, bytes, MPI_BYTE, found, MPI_STATUS_IGNORE));
+    r->open_partners -= !data[0];
     if (!m) return;
     m->next = NULL;
     m->rank = status->MPI_SOURCE;
@@ -186,36 +186,36 @@ static void receive(round *r, MPI_Message *found, const MPI_Status *status)
 
 static void receive_dense(round *r)
 {
-    while (r->open > 0) {
+    while (r->open_partners > 0) {
         MPI_Message found;
         MPI_Status status;
-        const int code = MPI_Mprobe(MPI_ANY_SOURCE, r->tag, r->room->comm, &found, &status);
-        check(r, code);
+        const int code = MPI_Mprobe(MPI_ANY_SOURCE, r->tag, r->transport->comm, &found, &status);
+        check_mpi(r, code);
         if (code != MPI_SUCCESS) return;
         receive(r, &found, &status);
     }
-    check(r, MPI_Waitall(r->request_count, r->requests, MPI_STATUSES_IGNORE));
+    check_mpi(r, MPI_Waitall(r->request_count, r->requests, MPI_STATUSES_IGNORE));
 }
 
 static void receive_sparse(round *r)
 {
     MPI_Request barrier = MPI_REQUEST_NULL;
     int is_over = 0, code = MPI_SUCCESS;
-    for (bool is_within = false; !is_over && code == MPI_SUCCESS;) {
+    for (bool is_in_barrier = false; !is_over && code == MPI_SUCCESS;) {
         int is_there = 0, are_sent = 0;
         MPI_Message found;
         MPI_Status status;
-        code = MPI_Improbe(MPI_ANY_SOURCE, r->tag, r->room->comm, &is_there, &found, &status);
+        code = MPI_Improbe(MPI_ANY_SOURCE, r->tag, r->transport->comm, &is_there, &found, &status);
         if (code == MPI_SUCCESS && is_there) receive(r, &found, &status);
-        if (code == MPI_SUCCESS && is_within) {
+        if (code == MPI_SUCCESS && is_in_barrier) {
             code = MPI_Test(&barrier, &is_over, MPI_STATUS_IGNORE);
         } else if (code == MPI_SUCCESS) {
             code = MPI_Testall(r->request_count, r->requests, &are_sent, MPI_STATUSES_IGNORE);
-            if (code == MPI_SUCCESS && are_sent) code = MPI_Ibarrier(r->room->comm, &barrier);
-            is_within = are_sent;
+            if (code == MPI_SUCCESS && are_sent) code = MPI_Ibarrier(r->transport->comm, &barrier);
+            is_in_barrier = are_sent;
         }
     }
-    check(r, code);
+    check_mpi(r, code);
 }
 
 /* Marks the last message to the rank as the last one; returns false if there is no message to the rank. */
@@ -231,48 +231,53 @@ static bool mark_last(const comp_messages *out, int rank)
     return last != NULL;
 }
 
-static insitu_status run(round *r, comp_messages *out)
+static insitu_status run_round(round *r, comp_messages *out)
 {
     for (const comp_message *m = out->first; m; m = m->next) send(r, m->data, m->bytes, m->rank);
     if (r->is_sparse)
         receive_sparse(r);
     else
         receive_dense(r);
-    if (r->requests != r->room->reserve) base_free(r->requests);
+    if (r->requests != r->transport->reserved_requests) base_free(r->requests);
     comp_messages_free(out);
     if (r->status) comp_messages_free(r->in);
     return r->status;
 }
 
-insitu_status comp_mail_round(comp_mailroom *room, const comp_route *route, int number, comp_messages *out,
-                              comp_messages *in, insitu_status status, base_error *error)
+insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int number, comp_messages *out,
+                                  comp_messages *in, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, room->rank), stride = comp_route_stride(route, number);
+    const int place = comp_route_place(route, transport->rank), stride = comp_route_stride(route, number);
     const bool takes_part = place < route->owners;
     const int partners = takes_part ? route->radix[number] - 1 : 0;
-    round r = {.room = room, .tag = TAG_ROUND + number, .in = in, .status = status, .error = error};
+    round r = {.transport = transport, .tag = TAG_ROUND + number, .in = in, .status = status, .error = error};
     r.is_sparse = !comp_route_is_dense(route, number);
     if (!takes_part && !r.is_sparse) return status;
     make_requests(&r, out, partners);
-    if (!r.is_sparse) r.open = partners;
+    if (!r.is_sparse) r.open_partners = partners;
     const int own = comp_route_digit(route, number, stride, place);
     for (int i = 1; i <= partners && !r.is_sparse; i++) {
         const int digit = (own + i) % route->radix[number];
         const int rank = comp_route_rank(route, comp_route_partner(route, number, stride, place, digit));
-        if (!mark_last(out, rank)) send(&r, no_more, NO_MORE_BYTES, rank);
+        if (!mark_last(out, rank)) send(&r, last_message, LAST_MESSAGE_BYTES, rank);
     }
-    return run(&r, out);
+    return run_round(&r, out);
 }
 
-insitu_status comp_mail_fold(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *in,
-                             insitu_status status, base_error *error)
+insitu_status comp_messages_fold(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                 comp_messages *in, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, room->rank);
-    const bool gives = place >= route->owners, takes = place + route->owners < route->ranks;
-    round r = {.room = room, .tag = TAG_FOLD, .in = in, .open = takes, .status = status, .error = error};
-    if (!gives && !takes) return status;
+    const int place = comp_route_place(route, transport->rank);
+    const bool sends_all = place >= route->owners, receives_all = place + route->owners < route->ranks;
+    round r = {.transport = transport,
+               .tag = TAG_FOLD,
+               .in = in,
+               .open_partners = receives_all,
+               .status = status,
+               .error = error};
+    if (!sends_all && !receives_all) return status;
     make_requests(&r, out, 1);
-    const int partner = gives ? comp_route_rank(route, place - route->owners) : 0;
-    if (gives && !mark_last(out, partner)) send(&r, no_more, NO_MORE_BYTES, partner);
-    return run(&r, out);
+    const int partner = sends_all ? comp_route_rank(route, place - route->owners) : 0;
+    if (sends_all && !mark_last(out, partner)) send(&r, last_message, LAST_MESSAGE_BYTES, partner);
+    return run_round(&r, out);
 }

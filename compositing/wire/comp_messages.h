@@ -4,8 +4,8 @@
  *
  * A message is at most COMP_MESSAGE_BYTES long. A rank that runs out of memory can therefore still receive it in a
  * buffer allocated beforehand, and discard it, so that no rank waits. */
-#ifndef COMP_COMP_MAIL_H
-#define COMP_COMP_MAIL_H
+#ifndef COMP_COMP_MESSAGES_H
+#define COMP_COMP_MESSAGES_H
 
 #include <mpi.h>
 #include <stdbool.h>
@@ -19,8 +19,8 @@ enum { COMP_MESSAGE_BYTES = 1 << 17, COMP_MESSAGE_HEAD = 4, COMP_PARCEL_HEAD = 1
 
 typedef struct comp_message {
     struct comp_message *next;
-    int rank;  /* source or destination */
-    int bytes; /* size of data in use, without the slack behind it */
+    int rank;  /* rank of the message's source or destination */
+    int bytes; /* number of valid bytes in data, without the slack behind them */
     unsigned char data[];
 } comp_message;
 
@@ -46,38 +46,39 @@ bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *
 typedef struct comp_writer {
     comp_messages messages;
     int rank;
-    size_t room;   /* capacity of the last message in bytes */
-    size_t parcel; /* offset of the last parcel in the last message; 0 if there is none */
+    size_t capacity; /* capacity of the last message in bytes */
+    size_t parcel;   /* offset of the last parcel in the last message; 0 if there is none */
 } comp_writer;
 
 /* Returns space for this number of bytes in a parcel for the owner, or NULL if memory ran out. `expected` estimates how
  * many bytes will be written in total; it determines the size of a new message. */
-unsigned char *comp_writer_room(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
+unsigned char *comp_writer_reserve(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
 /* Completes the data that was written up to `end`, which contains this number of records. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
 /* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */
-typedef struct comp_mailroom {
+typedef struct comp_transport {
     MPI_Comm comm;
     int rank;
-    unsigned char *waste; /* COMP_MESSAGE_BYTES long: receives messages for which there is no memory */
-    MPI_Request *reserve; /* one request per partner of the longest dense round */
-    comp_sheet *sheet;    /* scratch in which rank 0 unpacks pixels */
+    unsigned char *receive_buffer; /* COMP_MESSAGE_BYTES long: receives forwarded messages, and those for which there is
+                                      no memory */
+    MPI_Request *reserved_requests; /* one MPI request per partner of the longest dense round */
+    comp_sheet *sheet;              /* scratch sheet in which rank 0 unpacks pixels */
     int64_t sent_bytes, sent_messages;
-} comp_mailroom;
+} comp_transport;
 
-insitu_status comp_mailroom_open(MPI_Comm comm, comp_mailroom *out, base_error *error);
-void comp_mailroom_close(comp_mailroom *room);
+insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error *error);
+void comp_transport_close(comp_transport *transport);
 
 /* Runs one round: sends the messages in `out`; *in receives the messages of other ranks, which the caller must free.
  * `status` is this rank's status before the call; if it is an error, nothing is sent and received messages are
  * discarded. Returns this rank's own status. Collective. */
-insitu_status comp_mail_round(comp_mailroom *room, const comp_route *route, int round, comp_messages *out,
-                              comp_messages *in, insitu_status status, base_error *error);
+insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
+                                  comp_messages *in, insitu_status status, base_error *error);
 
 /* Runs before the first round: ranks beyond the owners send all their fragments to their partners. */
-insitu_status comp_mail_fold(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *in,
-                             insitu_status status, base_error *error);
+insitu_status comp_messages_fold(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                 comp_messages *in, insitu_status status, base_error *error);
 
 #endif
