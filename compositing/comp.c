@@ -216,7 +216,7 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     return status ? status : composite(&c, items, &none, error);
 }
 
-/* ---- overlaps ------------------------------------------------------------------------------------------------ */
+/* ---- overlaps --------------------------------------------------------------------------------------------------- */
 
 /* Distributes to all ranks the set of pixels in which owners found overlaps. */
 static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)

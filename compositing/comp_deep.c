@@ -11,7 +11,7 @@
 
 enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
 
-/* ---- on the owner --------------------------------------------------------------------------------------------- */
+/* ---- on the owner ----------------------------------------------------------------------------------------------- */
 
 /* Ensures space for one more item; returns false if memory ran out. */
 static bool reserve(void **items, int64_t count, int64_t *capacity, size_t size)
@@ -67,7 +67,7 @@ void comp_deep_free(comp_deep_list *lists, int count)
     }
 }
 
-/* ---- to rank 0 ------------------------------------------------------------------------------------------------ */
+/* ---- to rank 0 -------------------------------------------------------------------------------------------------- */
 
 static int send_items(MPI_Comm comm, int tag, const void *items, int64_t count, size_t size)
 {

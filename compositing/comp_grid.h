@@ -88,7 +88,7 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
     return (y + at / COMP_LANES) * grid->width + x + at % COMP_LANES;
 }
 
-/* ---- who owns a block ---------------------------------------------------------------------------------------- */
+/* ---- who owns a block ------------------------------------------------------------------------------------------- */
 
 /* A rank's claim to a block. The combined claim of all ranks has the largest vote and the sum of the fragments. */
 typedef struct comp_claim {

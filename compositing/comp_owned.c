@@ -34,7 +34,7 @@ static bool reserve(fragment_list *list, int64_t count)
     return true;
 }
 
-/* ---- joined -------------------------------------------------------------------------------------------------- */
+/* ---- joined ----------------------------------------------------------------------------------------------------- */
 
 /* Marks a pixel as one whose fragments are listed, and counts its fragment in the sheet first. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
@@ -112,7 +112,7 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
     return true;
 }
 
-/* ---- listed -------------------------------------------------------------------------------------------------- */
+/* ---- listed ----------------------------------------------------------------------------------------------------- */
 
 /* Returns the next mixed pixel, starting with index from, or COMP_STRIP_PIXELS if there is none. */
 static uint32_t next_mixed(const merge_scratch *m, uint32_t from)
@@ -165,7 +165,7 @@ static void blend_listed(const comp_grid *grid, const comp_merge_output *merged,
     }
 }
 
-/* ---- strips -------------------------------------------------------------------------------------------------- */
+/* ---- strips ----------------------------------------------------------------------------------------------------- */
 
 /* Writes the pixels of a strip. Strips without pixels are sent too, in a few bytes, so that rank 0 fills them with the
  * background. */

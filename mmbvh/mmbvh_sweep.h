@@ -76,7 +76,7 @@ static inline sweep_sum sweep_add(sweep_sum a, sweep_sum b)
 /* Checks whether the sweep visits the node's descendants. */
 bool sweep_visits(const sweep *s, int64_t node);
 
-/* ---- ranges of nodes --------------------------------------------------------------------------------------------- */
+/* ---- ranges of nodes -------------------------------------------------------------------------------------------- */
 
 typedef struct range {
     float low, high;

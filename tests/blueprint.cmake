@@ -1,4 +1,4 @@
-# The doors for Conduit's Mesh Blueprint and for Catalyst, on a stand-in of the functions that they call.
+# The adaptors for Conduit's Mesh Blueprint and for Catalyst, on a stand-in of the functions that they call.
 add_library(test_blueprint_fixture OBJECT conduit_stand_in.c test_blueprint_layouts.c)
 target_link_libraries(test_blueprint_fixture PUBLIC test_session_fixture PRIVATE insitu_quick_flags)
 

@@ -1,6 +1,6 @@
-/* A stand-in of the few functions of Conduit's C API that the doors call, by the same names: Debian has no Conduit. A
- * node is a name, children, or an array in memory of the test's. As Conduit throws where a path is missing or a node is
- * of another type, this ends the process. */
+/* A stand-in of the few functions of Conduit's C API that the adaptors call, by the same names: Debian has no Conduit.
+ * A node is a name, children, or an array in memory of the test's. As Conduit throws where a path is missing or a node
+ * is of another type, this ends the process. */
 #ifndef CONDUIT_STAND_IN_H
 #define CONDUIT_STAND_IN_H
 #define CONDUIT_NODE_H /* as Conduit's own header */

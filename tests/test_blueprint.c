@@ -35,38 +35,38 @@ static const char *write_scene_of(const layout_case *layout)
     return write_scene(layout->field_count == 3 ? scene : scene_of_two);
 }
 
-/* A session with a door. */
+/* A session with a Blueprint adaptor. */
 typedef struct doorway {
     insitu_session *session;
-    insitu_blueprint *door;
+    insitu_blueprint *adaptor;
 } doorway;
 
 static doorway open_door(const char *path)
 {
     doorway d = {open_session(MPI_COMM_WORLD, path), NULL};
-    everywhere(insitu_blueprint_create(d.session, &insitu_conduit_functions, MPI_COMM_WORLD, &d.door) == INSITU_OK);
+    everywhere(insitu_blueprint_create(d.session, &insitu_conduit_functions, MPI_COMM_WORLD, &d.adaptor) == INSITU_OK);
     return d;
 }
 
 static void close_door(doorway *d)
 {
-    insitu_blueprint_destroy(&d->door);
+    insitu_blueprint_destroy(&d->adaptor);
     everywhere(insitu_destroy(&d->session) == INSITU_OK);
 }
 
 static void step_well(doorway *d)
 {
     forget_pictures();
-    const insitu_status status = insitu_blueprint_step(d->door, NULL, NULL);
-    if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->door));
+    const insitu_status status = insitu_blueprint_step(d->adaptor, NULL, NULL);
+    if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->adaptor));
     everywhere(status == INSITU_OK);
     everywhere(insitu_last_report(d->session)->images == 1 && caught_count == (own_rank == 0));
 }
 
 static void set_well(doorway *d, const char *name, const conduit_node *node)
 {
-    const insitu_status status = insitu_blueprint_set(d->door, name, node);
-    if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->door));
+    const insitu_status status = insitu_blueprint_set(d->adaptor, name, node);
+    if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->adaptor));
     everywhere(status == INSITU_OK);
 }
 
@@ -103,7 +103,7 @@ static void each_layout_is_the_plain_header_s(void **state)
             if (packed) stand_in_pack(layout.node);
             set_well(&d, "", layout.node);
             step_well(&d);
-            const insitu_blueprint_report *report = insitu_blueprint_last_report(d.door);
+            const insitu_blueprint_report *report = insitu_blueprint_last_report(d.adaptor);
             caught_picture picture = take_caught();
             const bool is_same = own_rank || same_pictures(&picture, &truth);
             if (!is_same) fprintf(stderr, "%s%s: another picture\n", layout_kinds[i].name, packed ? ", packed" : "");
@@ -121,7 +121,7 @@ static void each_layout_is_the_plain_header_s(void **state)
     }
 }
 
-/* Types that are read in place: neither the door nor the session copies more than of the plain header's arrays. */
+/* Types that are read in place: neither the adaptor nor the session copies more than of the plain header's arrays. */
 static void what_the_header_says_is_not_copied(void **state)
 {
     (void)state;
@@ -139,7 +139,7 @@ static void what_the_header_says_is_not_copied(void **state)
             doorway d = open_door(path);
             set_well(&d, "", layout.node);
             step_well(&d);
-            everywhere(insitu_blueprint_last_report(d.door)->bytes_copied == 0);
+            everywhere(insitu_blueprint_last_report(d.adaptor)->bytes_copied == 0);
             if (insitu_last_report(d.session)->bytes_copied > copied)
                 fprintf(stderr, "%s: %s\n", names[n], insitu_last_report(d.session)->copied_why);
             everywhere(insitu_last_report(d.session)->bytes_copied <= copied);
@@ -150,7 +150,7 @@ static void what_the_header_says_is_not_copied(void **state)
         }
 }
 
-/* ---- several domains, names and steps ---------------------------------------------------------------------------- */
+/* ---- several domains, names and steps --------------------------------------------------------------------------- */
 
 /* Moves what one node has below another, whose it then is. */
 static void adopt(conduit_node *parent, const char *path, conduit_node *child)
@@ -183,7 +183,7 @@ static void domains_are_meshes_of_their_own(void **state)
     caught_picture picture = take_caught();
     const bool is_same = own_rank || same_pictures(&picture, &truth);
     everywhere(is_same);
-    everywhere(insitu_blueprint_last_report(d.door)->meshes == 2);
+    everywhere(insitu_blueprint_last_report(d.adaptor)->meshes == 2);
     free_caught(&picture);
     free_caught(&truth);
     close_door(&d);
@@ -284,7 +284,7 @@ static void cycles_are_counted(void **state)
     layout_free(&l);
 }
 
-/* ---- what is left out -------------------------------------------------------------------------------------------- */
+/* ---- what is left out ------------------------------------------------------------------------------------------- */
 
 typedef void spoil_node(conduit_node *node);
 
@@ -376,14 +376,14 @@ static void what_is_left_out_is_named(void **state)
         layout_make(find_layout(c->layout), &layout);
         c->spoil(layout.node);
         doorway d = open_door(path);
-        const insitu_status status = insitu_blueprint_set(d.door, "grid", layout.node);
-        insitu_blueprint_step(d.door, NULL, NULL);
-        const insitu_blueprint_report *r = insitu_blueprint_last_report(d.door);
+        const insitu_status status = insitu_blueprint_set(d.adaptor, "grid", layout.node);
+        insitu_blueprint_step(d.adaptor, NULL, NULL);
+        const insitu_blueprint_report *r = insitu_blueprint_last_report(d.adaptor);
         const bool is_well =
             !status && strstr(r->left_out, c->words) && r->meshes == c->meshes && r->fields == c->fields;
         if (!is_well)
             fprintf(stderr, "%s: \"%s\", %d meshes, %d fields: %s\n", c->words, r->left_out, r->meshes, r->fields,
-                    insitu_blueprint_error(d.door));
+                    insitu_blueprint_error(d.adaptor));
         everywhere(is_well);
         forget_pictures();
         close_door(&d);

@@ -194,12 +194,12 @@ static bool check_message(const char *message, const node_fault *f, const char *
     return is_well;
 }
 
-/* The door keeps no trace of the wrong node. */
-static void draw_mended(insitu_session *session, insitu_blueprint *door, const conduit_node *node)
+/* The adaptor keeps no trace of the wrong node. */
+static void draw_mended(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
 {
     forget_pictures();
-    everywhere(insitu_blueprint_set(door, "grid", node) == INSITU_OK);
-    everywhere(insitu_blueprint_step(door, NULL, NULL) == INSITU_OK);
+    everywhere(insitu_blueprint_set(adaptor, "grid", node) == INSITU_OK);
+    everywhere(insitu_blueprint_step(adaptor, NULL, NULL) == INSITU_OK);
     everywhere(insitu_last_report(session)->images == 1 && caught_count == (own_rank == 0));
 }
 
@@ -214,21 +214,22 @@ static void wrong_nodes_are_told_to_all(void **state)
         const node_fault *f = &faults[i];
         layout_case right, wrong;
         insitu_session *session = open_session(MPI_COMM_WORLD, path);
-        insitu_blueprint *door = NULL;
-        everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &door) == INSITU_OK);
+        insitu_blueprint *adaptor = NULL;
+        everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor) == INSITU_OK);
         layout_make(find_layout(f->layout), &right);
         layout_make(find_layout(f->layout), &wrong);
         if (own_rank == bad) spoil(wrong.node, f);
         forget_pictures();
-        const insitu_status at_once = insitu_blueprint_set(door, "grid", wrong.node);
-        const bool is_told = own_rank != bad ? !at_once : at_once && check_message(insitu_blueprint_error(door), f, "");
+        const insitu_status at_once = insitu_blueprint_set(adaptor, "grid", wrong.node);
+        const bool is_told =
+            own_rank != bad ? !at_once : at_once && check_message(insitu_blueprint_error(adaptor), f, "");
         everywhere(is_told);
-        const insitu_status status = insitu_blueprint_step(door, NULL, NULL);
+        const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
         if (status != f->status) fprintf(stderr, "%s, %s: status %d\n", f->layout, f->path, (int)status);
-        everywhere(status == f->status && check_message(insitu_blueprint_error(door), f, rank));
+        everywhere(status == f->status && check_message(insitu_blueprint_error(adaptor), f, rank));
         everywhere(caught_count == 0);
-        draw_mended(session, door, right.node);
-        insitu_blueprint_destroy(&door);
+        draw_mended(session, adaptor, right.node);
+        insitu_blueprint_destroy(&adaptor);
         insitu_destroy(&session);
         layout_free(&right);
         layout_free(&wrong);
@@ -245,16 +246,16 @@ static void wrong_indices_are_told_to_all(void **state)
     static const node_fault f = {"tets", "topologies/mesh/elements/connectivity", ENTRY, "", 4000, 5, MESH, ""};
     layout_case layout;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    insitu_blueprint *door = NULL;
-    insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &door);
+    insitu_blueprint *adaptor = NULL;
+    insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor);
     layout_make(find_layout("tets"), &layout);
     spoil(layout.node, &f);
-    everywhere(insitu_blueprint_set(door, "grid", layout.node) == INSITU_OK);
-    const insitu_status status = insitu_blueprint_step(door, NULL, NULL);
-    const char *message = insitu_blueprint_error(door);
+    everywhere(insitu_blueprint_set(adaptor, "grid", layout.node) == INSITU_OK);
+    const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
+    const char *message = insitu_blueprint_error(adaptor);
     everywhere(status == INSITU_ERROR_MESH && strstr(message, "mesh \"grid/mesh\": cell 1 (tet)") &&
                strstr(message, "4000"));
-    insitu_blueprint_destroy(&door);
+    insitu_blueprint_destroy(&adaptor);
     insitu_destroy(&session);
     layout_free(&layout);
     free((void *)(uintptr_t)replaced);
@@ -265,20 +266,21 @@ static void doors_need_what_they_stand_on(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    insitu_blueprint *door = (insitu_blueprint *)(void *)session;
-    everywhere(insitu_blueprint_create(NULL, &insitu_conduit_functions, MPI_COMM_WORLD, &door) ==
+    insitu_blueprint *adaptor = (insitu_blueprint *)(void *)session;
+    everywhere(insitu_blueprint_create(NULL, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor) ==
                INSITU_ERROR_ARGUMENT);
-    everywhere(!door && strstr(insitu_blueprint_error(NULL), "no session"));
-    everywhere(insitu_blueprint_create(session, NULL, MPI_COMM_WORLD, &door) == INSITU_ERROR_ARGUMENT && !door);
-    everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &door) == INSITU_OK);
-    everywhere(insitu_blueprint_set(door, NULL, NULL) == INSITU_ERROR_ARGUMENT);
+    everywhere(!adaptor && strstr(insitu_blueprint_error(NULL), "no session"));
+    everywhere(insitu_blueprint_create(session, NULL, MPI_COMM_WORLD, &adaptor) == INSITU_ERROR_ARGUMENT && !adaptor);
+    everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor) == INSITU_OK);
+    everywhere(insitu_blueprint_set(adaptor, NULL, NULL) == INSITU_ERROR_ARGUMENT);
     everywhere(insitu_blueprint_set(NULL, "", NULL) == INSITU_ERROR_ARGUMENT);
     everywhere(insitu_blueprint_step(NULL, NULL, NULL) == INSITU_ERROR_ARGUMENT);
-    insitu_blueprint_refuse(door, INSITU_ERROR_FIELD, "the code's own reason");
-    const insitu_status status = insitu_blueprint_step(door, NULL, NULL);
-    everywhere(status == INSITU_ERROR_FIELD && strstr(insitu_blueprint_error(door), "rank 0: the code's own reason"));
-    insitu_blueprint_destroy(&door);
-    insitu_blueprint_destroy(&door);
+    insitu_blueprint_refuse(adaptor, INSITU_ERROR_FIELD, "the code's own reason");
+    const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
+    everywhere(status == INSITU_ERROR_FIELD &&
+               strstr(insitu_blueprint_error(adaptor), "rank 0: the code's own reason"));
+    insitu_blueprint_destroy(&adaptor);
+    insitu_blueprint_destroy(&adaptor);
     insitu_blueprint_destroy(NULL);
     insitu_destroy(&session);
 }

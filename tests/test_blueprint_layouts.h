@@ -25,7 +25,7 @@ typedef void layout_function(layout_case *out);
 typedef struct layout_kind {
     const char *name;
     layout_function *make;
-    bool is_copied; /* the door copies something, because the node lacks it */
+    bool is_copied; /* the adaptor copies something, because the node lacks it */
 } layout_kind;
 
 extern const layout_kind layout_kinds[];

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "catalyst_door.h"
+#include "catalyst_adaptor.h"
 #include "conduit_stand_in.h"
 #include "insitu/conduit.h"
 #include "test_blueprint_layouts.h"
@@ -35,7 +35,7 @@ static const catalyst_writer writer = {set_string, set_integer, set_real};
 
 static insitu_status initialize(conduit_node *node)
 {
-    const insitu_status status = catalyst_door_initialize(&insitu_conduit_functions, node);
+    const insitu_status status = catalyst_adaptor_initialize(&insitu_conduit_functions, node);
     conduit_node_destroy(node);
     return status;
 }
@@ -48,11 +48,11 @@ static conduit_node *with_scene(void)
     return node;
 }
 
-/* The door's results. */
+/* The adaptor's results. */
 static conduit_node *results(void)
 {
     conduit_node *node = conduit_node_create();
-    catalyst_door_results(&writer, node);
+    catalyst_adaptor_results(&writer, node);
     return node;
 }
 
@@ -111,7 +111,7 @@ static void scenes_are_found(void **state)
         if (way == 2) conduit_node_set_path_char8_str(node, "catalyst/scripts/second/filename", path);
         if (way == 3) setenv("INSITU_SCENE", path, 1);
         everywhere(initialize(node) == INSITU_OK);
-        everywhere(catalyst_door_finalize() == INSITU_OK);
+        everywhere(catalyst_adaptor_finalize() == INSITU_OK);
     }
     unsetenv("INSITU_SCENE");
     everywhere(initialize(conduit_node_create()) == INSITU_ERROR_SCENE);
@@ -142,12 +142,12 @@ static void channels_are_drawn(void **state)
     put_channel(node, "parts", "multimesh", "data/walls", &b);
     put_channel(node, "levels", "amrmesh", "data/domain_000000", &c);
     forget_pictures();
-    everywhere(catalyst_door_execute(node) == INSITU_OK && has_drawn(1));
+    everywhere(catalyst_adaptor_execute(node) == INSITU_OK && has_drawn(1));
     conduit_node *out = results();
     everywhere(number_of(out, "insitu/cycle") == 7 && number_of(out, "insitu/images") == 1);
     everywhere(has_word(out, "insitu/status", "INSITU_OK") && has_word(out, "insitu/error", ""));
     conduit_node_destroy(out);
-    everywhere(catalyst_door_finalize() == INSITU_OK);
+    everywhere(catalyst_adaptor_finalize() == INSITU_OK);
     conduit_node_destroy(node);
     layout_free(&a);
     layout_free(&b);
@@ -159,7 +159,7 @@ static void errors_are_the_same_everywhere(void **state)
     (void)state;
     layout_case l;
     layout_make(&layout_kinds[0], &l);
-    everywhere(catalyst_door_execute(NULL) == INSITU_ERROR_ARGUMENT);
+    everywhere(catalyst_adaptor_execute(NULL) == INSITU_ERROR_ARGUMENT);
     everywhere(initialize(with_scene()) == INSITU_OK);
     conduit_node *node = at_step(0);
     put_channel(node, "grid", "mesh", "data", &l);
@@ -170,7 +170,7 @@ static void errors_are_the_same_everywhere(void **state)
         if (is_last && wrong == 1) conduit_node_set_path_float64(node, "catalyst/state/timestep", 1);
         if (is_last && wrong == 2)
             conduit_node_set_path_int64(node, "catalyst/channels/grid/data/topologies/mesh/type", 3);
-        const insitu_status status = catalyst_door_execute(node);
+        const insitu_status status = catalyst_adaptor_execute(node);
         everywhere(status == INSITU_ERROR_MESH && has_drawn(0));
         conduit_node *out = results();
         everywhere(has_word(out, "insitu/error",
@@ -181,9 +181,9 @@ static void errors_are_the_same_everywhere(void **state)
         conduit_node_set_path_char8_str(node, "catalyst/channels/grid/type", "mesh");
         conduit_node_set_path_int64(node, "catalyst/state/timestep", wrong + 1);
         conduit_node_set_path_char8_str(node, "catalyst/channels/grid/data/topologies/mesh/type", "uniform");
-        everywhere(catalyst_door_execute(node) == INSITU_OK && has_drawn(1));
+        everywhere(catalyst_adaptor_execute(node) == INSITU_OK && has_drawn(1));
     }
-    everywhere(catalyst_door_finalize() == INSITU_OK);
+    everywhere(catalyst_adaptor_finalize() == INSITU_OK);
     conduit_node_destroy(node);
     layout_free(&l);
 }
@@ -197,16 +197,16 @@ static void parameters_are_results(void **state)
     everywhere(initialize(node) == INSITU_OK);
     node = at_step(0);
     forget_pictures();
-    catalyst_door_execute(node); /* nothing is there to be drawn */
+    catalyst_adaptor_execute(node); /* nothing is there to be drawn */
     conduit_node *out = results();
     everywhere(number_of(out, "insitu/parameters/inflow") == 2.5 && number_of(out, "insitu/parameters/outflow") == 3);
     conduit_node_destroy(out);
     out = conduit_node_create();
-    catalyst_door_about(&writer, out);
+    catalyst_adaptor_about(&writer, out);
     everywhere(has_word(out, "catalyst/implementation", "insitu"));
     conduit_node_destroy(out);
     conduit_node_destroy(node);
-    everywhere(catalyst_door_finalize() == INSITU_OK);
+    everywhere(catalyst_adaptor_finalize() == INSITU_OK);
 }
 
 int main(int argc, char **argv)

@@ -30,7 +30,7 @@ static const shape *find_shape(const char *name)
 
 static bool fail_shape(const node *of, const char *path, const char *name)
 {
-    return node_fail(
+    return node_set_error(
         of, path, INSITU_ERROR_MESH,
         "is \"%s\", expected tri, quad, polygonal, tet, hex, wedge, pyramid, polyhedral, mixed, point or line", name);
 }
@@ -42,12 +42,13 @@ static bool find_integers(const node *parent, const char *path, node_array *out)
     *out = (node_array){.count = -1};
     if (!node_find(parent, path, &found)) return true;
     if (!node_read_array(&found, out)) return false;
-    return node_is_integers(out) || out->count == 0 || node_fail(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
+    return node_is_integers(out) || out->count == 0 ||
+           node_set_error(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
 }
 
-static bool need_integers(const node *parent, const char *path, node_array *out)
+static bool require_integers(const node *parent, const char *path, node_array *out)
 {
-    if (!node_has(parent, path)) return node_fail(parent, path, INSITU_ERROR_MESH, "is missing");
+    if (!node_has(parent, path)) return node_set_error(parent, path, INSITU_ERROR_MESH, "is missing");
     return find_integers(parent, path, out);
 }
 
@@ -66,17 +67,17 @@ static int64_t row_size(const row_list *rows, int64_t i)
 }
 
 /* Computes the offsets if the node has none. */
-static bool make_offsets(const node *of, row_list *rows, door_owned *owned)
+static bool make_offsets(const node *of, row_list *rows, owned_arrays *owned)
 {
     const int64_t bytes = rows->count * (int64_t)sizeof(int64_t);
-    int64_t *offsets = door_own(of, owned, bytes), sum = 0;
+    int64_t *offsets = owned_arrays_add(of, owned, bytes), sum = 0;
     if (!offsets) return false;
     for (int64_t i = 0; i < rows->count; i++) {
         offsets[i] = sum;
         sum += row_size(rows, i);
     }
     rows->offsets = (node_array){{offsets, INSITU_INT64, 0}, rows->count};
-    node_note_copy(of, "offsets", bytes, "made from sizes, as the node has none");
+    node_report_copy(of, "offsets", bytes, "made from sizes, as the node has none");
     return true;
 }
 
@@ -87,10 +88,10 @@ static bool check_offsets(const node *of, const row_list *rows)
         const int64_t first = node_element(&rows->offsets.array, i), size = row_size(rows, i);
         const int64_t next = i + 1 < rows->count ? node_element(&rows->offsets.array, i + 1) : rows->connectivity.count;
         if (first < 0 || size < 0 || first > rows->connectivity.count || size > rows->connectivity.count - first)
-            return node_fail(of, "offsets", INSITU_ERROR_MESH, "entry %lld: %lld and size %lld, outside 0..%lld",
-                             (long long)i, (long long)first, (long long)size, (long long)rows->connectivity.count);
+            return node_set_error(of, "offsets", INSITU_ERROR_MESH, "entry %lld: %lld and size %lld, outside 0..%lld",
+                                  (long long)i, (long long)first, (long long)size, (long long)rows->connectivity.count);
         if (first + size != next)
-            return node_fail(
+            return node_set_error(
                 of, "offsets", INSITU_ERROR_MESH,
                 "entry %lld: %lld and size %lld, but the next begins at %lld: lists must follow one another",
                 (long long)i, (long long)first, (long long)size, (long long)next);
@@ -99,30 +100,31 @@ static bool check_offsets(const node *of, const row_list *rows)
 }
 
 /* Reads lists of different lengths from a node `elements` or `subelements`. */
-static bool read_rows(const node *of, row_list *rows, door_owned *owned)
+static bool read_rows(const node *of, row_list *rows, owned_arrays *owned)
 {
-    if (!need_integers(of, "connectivity", &rows->connectivity)) return false;
+    if (!require_integers(of, "connectivity", &rows->connectivity)) return false;
     if (!find_integers(of, "sizes", &rows->sizes) || !find_integers(of, "offsets", &rows->offsets)) return false;
-    if (rows->sizes.count < 0 && !rows->vertices) return node_fail(of, "sizes", INSITU_ERROR_MESH, "is missing");
+    if (rows->sizes.count < 0 && !rows->vertices) return node_set_error(of, "sizes", INSITU_ERROR_MESH, "is missing");
     rows->count = rows->sizes.count >= 0 ? rows->sizes.count : rows->connectivity.count / rows->vertices;
     if (rows->offsets.count >= 0 && rows->offsets.count != rows->count)
-        return node_fail(of, "offsets", INSITU_ERROR_MESH, "has %lld elements, expected %lld",
-                         (long long)rows->offsets.count, (long long)rows->count);
+        return node_set_error(of, "offsets", INSITU_ERROR_MESH, "has %lld elements, expected %lld",
+                              (long long)rows->offsets.count, (long long)rows->count);
     if (rows->offsets.count < 0 && !make_offsets(of, rows, owned)) return false;
     return check_offsets(of, rows);
 }
 
 /* Reads the faces of polyhedra, which may be polygonal, all of one shape, or mixed. */
-static bool read_faces(const node *topology, door_mesh *out)
+static bool read_faces(const node *topology, blueprint_mesh *out)
 {
     node faces;
     const char *name = NULL;
     row_list rows = {.vertices = 0};
-    if (!node_need(topology, "subelements", &faces) || !node_string(&faces, "shape", &name)) return false;
+    if (!node_require(topology, "subelements", &faces) || !node_string(&faces, "shape", &name)) return false;
     const shape *of = find_shape(name);
     if (!of && strcmp(name, "mixed") != 0) return fail_shape(&faces, "shape", name);
     if (of && of->type != INSITU_POLYGON && of->type != INSITU_TRIANGLE && of->type != INSITU_QUAD)
-        return node_fail(&faces, "shape", INSITU_ERROR_MESH, "is \"%s\", expected tri, quad, polygonal or mixed", name);
+        return node_set_error(&faces, "shape", INSITU_ERROR_MESH, "is \"%s\", expected tri, quad, polygonal or mixed",
+                              name);
     rows.vertices = of ? of->vertices : 0;
     if (!read_rows(&faces, &rows, &out->owned)) return false;
     out->mesh.face_count = rows.count;
@@ -135,13 +137,13 @@ static bool read_faces(const node *topology, door_mesh *out)
 /* ---- cells of several types ------------------------------------------------------------------------------------- */
 
 /* Reads the map from shape numbers to cell types. *are_vtk is set to true if all numbers are VTK's cell types. */
-static bool read_map(const node *elements, door_mesh *out, bool *are_vtk)
+static bool read_map(const node *elements, blueprint_mesh *out, bool *are_vtk)
 {
     node map;
     if (!node_find(elements, "shape_map", &map) && !node_find(elements, "shapes_map", &map))
-        return node_fail(elements, "shape_map", INSITU_ERROR_MESH, "is missing");
+        return node_set_error(elements, "shape_map", INSITU_ERROR_MESH, "is missing");
     out->type_map = calloc(MAP_SIZE, sizeof *out->type_map);
-    if (!out->type_map) return node_fail(&map, "", INSITU_ERROR_MEMORY, "no memory for a table");
+    if (!out->type_map) return node_set_error(&map, "", INSITU_ERROR_MEMORY, "no memory for a table");
     *are_vtk = true;
     for (int64_t i = 0; i < node_child_count(&map); i++) {
         node entry;
@@ -151,7 +153,8 @@ static bool read_map(const node *elements, door_mesh *out, bool *are_vtk)
         if (!of) return fail_shape(&map, entry.name, entry.name);
         if (!node_integer(&map, entry.name, true, &number)) return false;
         if (number < 0 || number >= MAP_SIZE)
-            return node_fail(&entry, "", INSITU_ERROR_MESH, "is %lld, expected 0..%d", (long long)number, MAP_SIZE - 1);
+            return node_set_error(&entry, "", INSITU_ERROR_MESH, "is %lld, expected 0..%d", (long long)number,
+                                  MAP_SIZE - 1);
         out->type_map[number] = of->type;
         *are_vtk = *are_vtk && number == of->type;
         if (number >= out->mesh.cell_type_map_count) out->mesh.cell_type_map_count = (int)number + 1;
@@ -160,25 +163,26 @@ static bool read_map(const node *elements, door_mesh *out, bool *are_vtk)
 }
 
 /* Checks that the map contains every cell's number. A topology that contains points or lines is left out. */
-static bool check_numbers(const node *elements, const node_array *numbers, door_mesh *out, bool *has_polyhedra)
+static bool check_shape_numbers(const node *elements, const node_array *numbers, blueprint_mesh *out,
+                                bool *has_polyhedra)
 {
     for (int64_t i = 0; i < numbers->count; i++) {
         const int64_t number = node_element(&numbers->array, i);
         const int type = number >= 0 && number < MAP_SIZE ? out->type_map[number] : 0;
         if (!type)
-            return node_fail(elements, "shapes", INSITU_ERROR_MESH, "entry %lld is %lld, which shape_map does not have",
-                             (long long)i, (long long)number);
+            return node_set_error(elements, "shapes", INSITU_ERROR_MESH,
+                                  "entry %lld is %lld, which shape_map does not have", (long long)i, (long long)number);
         *has_polyhedra = *has_polyhedra || type == INSITU_POLYHEDRON;
         if (type != SHAPE_POINT && type != SHAPE_LINE) continue;
-        node_leave_out(elements, "shapes", "entry %lld is a %s, and points and lines are not drawn", (long long)i,
-                       type == SHAPE_POINT ? "point" : "line");
+        node_report_left_out(elements, "shapes", "entry %lld is a %s, and points and lines are not drawn", (long long)i,
+                             type == SHAPE_POINT ? "point" : "line");
         out->is_left_out = true;
         break;
     }
     return true;
 }
 
-static void take_rows(const row_list *rows, door_mesh *out)
+static void set_cell_rows(const row_list *rows, blueprint_mesh *out)
 {
     out->mesh.cell_count = rows->count;
     out->mesh.offsets = rows->offsets.array;
@@ -186,19 +190,19 @@ static void take_rows(const row_list *rows, door_mesh *out)
     out->mesh.connectivity_count = rows->connectivity.count;
 }
 
-static bool read_mixed(const node *topology, const node *elements, door_mesh *out)
+static bool read_mixed(const node *topology, const node *elements, blueprint_mesh *out)
 {
     node_array numbers;
     row_list rows = {.vertices = 0};
     bool are_vtk = false, has_polyhedra = false;
-    if (!need_integers(elements, "shapes", &numbers) || !read_map(elements, out, &are_vtk)) return false;
-    if (!check_numbers(elements, &numbers, out, &has_polyhedra)) return false;
+    if (!require_integers(elements, "shapes", &numbers) || !read_map(elements, out, &are_vtk)) return false;
+    if (!check_shape_numbers(elements, &numbers, out, &has_polyhedra)) return false;
     if (out->is_left_out) return true;
     if (!read_rows(elements, &rows, &out->owned)) return false;
     if (numbers.count != rows.count)
-        return node_fail(elements, "shapes", INSITU_ERROR_MESH, "has %lld elements, sizes has %lld",
-                         (long long)numbers.count, (long long)rows.count);
-    take_rows(&rows, out);
+        return node_set_error(elements, "shapes", INSITU_ERROR_MESH, "has %lld elements, sizes has %lld",
+                              (long long)numbers.count, (long long)rows.count);
+    set_cell_rows(&rows, out);
     out->mesh.cell_types = numbers.array;
     out->mesh.cell_type_map = are_vtk ? NULL : out->type_map;
     if (are_vtk) out->mesh.cell_type_map_count = 0;
@@ -207,30 +211,31 @@ static bool read_mixed(const node *topology, const node *elements, door_mesh *ou
 
 /* ---- cells of one type ------------------------------------------------------------------------------------------ */
 
-static bool read_fixed(const node *elements, const shape *of, door_mesh *out)
+static bool read_fixed(const node *elements, const shape *of, blueprint_mesh *out)
 {
     row_list rows = {.vertices = of->vertices, .sizes = {.count = -1}};
-    if (!need_integers(elements, "connectivity", &rows.connectivity)) return false;
+    if (!require_integers(elements, "connectivity", &rows.connectivity)) return false;
     if (rows.connectivity.count % of->vertices != 0)
-        return node_fail(elements, "connectivity", INSITU_ERROR_MESH, "has %lld elements, no multiple of a %s's %d",
-                         (long long)rows.connectivity.count, of->name, of->vertices);
+        return node_set_error(elements, "connectivity", INSITU_ERROR_MESH,
+                              "has %lld elements, no multiple of a %s's %d", (long long)rows.connectivity.count,
+                              of->name, of->vertices);
     if (!find_integers(elements, "offsets", &rows.offsets)) return false;
     rows.count = rows.offsets.count >= 0 ? rows.offsets.count : rows.connectivity.count / of->vertices;
     if (rows.offsets.count >= 0 && !check_offsets(elements, &rows)) return false;
     rows.offsets = (node_array){.count = 0}; /* not needed: check_offsets() found them equal to the regular offsets */
-    take_rows(&rows, out);
+    set_cell_rows(&rows, out);
     return true;
 }
 
-bool door_read_unstructured(const node *topology, door_mesh *out)
+bool blueprint_read_unstructured(const node *topology, blueprint_mesh *out)
 {
     node elements;
     const char *name;
     out->mesh.open_offsets = 1;
-    if (!node_need(topology, "elements", &elements)) return false;
+    if (!node_require(topology, "elements", &elements)) return false;
     if (node_has(&elements, "element_types") || node_has(&elements, "stream")) {
-        node_leave_out(&elements, "element_types",
-                       "the old form of mixed cells is not read: give shapes and a shape_map");
+        node_report_left_out(&elements, "element_types",
+                             "the old form of mixed cells is not read: give shapes and a shape_map");
         out->is_left_out = true;
         return true;
     }
@@ -239,7 +244,7 @@ bool door_read_unstructured(const node *topology, door_mesh *out)
     const shape *of = find_shape(name);
     if (!of) return fail_shape(&elements, "shape", name);
     if (of->type == SHAPE_POINT || of->type == SHAPE_LINE) {
-        node_leave_out(&elements, "shape", "is \"%s\": points and lines are not drawn", name);
+        node_report_left_out(&elements, "shape", "is \"%s\": points and lines are not drawn", name);
         out->is_left_out = true;
         return true;
     }
@@ -247,6 +252,6 @@ bool door_read_unstructured(const node *topology, door_mesh *out)
     if (of->vertices) return read_fixed(&elements, of, out);
     row_list rows = {.vertices = 0};
     if (!read_rows(&elements, &rows, &out->owned)) return false;
-    take_rows(&rows, out);
+    set_cell_rows(&rows, out);
     return of->type != INSITU_POLYHEDRON || read_faces(topology, out);
 }

@@ -6,20 +6,20 @@
 #include <string.h>
 
 /* A field of the topology. */
-typedef struct door_field {
+typedef struct blueprint_field {
     node at, values;
     bool is_element;
     int64_t first;      /* index of the first vertex's or cell's tuple in the array */
     int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
-} door_field;
+} blueprint_field;
 
 /* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. */
-enum { VTK_HIDING = 1 | 8 | 32 };
+enum { VTK_HIDDEN_BITS = 1 | 8 | 32 };
 
 /* ---- which fields ----------------------------------------------------------------------------------------------- */
 
 /* Checks whether state/metadata/vtk_fields declares the field as ghost flags. */
-static bool is_called_ghosts(const node *domain, const char *name)
+static bool is_declared_ghosts(const node *domain, const char *name)
 {
     node states, state;
     const char *attribute;
@@ -30,12 +30,12 @@ static bool is_called_ghosts(const node *domain, const char *name)
 
 static bool is_ghosts(const node *domain, const char *name)
 {
-    return strcmp(name, "vtkGhostType") == 0 || strcmp(name, "ascent_ghosts") == 0 || is_called_ghosts(domain, name);
+    return strcmp(name, "vtkGhostType") == 0 || strcmp(name, "ascent_ghosts") == 0 || is_declared_ghosts(domain, name);
 }
 
 /* Checks whether the field belongs to the topology. Fields of other topologies are ignored even if they contain
  * errors. */
-static bool is_on(const node *field, const char *topology)
+static bool belongs_to(const node *field, const char *topology)
 {
     const char *name;
     if (!node_string(field, "topology", &name)) return false;
@@ -44,24 +44,24 @@ static bool is_on(const node *field, const char *topology)
 
 /* Finds the values and association of a field. Returns false if the field is invalid (which sets the error) or is left
  * out (which is reported if `tells`). */
-static bool find_field(const node *field, door_field *out, bool tells)
+static bool find_field(const node *field, blueprint_field *out, bool reports_left_out)
 {
     const char *association;
     if (!node_has(field, "association") && node_has(field, "basis")) {
-        if (tells) node_leave_out(field, "basis", "fields by a basis are not read");
+        if (reports_left_out) node_report_left_out(field, "basis", "fields by a basis are not read");
         return false;
     }
     if (!node_has(field, "values") && node_has(field, "matset_values")) {
-        if (tells) node_leave_out(field, "values", "values of materials alone are not read");
+        if (reports_left_out) node_report_left_out(field, "values", "values of materials alone are not read");
         return false;
     }
     if (!node_string(field, "association", &association)) return false;
     out->at = *field;
     out->is_element = strcmp(association, "element") == 0;
     if (!out->is_element && strcmp(association, "vertex") != 0)
-        return node_fail(field, "association", INSITU_ERROR_FIELD, "is \"%s\", expected vertex or element",
-                         association);
-    return node_need(&out->at, "values", &out->values);
+        return node_set_error(field, "association", INSITU_ERROR_FIELD, "is \"%s\", expected vertex or element",
+                              association);
+    return node_require(&out->at, "values", &out->values);
 }
 
 /* Iterates over the fields of a topology. next_field() returns false behind the last field, or if a field is
@@ -69,10 +69,10 @@ static bool find_field(const node *field, door_field *out, bool tells)
 typedef struct field_walk {
     const node *domain;
     const char *topology;
-    bool tells; /* reports fields that are left out */
+    bool reports_left_out; /* reports fields that are left out */
     node fields, field;
     int64_t next;
-    door_field found;
+    blueprint_field found;
 } field_walk;
 
 static bool next_field(field_walk *w)
@@ -80,14 +80,14 @@ static bool next_field(field_walk *w)
     if (w->next == 0 && !node_find(w->domain, "fields", &w->fields)) return false;
     while (w->next < node_child_count(&w->fields)) {
         node_child(&w->fields, w->next++, &w->field);
-        w->found = (door_field){.first = 0};
-        if (is_on(&w->field, w->topology) && find_field(&w->field, &w->found, w->tells)) return true;
+        w->found = (blueprint_field){.first = 0};
+        if (belongs_to(&w->field, w->topology) && find_field(&w->field, &w->found, w->reports_left_out)) return true;
         if (w->domain->log->status) return false;
     }
     return false;
 }
 
-uint64_t door_field_names(const node *domain, const char *topology)
+uint64_t blueprint_hash_field_names(const node *domain, const char *topology)
 {
     uint64_t sum = 0;
     for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
@@ -98,10 +98,10 @@ uint64_t door_field_names(const node *domain, const char *topology)
     return sum;
 }
 
-/* ---- strides of lattices ----------------------------------------------------------------------------------------- */
+/* ---- strides of lattices ---------------------------------------------------------------------------------------- */
 
 /* Returns the number of cells or vertices along each axis, at least 1. */
-static void counts_of(const door_mesh *mesh, bool is_element, int64_t counts[3])
+static void element_counts(const blueprint_mesh *mesh, bool is_element, int64_t counts[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         const int64_t cells = mesh->lattice.cells[axis];
@@ -110,11 +110,11 @@ static void counts_of(const door_mesh *mesh, bool is_element, int64_t counts[3])
 }
 
 /* Reads the field's offsets and strides; without them the field is packed. */
-static bool read_order(const door_mesh *mesh, door_field *field)
+static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
 {
     int64_t counts[3], offsets[3] = {0, 0, 0};
     int count = 0;
-    counts_of(mesh, field->is_element, counts);
+    element_counts(mesh, field->is_element, counts);
     field->strides[0] = 1;
     field->strides[1] = counts[0];
     field->strides[2] = counts[0] * counts[1];
@@ -124,15 +124,15 @@ static bool read_order(const door_mesh *mesh, door_field *field)
         for (int axis = count; axis < 3; axis++) field->strides[axis] = field->strides[axis - 1] * counts[axis - 1];
     for (int axis = 0; axis < 3; axis++) {
         if (field->strides[axis] < 1 || offsets[axis] < 0)
-            return node_fail(&field->at, field->strides[axis] < 1 ? "strides" : "offsets", INSITU_ERROR_FIELD,
-                             "has %lld", (long long)(field->strides[axis] < 1 ? field->strides : offsets)[axis]);
+            return node_set_error(&field->at, field->strides[axis] < 1 ? "strides" : "offsets", INSITU_ERROR_FIELD,
+                                  "has %lld", (long long)(field->strides[axis] < 1 ? field->strides : offsets)[axis]);
         field->first += offsets[axis] * field->strides[axis];
     }
     return !field->at.log->status;
 }
 
 /* Checks whether the strides are equal along all axes with more than one element. */
-static bool is_same_order(const int64_t counts[3], const int64_t a[3], const int64_t b[3])
+static bool have_same_strides(const int64_t counts[3], const int64_t a[3], const int64_t b[3])
 {
     bool is_same = true;
     for (int axis = 0; axis < 3; axis++) is_same = is_same && (counts[axis] == 1 || a[axis] == b[axis]);
@@ -140,83 +140,84 @@ static bool is_same_order(const int64_t counts[3], const int64_t a[3], const int
 }
 
 /* Checks whether the field's strides are those of the mesh's vertices or cells. */
-static bool has_order(const door_mesh *mesh, const door_field *field)
+static bool has_mesh_strides(const blueprint_mesh *mesh, const blueprint_field *field)
 {
     int64_t counts[3];
     if (!mesh->mesh.lattice) return true;
-    counts_of(mesh, field->is_element, counts);
-    return is_same_order(counts, field->strides,
-                         field->is_element ? mesh->lattice.cell_strides : mesh->lattice.vertex_strides);
+    element_counts(mesh, field->is_element, counts);
+    return have_same_strides(counts, field->strides,
+                             field->is_element ? mesh->lattice.cell_strides : mesh->lattice.vertex_strides);
 }
 
 /* Sets the cell strides of a lattice to those of its first element field. */
-static void take_cell_order(door_mesh *mesh, const door_field *field)
+static void set_cell_strides(blueprint_mesh *mesh, const blueprint_field *field)
 {
     int64_t counts[3];
-    if (!mesh->mesh.lattice || mesh->has_cell_order) return;
-    counts_of(mesh, true, counts);
+    if (!mesh->mesh.lattice || mesh->has_cell_strides) return;
+    element_counts(mesh, true, counts);
     memcpy(mesh->lattice.cell_strides, field->strides, sizeof field->strides);
-    mesh->mesh.cell_count = door_reach(counts, field->strides);
-    mesh->has_cell_order = true;
+    mesh->mesh.cell_count = blueprint_element_span(counts, field->strides);
+    mesh->has_cell_strides = true;
 }
 
-/* ---- arrays ------------------------------------------------------------------------------------------------------ */
+/* ---- arrays ----------------------------------------------------------------------------------------------------- */
 
 /* Describes the array of one component, beginning with the mesh's first vertex or cell. */
-static bool read_component(const node *values, const door_mesh *mesh, const door_field *field, insitu_array *out)
+static bool read_component(const node *values, const blueprint_mesh *mesh, const blueprint_field *field,
+                           insitu_array *out)
 {
     node_array array;
     const int64_t needed = field->is_element ? mesh->mesh.cell_count : mesh->mesh.vertex_count;
     if (!node_read_array(values, &array)) return false;
     const bool is_whole = !mesh->mesh.lattice && array.count != needed;
     if (is_whole || array.count < field->first + needed)
-        return node_fail(values, "", INSITU_ERROR_FIELD, "has %lld elements, the topology has %lld %s%s",
-                         (long long)array.count, (long long)needed, field->is_element ? "elements" : "vertices",
-                         field->first ? ", after the field's offsets" : "");
+        return node_set_error(values, "", INSITU_ERROR_FIELD, "has %lld elements, the topology has %lld %s%s",
+                              (long long)array.count, (long long)needed, field->is_element ? "elements" : "vertices",
+                              field->first ? ", after the field's offsets" : "");
     *out = array.array;
     if (out->data) out->data = (const char *)out->data + field->first * out->stride_bytes;
     return true;
 }
 
-/* ---- ghosts ------------------------------------------------------------------------------------------------------ */
+/* ---- ghosts ----------------------------------------------------------------------------------------------------- */
 
 /* Returns new flags of the mesh's cells, owned by the adaptor: 1 where `flags` has a bit of the mask, otherwise 0. NULL
  * if memory ran out. */
-static unsigned char *own_flags(const node *of, door_mesh *mesh, const insitu_array *flags, int64_t mask)
+static unsigned char *make_flags(const node *of, blueprint_mesh *mesh, const insitu_array *flags, int64_t mask)
 {
-    unsigned char *own = door_own(of, &mesh->owned, mesh->mesh.cell_count);
+    unsigned char *own = owned_arrays_add(of, &mesh->owned, mesh->mesh.cell_count);
     for (int64_t i = 0; own && i < mesh->mesh.cell_count && flags->data; i++)
         own[i] = (node_element(flags, i) & mask) != 0;
     return own;
 }
 
-static bool take_flags(const door_field *field, door_mesh *mesh)
+static bool set_ghost_flags(const blueprint_field *field, blueprint_mesh *mesh)
 {
     node_array array;
     insitu_array flags;
     if (!node_read_array(&field->values, &array)) return false;
     if (!node_is_integers(&array))
-        return node_fail(&field->values, "", INSITU_ERROR_FIELD, "are no whole numbers, as flags of ghosts are");
+        return node_set_error(&field->values, "", INSITU_ERROR_FIELD, "are no whole numbers, as flags of ghosts are");
     if (!read_component(&field->values, mesh, field, &flags)) return false;
     int64_t any = 0;
     for (int64_t i = 0; i < mesh->mesh.cell_count && flags.data; i++) any |= node_element(&flags, i);
     mesh->mesh.ghosts = any ? flags : (insitu_array){0};
-    if (strcmp(field->at.name, "ascent_ghosts") == 0 || !(any & ~(int64_t)VTK_HIDING)) return true;
-    unsigned char *own = own_flags(&field->at, mesh, &flags, VTK_HIDING);
+    if (strcmp(field->at.name, "ascent_ghosts") == 0 || !(any & ~(int64_t)VTK_HIDDEN_BITS)) return true;
+    unsigned char *own = make_flags(&field->at, mesh, &flags, VTK_HIDDEN_BITS);
     if (!own) return false;
-    node_note_copy(&field->at, "values", mesh->mesh.cell_count, "the flags that hide a cell");
+    node_report_copy(&field->at, "values", mesh->mesh.cell_count, "the flags that hide a cell");
     mesh->mesh.ghosts = (insitu_array){own, INSITU_UINT8, 0};
     return true;
 }
 
 /* Reads the range of cells of a window, as indices in the domain. *fits is set to whether the range lies in the
  * domain. */
-static bool read_window(const node *window, const door_mesh *mesh, int64_t first[3], int64_t end[3], bool *fits)
+static bool read_window(const node *window, const blueprint_mesh *mesh, int64_t first[3], int64_t end[3], bool *fits)
 {
     static const char *const origins[3] = {"origin/i", "origin/j", "origin/k"};
     static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
     int64_t counts[3];
-    counts_of(mesh, true, counts);
+    element_counts(mesh, true, counts);
     *fits = true;
     for (int axis = 0; axis < 3; axis++) {
         int64_t count = 1;
@@ -229,7 +230,7 @@ static bool read_window(const node *window, const door_mesh *mesh, int64_t first
     return true;
 }
 
-static void mark_cells(const int64_t strides[3], const int64_t first[3], const int64_t end[3], unsigned char *flags)
+static void flag_cells(const int64_t strides[3], const int64_t first[3], const int64_t end[3], unsigned char *flags)
 {
     for (int64_t k = first[2]; k < end[2]; k++)
         for (int64_t j = first[1]; j < end[1]; j++)
@@ -238,68 +239,69 @@ static void mark_cells(const int64_t strides[3], const int64_t first[3], const i
 
 /* Sets the ghost flags of the cells that finer domains cover, according to the windows of the nestset. Some codes write
  * windows in vertices, or in indices of another level; windows that do not fit the domain are left out. */
-static bool cover_cells(const node *nestset, door_mesh *mesh)
+static bool flag_covered_cells(const node *nestset, blueprint_mesh *mesh)
 {
     node windows, window;
     const char *kind;
     unsigned char *flags = NULL;
     int64_t first[3], end[3];
     bool fits;
-    if (!node_need(nestset, "windows", &windows)) return false;
+    if (!node_require(nestset, "windows", &windows)) return false;
     for (int64_t i = 0; i < node_child_count(&windows); i++) {
         node_child(&windows, i, &window);
         if (!node_string(&window, "domain_type", &kind)) return false;
         if (strcmp(kind, "child") != 0) continue;
         if (!read_window(&window, mesh, first, end, &fits)) return false;
         if (!fits) {
-            node_leave_out(&window, "",
-                           "is not within the domain's own cells: the cells that a child covers are drawn too");
+            node_report_left_out(&window, "",
+                                 "is not within the domain's own cells: the cells that a child covers are drawn too");
             continue;
         }
-        if (!flags) flags = own_flags(nestset, mesh, &mesh->mesh.ghosts, -1);
+        if (!flags) flags = make_flags(nestset, mesh, &mesh->mesh.ghosts, -1);
         if (!flags) return false;
-        mark_cells(mesh->lattice.cell_strides, first, end, flags);
+        flag_cells(mesh->lattice.cell_strides, first, end, flags);
     }
     if (!flags) return true;
-    node_note_copy(nestset, "windows", mesh->mesh.cell_count, "flags of the cells that other domains refine");
+    node_report_copy(nestset, "windows", mesh->mesh.cell_count, "flags of the cells that other domains refine");
     mesh->mesh.ghosts = (insitu_array){flags, INSITU_UINT8, 0};
     return true;
 }
 
-static bool read_nestsets(const node *domain, const char *topology, door_mesh *mesh)
+static bool read_nestsets(const node *domain, const char *topology, blueprint_mesh *mesh)
 {
     node nestsets, nestset;
     if (!mesh->mesh.lattice || !node_find(domain, "nestsets", &nestsets)) return true;
     for (int64_t i = 0; i < node_child_count(&nestsets); i++) {
         node_child(&nestsets, i, &nestset);
-        if (is_on(&nestset, topology) && !cover_cells(&nestset, mesh)) return false;
+        if (belongs_to(&nestset, topology) && !flag_covered_cells(&nestset, mesh)) return false;
         if (domain->log->status) return false;
     }
     return true;
 }
 
-bool door_read_ghosts(const node *domain, const char *topology, door_mesh *mesh)
+bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_mesh *mesh)
 {
     for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
         if (!w.found.is_element) continue;
-        if (!read_order(mesh, &w.found)) return false;
-        take_cell_order(mesh, &w.found);
-        if (has_order(mesh, &w.found) && is_ghosts(domain, w.field.name) && !take_flags(&w.found, mesh)) return false;
+        if (!read_strides(mesh, &w.found)) return false;
+        set_cell_strides(mesh, &w.found);
+        if (has_mesh_strides(mesh, &w.found) && is_ghosts(domain, w.field.name) && !set_ghost_flags(&w.found, mesh))
+            return false;
         if (domain->log->status) return false;
     }
     return !domain->log->status && read_nestsets(domain, topology, mesh);
 }
 
-/* ---- values ------------------------------------------------------------------------------------------------------ */
+/* ---- values ----------------------------------------------------------------------------------------------------- */
 
 /* Describes the field's components in an array, which the caller must free. NULL after an error. */
-static insitu_array *read_values(const door_field *field, const door_mesh *mesh, int *count)
+static insitu_array *read_values(const blueprint_field *field, const blueprint_mesh *mesh, int *count)
 {
     const int64_t children = node_child_count(&field->values);
     *count = children ? (int)children : 1;
     insitu_array *out = calloc((size_t)*count, sizeof *out);
     bool is_read = out != NULL;
-    if (!out) node_fail(&field->values, "", INSITU_ERROR_MEMORY, "no memory for %d components", *count);
+    if (!out) node_set_error(&field->values, "", INSITU_ERROR_MEMORY, "no memory for %d components", *count);
     if (out && !children) is_read = read_component(&field->values, mesh, field, out);
     for (int i = 0; i < children && is_read; i++) {
         node component;
@@ -311,7 +313,8 @@ static insitu_array *read_values(const door_field *field, const door_mesh *mesh,
     return NULL;
 }
 
-static bool set_field(const door_field *field, const door_mesh *mesh, insitu_session *session, const char *name)
+static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, insitu_session *session,
+                      const char *name)
 {
     insitu_field given;
     int components;
@@ -328,21 +331,21 @@ static bool set_field(const door_field *field, const door_mesh *mesh, insitu_ses
         given.components = values;
     const insitu_status status = insitu_set_field(session, name, &given);
     free(values);
-    return !status || node_fail(&field->at, "", status, "%s", insitu_error(session));
+    return !status || node_set_error(&field->at, "", status, "%s", insitu_error(session));
 }
 
-bool door_set_fields(const node *domain, const char *topology, const door_mesh *mesh, insitu_session *session,
-                     const char *name, int *count)
+bool blueprint_set_fields(const node *domain, const char *topology, const blueprint_mesh *mesh, insitu_session *session,
+                          const char *name, int *count)
 {
-    for (field_walk w = {.domain = domain, .topology = topology, .tells = true}; next_field(&w);) {
+    for (field_walk w = {.domain = domain, .topology = topology, .reports_left_out = true}; next_field(&w);) {
         if (is_ghosts(domain, w.field.name)) {
-            if (!w.found.is_element) node_leave_out(&w.field, "values", "ghosts at vertices are not read");
+            if (!w.found.is_element) node_report_left_out(&w.field, "values", "ghosts at vertices are not read");
             continue;
         }
-        if (!read_order(mesh, &w.found)) return false;
-        if (!has_order(mesh, &w.found)) {
-            node_leave_out(&w.field, "strides", "has other strides than the %s of the topology",
-                           w.found.is_element ? "other element fields" : "vertices");
+        if (!read_strides(mesh, &w.found)) return false;
+        if (!has_mesh_strides(mesh, &w.found)) {
+            node_report_left_out(&w.field, "strides", "has other strides than the %s of the topology",
+                                 w.found.is_element ? "other element fields" : "vertices");
             continue;
         }
         if (!set_field(&w.found, mesh, session, name)) return false;

@@ -71,7 +71,7 @@ static bool are_interleaved(const insitu_array coordinates[3])
     return are;
 }
 
-uint64_t door_hash_places(const insitu_mesh *mesh)
+uint64_t blueprint_hash_coordinates(const insitu_mesh *mesh)
 {
     const insitu_array *c = mesh->coordinates;
     uint64_t sum = 1;
@@ -89,7 +89,7 @@ uint64_t door_hash_places(const insitu_mesh *mesh)
     return sum;
 }
 
-uint64_t door_hash_cells(const insitu_mesh *mesh)
+uint64_t blueprint_hash_cells(const insitu_mesh *mesh)
 {
     uint64_t sum = mix(1, (uint64_t)mesh->cell_type);
     sum = hash_array(sum, &mesh->cell_types, mesh->cell_count);

@@ -5,9 +5,9 @@
 #include "insitu/insitu.h"
 
 /* Returns a hash of the mesh's coordinates, including origin, spacing and axes of a lattice. */
-uint64_t door_hash_places(const insitu_mesh *mesh);
+uint64_t blueprint_hash_coordinates(const insitu_mesh *mesh);
 
 /* Returns a hash of the mesh's cell types, connectivity, faces and ghost flags. */
-uint64_t door_hash_cells(const insitu_mesh *mesh);
+uint64_t blueprint_hash_cells(const insitu_mesh *mesh);
 
 #endif

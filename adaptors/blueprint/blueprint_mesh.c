@@ -2,30 +2,30 @@
 
 #include <stdlib.h>
 
-void *door_own(const node *of, door_owned *owned, int64_t bytes)
+void *owned_arrays_add(const node *of, owned_arrays *owned, int64_t bytes)
 {
-    void *made = owned->count < DOOR_OWNED ? calloc(bytes > 0 ? (size_t)bytes : 1, 1) : NULL;
+    void *made = owned->count < OWNED_ARRAYS_MAX ? calloc(bytes > 0 ? (size_t)bytes : 1, 1) : NULL;
     if (!made) {
-        node_fail(of, "", INSITU_ERROR_MEMORY, "no memory for %lld bytes", (long long)bytes);
+        node_set_error(of, "", INSITU_ERROR_MEMORY, "no memory for %lld bytes", (long long)bytes);
         return NULL;
     }
     owned->arrays[owned->count++] = made;
     return made;
 }
 
-void door_owned_free(door_owned *owned)
+void owned_arrays_free(owned_arrays *owned)
 {
     for (int i = 0; i < owned->count; i++) free(owned->arrays[i]);
     owned->count = 0;
 }
 
-void door_mesh_end(door_mesh *mesh)
+void blueprint_mesh_free_tables(blueprint_mesh *mesh)
 {
     free(mesh->type_map);
     mesh->type_map = NULL;
 }
 
-int64_t door_reach(const int64_t counts[3], const int64_t strides[3])
+int64_t blueprint_element_span(const int64_t counts[3], const int64_t strides[3])
 {
     int64_t reach = 0;
     for (int axis = 0; axis < 3; axis++) reach += (counts[axis] > 0 ? counts[axis] - 1 : 0) * strides[axis];

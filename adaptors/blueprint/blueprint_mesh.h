@@ -4,48 +4,49 @@
 
 #include "blueprint_node.h"
 
-enum { DOOR_OWNED = 4 };
+enum { OWNED_ARRAYS_MAX = 4 };
 
 /* Arrays that the adaptor allocates because the node does not contain them. The session borrows them with the mesh. */
-typedef struct door_owned {
-    void *arrays[DOOR_OWNED];
+typedef struct owned_arrays {
+    void *arrays[OWNED_ARRAYS_MAX];
     int count;
-} door_owned;
+} owned_arrays;
 
-typedef struct door_mesh {
+typedef struct blueprint_mesh {
     insitu_mesh mesh;
     insitu_lattice lattice; /* mesh.lattice points to it, unless the topology is unstructured */
     bool is_left_out;       /* the topology is not drawn; the log contains the reason */
-    bool has_cell_order;    /* lattice.cell_strides are those of an element field */
+    bool has_cell_strides;  /* lattice.cell_strides are those of an element field */
     int *type_map;          /* mesh.cell_type_map points to it, unless NULL */
-    door_owned owned;
-} door_mesh;
+    owned_arrays owned;
+} blueprint_mesh;
 
 /* Allocates an array that lives as long as the mesh. If memory runs out, sets the error and returns NULL. */
-void *door_own(const node *of, door_owned *owned, int64_t bytes);
-void door_owned_free(door_owned *owned);
+void *owned_arrays_add(const node *of, owned_arrays *owned, int64_t bytes);
+void owned_arrays_free(owned_arrays *owned);
 
 /* Reads the topology and its coordset. Returns false if the node is invalid. */
-bool door_read_topology(const node *domain, const node *topology, door_mesh *out);
+bool blueprint_read_topology(const node *domain, const node *topology, blueprint_mesh *out);
 
 /* Frees the tables that are needed only until the mesh is set, but not the arrays in `owned`. */
-void door_mesh_end(door_mesh *mesh);
+void blueprint_mesh_free_tables(blueprint_mesh *mesh);
 
 /* Reads the cells of an unstructured topology, after its vertices. */
-bool door_read_unstructured(const node *topology, door_mesh *out);
+bool blueprint_read_unstructured(const node *topology, blueprint_mesh *out);
 
 /* Reads the strides of a lattice's element fields, and the ghost flags of the topology. */
-bool door_read_ghosts(const node *domain, const char *topology, door_mesh *out);
+bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_mesh *out);
 
 /* Sets all fields of the topology on the session's mesh, and increases *count by their number. Returns false if the
  * node is invalid or the session rejects a field. */
-bool door_set_fields(const node *domain, const char *topology, const door_mesh *mesh, insitu_session *session,
-                     const char *name, int *count);
+bool blueprint_set_fields(const node *domain, const char *topology, const blueprint_mesh *mesh, insitu_session *session,
+                          const char *name, int *count);
 
-/* Returns a hash of the names of the fields that door_set_fields() would set. It does not depend on their order. */
-uint64_t door_field_names(const node *domain, const char *topology);
+/* Returns a hash of the names of the fields that blueprint_set_fields() would set. It does not depend on their order.
+ */
+uint64_t blueprint_hash_field_names(const node *domain, const char *topology);
 
 /* Returns the number of array elements from the first to the last cell or vertex, including padding. */
-int64_t door_reach(const int64_t counts[3], const int64_t strides[3]);
+int64_t blueprint_element_span(const int64_t counts[3], const int64_t strides[3]);
 
 #endif

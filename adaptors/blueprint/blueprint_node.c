@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- messages ------------------------------------------------------------------------------------------------ */
+/* ---- messages --------------------------------------------------------------------------------------------------- */
 
 /* Appends the path of a node, beginning at the root. */
 static void write_path(const node *n, char *out)
@@ -24,7 +24,7 @@ static void path_of(const node *parent, const char *path, char *out)
     if (!*out) snprintf(out, NODE_PATH, "(the node itself)");
 }
 
-bool node_fail(const node *parent, const char *path, insitu_status status, const char *format, ...)
+bool node_set_error(const node *parent, const char *path, insitu_status status, const char *format, ...)
 {
     node_log *log = parent->log;
     char where[NODE_PATH], what[NODE_PATH];
@@ -49,7 +49,7 @@ static void add_line(char **text, const char *where, const char *what)
     *text = longer;
 }
 
-void node_leave_out(const node *parent, const char *path, const char *format, ...)
+void node_report_left_out(const node *parent, const char *path, const char *format, ...)
 {
     char where[NODE_PATH], what[NODE_PATH];
     va_list list;
@@ -60,7 +60,7 @@ void node_leave_out(const node *parent, const char *path, const char *format, ..
     add_line(&parent->log->left_out, where, what);
 }
 
-void node_note_copy(const node *parent, const char *path, int64_t bytes, const char *why)
+void node_report_copy(const node *parent, const char *path, int64_t bytes, const char *why)
 {
     char where[NODE_PATH], what[NODE_PATH];
     path_of(parent, path, where);
@@ -76,7 +76,7 @@ void node_log_free(node_log *log)
     *log = (node_log){.status = INSITU_OK};
 }
 
-/* ---- nodes --------------------------------------------------------------------------------------------------- */
+/* ---- nodes ------------------------------------------------------------------------------------------------------ */
 
 bool node_has(const node *parent, const char *path)
 {
@@ -91,9 +91,9 @@ bool node_find(const node *parent, const char *path, node *out)
     return true;
 }
 
-bool node_need(const node *parent, const char *path, node *out)
+bool node_require(const node *parent, const char *path, node *out)
 {
-    return node_find(parent, path, out) || node_fail(parent, path, INSITU_ERROR_MESH, "is missing");
+    return node_find(parent, path, out) || node_set_error(parent, path, INSITU_ERROR_MESH, "is missing");
 }
 
 int64_t node_child_count(const node *parent)
@@ -115,13 +115,13 @@ void node_child(const node *parent, int64_t number, node *out)
 bool node_string(const node *parent, const char *path, const char **out)
 {
     node found;
-    if (!node_need(parent, path, &found)) return false;
-    if (!found.conduit->is_string(found.at)) return node_fail(&found, "", INSITU_ERROR_MESH, "is no string");
+    if (!node_require(parent, path, &found)) return false;
+    if (!found.conduit->is_string(found.at)) return node_set_error(&found, "", INSITU_ERROR_MESH, "is no string");
     *out = found.conduit->as_char8_str(found.at);
-    return *out || node_fail(&found, "", INSITU_ERROR_MESH, "is no string");
+    return *out || node_set_error(&found, "", INSITU_ERROR_MESH, "is no string");
 }
 
-/* ---- arrays -------------------------------------------------------------------------------------------------- */
+/* ---- arrays ----------------------------------------------------------------------------------------------------- */
 
 /* Converts a Conduit type id (3 to 12) to an insitu_type. Returns 0 for other ids, which are not numeric. */
 static int type_of(int64_t id)
@@ -145,24 +145,24 @@ static int type_of(int64_t id)
 bool node_read_array(const node *of, node_array *out)
 {
     const int type = type_of(of->conduit->id(of->at));
-    if (!type) return node_fail(of, "", INSITU_ERROR_MESH, "is no array of numbers");
+    if (!type) return node_set_error(of, "", INSITU_ERROR_MESH, "is no array of numbers");
     *out = (node_array){.count = of->conduit->number_of_elements(of->at)};
     out->array.type = (insitu_type)type;
-    if (out->count < 0) return node_fail(of, "", INSITU_ERROR_MESH, "has %lld elements", (long long)out->count);
+    if (out->count < 0) return node_set_error(of, "", INSITU_ERROR_MESH, "has %lld elements", (long long)out->count);
     if (out->count == 0) return true;
     out->array.data = of->conduit->element_ptr(of->at, 0);
     out->array.stride_bytes = of->conduit->stride(of->at);
     if (!out->array.data)
-        return node_fail(of, "", INSITU_ERROR_MESH, "has %lld elements and no address", (long long)out->count);
+        return node_set_error(of, "", INSITU_ERROR_MESH, "has %lld elements and no address", (long long)out->count);
     if (out->array.stride_bytes == 0 && out->count > 1)
-        return node_fail(of, "", INSITU_ERROR_MESH, "has %lld elements and a stride of 0", (long long)out->count);
+        return node_set_error(of, "", INSITU_ERROR_MESH, "has %lld elements and a stride of 0", (long long)out->count);
     return true;
 }
 
-bool node_need_array(const node *parent, const char *path, node_array *out)
+bool node_require_array(const node *parent, const char *path, node_array *out)
 {
     node found;
-    return node_need(parent, path, &found) && node_read_array(&found, out);
+    return node_require(parent, path, &found) && node_read_array(&found, out);
 }
 
 int64_t node_type_bytes(insitu_type type)
@@ -215,31 +215,31 @@ bool node_is_integers(const node_array *array)
 
 /* Finds the single number at a path. Returns false if it is missing, and sets the error if it is needed or is not a
  * single number. */
-static bool find_number(const node *parent, const char *path, bool is_needed, node *found, node_array *out)
+static bool find_number(const node *parent, const char *path, bool is_required, node *found, node_array *out)
 {
     if (!node_find(parent, path, found))
-        return is_needed ? node_fail(parent, path, INSITU_ERROR_MESH, "is missing") : false;
+        return is_required ? node_set_error(parent, path, INSITU_ERROR_MESH, "is missing") : false;
     if (!node_read_array(found, out)) return false;
     return out->count == 1 ||
-           node_fail(found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1", (long long)out->count);
+           node_set_error(found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1", (long long)out->count);
 }
 
-bool node_integer(const node *parent, const char *path, bool is_needed, int64_t *out)
+bool node_integer(const node *parent, const char *path, bool is_required, int64_t *out)
 {
     node found;
     node_array number;
-    if (!find_number(parent, path, is_needed, &found, &number)) return !parent->log->status;
-    if (!node_is_integers(&number)) return node_fail(&found, "", INSITU_ERROR_MESH, "is no whole number");
+    if (!find_number(parent, path, is_required, &found, &number)) return !parent->log->status;
+    if (!node_is_integers(&number)) return node_set_error(&found, "", INSITU_ERROR_MESH, "is no whole number");
     *out = node_element(&number.array, 0);
     return true;
 }
 
-bool node_real(const node *parent, const char *path, bool is_needed, double *out)
+bool node_real(const node *parent, const char *path, bool is_required, double *out)
 {
     node found;
     node_array number;
     float narrow;
-    if (!find_number(parent, path, is_needed, &found, &number)) return !parent->log->status;
+    if (!find_number(parent, path, is_required, &found, &number)) return !parent->log->status;
     if (number.array.type == INSITU_FLOAT64) {
         memcpy(out, number.array.data, sizeof *out);
     } else if (number.array.type == INSITU_FLOAT32) {
@@ -256,9 +256,10 @@ bool node_integers(const node *parent, const char *path, int64_t out[3], int *co
     node found;
     node_array array;
     if (!node_find(parent, path, &found) || !node_read_array(&found, &array)) return false;
-    if (!node_is_integers(&array)) return node_fail(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
+    if (!node_is_integers(&array)) return node_set_error(&found, "", INSITU_ERROR_MESH, "are no whole numbers");
     if (array.count < 1 || array.count > 3)
-        return node_fail(&found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1 to 3", (long long)array.count);
+        return node_set_error(&found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1 to 3",
+                              (long long)array.count);
     *count = (int)array.count;
     for (int i = 0; i < *count; i++) out[i] = node_element(&array.array, i);
     return true;

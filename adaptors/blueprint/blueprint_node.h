@@ -35,15 +35,15 @@ typedef struct node_array {
 
 /* Stores the error "path: what" if it is the first one. The path is relative to the node and may be "". Always returns
  * false. */
-bool node_fail(const node *parent, const char *path, insitu_status status, const char *format, ...)
+bool node_set_error(const node *parent, const char *path, insitu_status status, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
 /* Reports that the item at the path is left out, and why. */
-void node_leave_out(const node *parent, const char *path, const char *format, ...)
+void node_report_left_out(const node *parent, const char *path, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
 /* Reports a copy of this many bytes that the adaptor holds, and why. */
-void node_note_copy(const node *parent, const char *path, int64_t bytes, const char *why);
+void node_report_copy(const node *parent, const char *path, int64_t bytes, const char *why);
 
 void node_log_free(node_log *log);
 
@@ -54,7 +54,7 @@ bool node_has(const node *parent, const char *path);
 bool node_find(const node *parent, const char *path, node *out);
 
 /* Same as node_find(), but a missing node is an error. */
-bool node_need(const node *parent, const char *path, node *out);
+bool node_require(const node *parent, const char *path, node *out);
 
 int64_t node_child_count(const node *parent);
 void node_child(const node *parent, int64_t number, node *out);
@@ -62,9 +62,9 @@ void node_child(const node *parent, int64_t number, node *out);
 /* Reads a string, which belongs to the node. Returns false and sets the error if there is no string at the path. */
 bool node_string(const node *parent, const char *path, const char **out);
 
-/* These read a number. If it is missing, *out does not change; this is an error only if is_needed. */
-bool node_integer(const node *parent, const char *path, bool is_needed, int64_t *out);
-bool node_real(const node *parent, const char *path, bool is_needed, double *out);
+/* These read a number. If it is missing, *out does not change; this is an error only if is_required. */
+bool node_integer(const node *parent, const char *path, bool is_required, int64_t *out);
+bool node_real(const node *parent, const char *path, bool is_required, double *out);
 
 /* Reads one to three integers of an optional array, for example strides; *count receives their number. Returns false if
  * the array is missing or invalid. */
@@ -73,7 +73,7 @@ bool node_integers(const node *parent, const char *path, int64_t out[3], int *co
 /* These describe the array of the node, or of the node at the path. They return false and set the error if it is not an
  * array of numbers. */
 bool node_read_array(const node *of, node_array *out);
-bool node_need_array(const node *parent, const char *path, node_array *out);
+bool node_require_array(const node *parent, const char *path, node_array *out);
 
 /* Returns an element of an array of integers. */
 int64_t node_element(const insitu_array *array, int64_t i);

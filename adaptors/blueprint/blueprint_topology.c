@@ -6,25 +6,25 @@
 
 static const char *const index_names[3] = {"i", "j", "k"};
 
-/* ---- lattices ------------------------------------------------------------------------------------------------ */
+/* ---- lattices --------------------------------------------------------------------------------------------------- */
 
 /* Stores the number of vertices along each axis, which must be at least 1. A topology whose cells have fewer than two
  * dimensions is left out. */
-static bool take_counts(const node *of, const char *path, const int64_t counts[3], door_mesh *out)
+static bool set_vertex_counts(const node *of, const char *path, const int64_t counts[3], blueprint_mesh *out)
 {
     int flat = 0;
     for (int axis = 0; axis < 3; axis++) {
         if (counts[axis] < 1 || counts[axis] > (int64_t)1 << 40)
-            return node_fail(of, path, INSITU_ERROR_MESH, "has %lld vertices along %s, expected at least 1",
-                             (long long)counts[axis], index_names[axis]);
+            return node_set_error(of, path, INSITU_ERROR_MESH, "has %lld vertices along %s, expected at least 1",
+                                  (long long)counts[axis], index_names[axis]);
         flat += counts[axis] == 1;
         out->lattice.cells[axis] = counts[axis] - 1;
     }
     out->mesh.lattice = &out->lattice;
     out->is_left_out = flat > 1;
     if (out->is_left_out)
-        node_leave_out(of, path, "%lld x %lld x %lld vertices make no cells of two or three dimensions",
-                       (long long)counts[0], (long long)counts[1], (long long)counts[2]);
+        node_report_left_out(of, path, "%lld x %lld x %lld vertices make no cells of two or three dimensions",
+                             (long long)counts[0], (long long)counts[1], (long long)counts[2]);
     return true;
 }
 
@@ -37,19 +37,19 @@ static void set_packed(const int64_t counts[3], int64_t strides[3])
 }
 
 /* Sets packed strides for vertices and cells. */
-static void pack_lattice(door_mesh *out)
+static void pack_lattice(blueprint_mesh *out)
 {
     int64_t counts[3];
     for (int axis = 0; axis < 3; axis++) counts[axis] = out->lattice.cells[axis] + 1;
     set_packed(counts, out->lattice.vertex_strides);
     set_packed(out->lattice.cells, out->lattice.cell_strides);
-    out->mesh.vertex_count = door_reach(counts, out->lattice.vertex_strides);
-    out->mesh.cell_count = door_reach(out->lattice.cells, out->lattice.cell_strides);
+    out->mesh.vertex_count = blueprint_element_span(counts, out->lattice.vertex_strides);
+    out->mesh.cell_count = blueprint_element_span(out->lattice.cells, out->lattice.cell_strides);
 }
 
 /* Reads a uniform coordset. elements/origin is the index of the block's first vertex in the whole lattice; the origin
  * of the whole lattice is computed from it, so that all blocks compute the same coordinates. */
-static bool read_uniform(const node *coordset, const node *topology, door_mesh *out)
+static bool read_uniform(const node *coordset, const node *topology, blueprint_mesh *out)
 {
     static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
     static const char *const origins[3] = {"origin/x", "origin/y", "origin/z"};
@@ -64,52 +64,52 @@ static bool read_uniform(const node *coordset, const node *topology, door_mesh *
         if (!node_real(coordset, origins[axis], false, &origin)) return false;
         if (!node_real(coordset, spacings[axis], false, &spacing)) return false;
         if (!node_integer(topology, firsts[axis], false, &first)) return false;
-        if (spacing == 0) return node_fail(coordset, spacings[axis], INSITU_ERROR_MESH, "is 0");
+        if (spacing == 0) return node_set_error(coordset, spacings[axis], INSITU_ERROR_MESH, "is 0");
         out->lattice.origin[axis] = origin - spacing * (double)first;
         out->lattice.spacing[axis] = spacing;
         out->lattice.first[axis] = first;
     }
-    if (!take_counts(coordset, "dims", counts, out)) return false;
+    if (!set_vertex_counts(coordset, "dims", counts, out)) return false;
     pack_lattice(out);
     return true;
 }
 
 /* Finds the coordinates along x, y and z. Returns false if one is missing. A coordset in another system (r, theta, phi)
  * is left out. */
-static bool find_axes(const node *coordset, node_array axes[3], int *count, door_mesh *out)
+static bool find_axes(const node *coordset, node_array axes[3], int *count, blueprint_mesh *out)
 {
     static const char *const paths[3] = {"values/x", "values/y", "values/z"};
     static const char *const others[3] = {"values/r", "values/theta", "values/phi"};
     for (int i = 0; i < 3; i++)
         if (node_has(coordset, others[i])) {
-            node_leave_out(coordset, others[i], "coordinates other than x, y and z are not read");
+            node_report_left_out(coordset, others[i], "coordinates other than x, y and z are not read");
             out->is_left_out = true;
             return true;
         }
     *count = 0;
     for (int axis = 0; axis < 3; axis++) {
         if (axis && !node_has(coordset, paths[axis])) break;
-        if (!node_need_array(coordset, paths[axis], &axes[axis])) return false;
+        if (!node_require_array(coordset, paths[axis], &axes[axis])) return false;
         *count = axis + 1;
     }
     return true;
 }
 
-static bool read_rectilinear(const node *coordset, door_mesh *out)
+static bool read_rectilinear(const node *coordset, blueprint_mesh *out)
 {
     node_array axes[3] = {{.count = 1}, {.count = 1}, {.count = 1}};
     int dimensions;
     if (!find_axes(coordset, axes, &dimensions, out)) return false;
     if (out->is_left_out) return true;
     const int64_t counts[3] = {axes[0].count, axes[1].count, axes[2].count};
-    if (!take_counts(coordset, "values", counts, out)) return false;
+    if (!set_vertex_counts(coordset, "values", counts, out)) return false;
     for (int axis = 0; axis < dimensions; axis++) out->lattice.axes[axis] = axes[axis].array;
     pack_lattice(out);
     return true;
 }
 
 /* Reads the coordinates of each vertex. In two dimensions there is no z. */
-static bool read_explicit(const node *coordset, door_mesh *out)
+static bool read_explicit(const node *coordset, blueprint_mesh *out)
 {
     static const char *const paths[3] = {"values/x", "values/y", "values/z"};
     node_array axes[3];
@@ -117,20 +117,20 @@ static bool read_explicit(const node *coordset, door_mesh *out)
     if (!find_axes(coordset, axes, &dimensions, out)) return false;
     if (out->is_left_out) return true;
     if (dimensions == 1) {
-        node_leave_out(coordset, "values", "coordinates of one dimension");
+        node_report_left_out(coordset, "values", "coordinates of one dimension");
         out->is_left_out = true;
     }
     out->mesh.vertex_count = axes[0].count;
     for (int axis = 0; axis < dimensions; axis++) {
         if (axes[axis].count != axes[0].count)
-            return node_fail(coordset, paths[axis], INSITU_ERROR_MESH, "has %lld elements, values/x has %lld",
-                             (long long)axes[axis].count, (long long)axes[0].count);
+            return node_set_error(coordset, paths[axis], INSITU_ERROR_MESH, "has %lld elements, values/x has %lld",
+                                  (long long)axes[axis].count, (long long)axes[0].count);
         out->mesh.coordinates[axis] = axes[axis].array;
     }
     return true;
 }
 
-/* ---- structured ---------------------------------------------------------------------------------------------- */
+/* ---- structured ------------------------------------------------------------------------------------------------- */
 
 /* Reads the number of vertices along each axis, and the offsets and strides of the vertices if they are not packed. */
 static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3], int64_t strides[3])
@@ -141,7 +141,8 @@ static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3
         int64_t cells = 0;
         if (!node_integer(topology, dims[axis], axis == 0, &cells)) return false;
         if (cells < 0)
-            return node_fail(topology, dims[axis], INSITU_ERROR_MESH, "is %lld, expected at least 0", (long long)cells);
+            return node_set_error(topology, dims[axis], INSITU_ERROR_MESH, "is %lld, expected at least 0",
+                                  (long long)cells);
         counts[axis] = cells + 1;
     }
     set_packed(counts, strides);
@@ -150,26 +151,27 @@ static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3
         for (int axis = stride_count; axis < 3; axis++) strides[axis] = strides[axis - 1] * counts[axis - 1];
     for (int axis = 0; axis < 3 && !topology->log->status; axis++)
         if (offsets[axis] < 0 || strides[axis] < 1)
-            return node_fail(topology, offsets[axis] < 0 ? "elements/dims/offsets" : "elements/dims/strides",
-                             INSITU_ERROR_MESH, "has %lld for %s",
-                             (long long)(offsets[axis] < 0 ? offsets : strides)[axis], index_names[axis]);
+            return node_set_error(topology, offsets[axis] < 0 ? "elements/dims/offsets" : "elements/dims/strides",
+                                  INSITU_ERROR_MESH, "has %lld for %s",
+                                  (long long)(offsets[axis] < 0 ? offsets : strides)[axis], index_names[axis]);
     return !topology->log->status;
 }
 
-static bool read_structured(const node *topology, door_mesh *out)
+static bool read_structured(const node *topology, blueprint_mesh *out)
 {
     int64_t counts[3], offsets[3] = {0, 0, 0}, strides[3], first = 0;
     insitu_mesh *m = &out->mesh;
     if (!read_dims(topology, counts, offsets, strides)) return false;
-    if (!take_counts(topology, "elements/dims", counts, out)) return false;
+    if (!set_vertex_counts(topology, "elements/dims", counts, out)) return false;
     for (int axis = 0; axis < 3; axis++) first += offsets[axis] * strides[axis];
-    const int64_t reach = door_reach(counts, strides);
-    if (first + reach > m->vertex_count)
-        return node_fail(topology, "elements/dims", INSITU_ERROR_MESH, "reaches vertex %lld, the coordset has %lld",
-                         (long long)(first + reach - 1), (long long)m->vertex_count);
+    const int64_t span = blueprint_element_span(counts, strides);
+    if (first + span > m->vertex_count)
+        return node_set_error(topology, "elements/dims", INSITU_ERROR_MESH,
+                              "reaches vertex %lld, the coordset has %lld", (long long)(first + span - 1),
+                              (long long)m->vertex_count);
     pack_lattice(out);
     memcpy(out->lattice.vertex_strides, strides, sizeof strides);
-    m->vertex_count = reach;
+    m->vertex_count = span;
     for (int axis = 0; axis < 3; axis++)
         if (m->coordinates[axis].data)
             m->coordinates[axis].data =
@@ -177,37 +179,39 @@ static bool read_structured(const node *topology, door_mesh *out)
     return true;
 }
 
-/* ---- topologies ---------------------------------------------------------------------------------------------- */
+/* ---- topologies ------------------------------------------------------------------------------------------------- */
 
-static bool read_coordset(const node *coordset, const node *topology, const char *type, door_mesh *out)
+static bool read_coordset(const node *coordset, const node *topology, const char *type, blueprint_mesh *out)
 {
     if (strcmp(type, "uniform") == 0) return read_uniform(coordset, topology, out);
     if (strcmp(type, "rectilinear") == 0) return read_rectilinear(coordset, out);
     if (strcmp(type, "explicit") == 0) return read_explicit(coordset, out);
-    return node_fail(coordset, "type", INSITU_ERROR_MESH, "is \"%s\", expected uniform, rectilinear or explicit", type);
+    return node_set_error(coordset, "type", INSITU_ERROR_MESH, "is \"%s\", expected uniform, rectilinear or explicit",
+                          type);
 }
 
 static bool find_coordset(const node *domain, const node *topology, node *sets, node *out, const char **type)
 {
     const char *name;
     if (!node_string(topology, "coordset", &name)) return false;
-    if (!node_need(domain, "coordsets", sets)) return false;
+    if (!node_require(domain, "coordsets", sets)) return false;
     if (!node_find(sets, name, out))
-        return node_fail(topology, "coordset", INSITU_ERROR_MESH, "is \"%s\", which is not among the coordsets", name);
+        return node_set_error(topology, "coordset", INSITU_ERROR_MESH, "is \"%s\", which is not among the coordsets",
+                              name);
     return node_string(out, "type", type);
 }
 
 /* Checks that the coordset's type is the one that this type of topology requires. */
-static bool check_kind(const node *topology, const char *type, const char *of_coordset)
+static bool check_coordset_type(const node *topology, const char *type, const char *of_coordset)
 {
     const bool is_explicit = strcmp(type, "structured") == 0 || strcmp(type, "unstructured") == 0;
     const char *expected = is_explicit ? "explicit" : type;
     return strcmp(of_coordset, expected) == 0 ||
-           node_fail(topology, "coordset", INSITU_ERROR_MESH,
-                     "is of type \"%s\", topologies of type \"%s\" need \"%s\"", of_coordset, type, expected);
+           node_set_error(topology, "coordset", INSITU_ERROR_MESH,
+                          "is of type \"%s\", topologies of type \"%s\" need \"%s\"", of_coordset, type, expected);
 }
 
-bool door_read_topology(const node *domain, const node *topology, door_mesh *out)
+bool blueprint_read_topology(const node *domain, const node *topology, blueprint_mesh *out)
 {
     const char *type, *of_coordset;
     node sets, coordset;
@@ -215,18 +219,18 @@ bool door_read_topology(const node *domain, const node *topology, door_mesh *out
     insitu_mesh_defaults(&out->mesh);
     if (!node_string(topology, "type", &type)) return false;
     if (strcmp(type, "points") == 0) {
-        node_leave_out(topology, "type", "points are not drawn");
+        node_report_left_out(topology, "type", "points are not drawn");
         out->is_left_out = true;
         return true;
     }
     if (strcmp(type, "uniform") != 0 && strcmp(type, "rectilinear") != 0 && strcmp(type, "structured") != 0 &&
         strcmp(type, "unstructured") != 0)
-        return node_fail(topology, "type", INSITU_ERROR_MESH,
-                         "is \"%s\", expected uniform, rectilinear, structured, unstructured or points", type);
+        return node_set_error(topology, "type", INSITU_ERROR_MESH,
+                              "is \"%s\", expected uniform, rectilinear, structured, unstructured or points", type);
     if (!find_coordset(domain, topology, &sets, &coordset, &of_coordset)) return false;
-    if (!check_kind(topology, type, of_coordset)) return false;
+    if (!check_coordset_type(topology, type, of_coordset)) return false;
     if (!read_coordset(&coordset, topology, of_coordset, out)) return false;
     if (out->is_left_out) return true;
     if (strcmp(type, "structured") == 0) return read_structured(topology, out);
-    return strcmp(type, "unstructured") != 0 || door_read_unstructured(topology, out);
+    return strcmp(type, "unstructured") != 0 || blueprint_read_unstructured(topology, out);
 }

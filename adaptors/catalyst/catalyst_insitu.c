@@ -1,7 +1,7 @@
 /* The functions that Catalyst calls. catalyst_implementation() (catalyst_impl_insitu.h) defines the table of them. */
 #include <catalyst_impl_insitu.h>
 
-#include "catalyst_door.h"
+#include "catalyst_adaptor.h"
 #include "insitu/conduit.h"
 
 /* Converts errors of libinsitu to numbers above those that Catalyst uses itself. */
@@ -29,28 +29,28 @@ static const catalyst_writer writer = {set_string, set_integer, set_real};
 
 enum catalyst_status catalyst_initialize_insitu(const conduit_node *params)
 {
-    return status_of(catalyst_door_initialize(&insitu_conduit_functions, params));
+    return status_of(catalyst_adaptor_initialize(&insitu_conduit_functions, params));
 }
 
 enum catalyst_status catalyst_execute_insitu(const conduit_node *params)
 {
-    return status_of(catalyst_door_execute(params));
+    return status_of(catalyst_adaptor_execute(params));
 }
 
 enum catalyst_status catalyst_finalize_insitu(const conduit_node *params)
 {
     (void)params;
-    return status_of(catalyst_door_finalize());
+    return status_of(catalyst_adaptor_finalize());
 }
 
 enum catalyst_status catalyst_about_insitu(conduit_node *params)
 {
-    catalyst_door_about(&writer, params);
+    catalyst_adaptor_about(&writer, params);
     return catalyst_status_ok;
 }
 
 enum catalyst_status catalyst_results_insitu(conduit_node *params)
 {
-    catalyst_door_results(&writer, params);
+    catalyst_adaptor_results(&writer, params);
     return catalyst_status_ok;
 }

@@ -22,7 +22,7 @@ struct sheet {
     typeface *font; /* NULL if there is no text */
 };
 
-/* ---- pixels -------------------------------------------------------------------------------------------------- */
+/* ---- pixels ----------------------------------------------------------------------------------------------------- */
 
 float *pixel_at(sheet &s, int x, int y)
 {
@@ -105,7 +105,7 @@ void draw_strokes(sheet &s, bool behind)
         if (s.what.strokes[i].is_behind == behind) draw_stroke(s, s.what.strokes[i], line_width(s), s.what.colour);
 }
 
-/* ---- text ---------------------------------------------------------------------------------------------------- */
+/* ---- text ------------------------------------------------------------------------------------------------------- */
 
 /* The opacity of the halo around text and its lines. The halo has the background's colour; there is none if the
  * background is transparent. */
@@ -150,7 +150,7 @@ void draw_rimmed_stroke(sheet &s, const insitu_stroke &line, double width, int s
     draw_stroke(s, line, width, colour);
 }
 
-/* ---- colour bars --------------------------------------------------------------------------------------------- */
+/* ---- colour bars ------------------------------------------------------------------------------------------------ */
 
 /* Interpolates linearly between the table's entries, as the renderer does. */
 void colour_at(const insitu_colour_bar &bar, double place, float out[3])
@@ -207,7 +207,7 @@ void draw_bar(sheet &s, const block &b)
     }
 }
 
-/* ---- scale bar and axes ---------------------------------------------------------------------------------------- */
+/* ---- scale bar and axes ----------------------------------------------------------------------------------------- */
 
 /* Draws the scale bar below its text. */
 void draw_scale_bar(sheet &s, const block &b)
@@ -240,7 +240,7 @@ void draw_axes(sheet &s, const block &b)
     }
 }
 
-/* ---- all decorations ----------------------------------------------------------------------------------------- */
+/* ---- all decorations -------------------------------------------------------------------------------------------- */
 
 void draw_block(sheet &s, const block &b)
 {

@@ -42,7 +42,7 @@ std::vector<int> sizes_from(double size)
     return out;
 }
 
-/* ---- free positions -------------------------------------------------------------------------------------------- */
+/* ---- free positions --------------------------------------------------------------------------------------------- */
 
 bool are_apart(const area &a, const area &b)
 {
@@ -101,7 +101,7 @@ bool find_room(const sheet &s, insitu_anchor at, double width, double height, ar
     return least < HUGE_VAL;
 }
 
-/* ---- lines of text --------------------------------------------------------------------------------------------- */
+/* ---- lines of text ---------------------------------------------------------------------------------------------- */
 
 /* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters count, and
  * at least one is returned. */
@@ -194,7 +194,7 @@ bool place_words(sheet &s, int index)
     return false;
 }
 
-/* ---- colour bars ----------------------------------------------------------------------------------------------- */
+/* ---- colour bars ------------------------------------------------------------------------------------------------ */
 
 /* The colour bars of a side with text of one size. All have the width of the widest bar, and leave space for the
  * highest label. */
@@ -363,7 +363,7 @@ void place_bars(sheet &s, insitu_anchor at)
     }
 }
 
-/* ---- other decorations ----------------------------------------------------------------------------------------- */
+/* ---- other decorations ------------------------------------------------------------------------------------------ */
 
 bool place_scale_bar(sheet &s)
 {

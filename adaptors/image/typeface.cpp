@@ -28,7 +28,7 @@ bool is_done(FT_Error code)
     return code == FT_Err_Ok;
 }
 
-/* ---- finding a font ---- */
+/* ---- finding a font --------------------------------------------------------------------------------------------- */
 
 /* Returns the files of this font in the folder and up to three levels below. Uses glob(), because the directory
  * iterators of the C++ library terminate the process if memory runs out. */
@@ -95,7 +95,7 @@ std::string usual_fonts()
     return out;
 }
 
-/* ---- characters ---- */
+/* ---- characters ------------------------------------------------------------------------------------------------- */
 
 /* Decodes the character at `at` and advances `at` behind it. Returns the replacement character for invalid UTF-8. */
 char32_t next_character(const std::string &text, std::size_t &at)

@@ -15,7 +15,7 @@
 /* Indices of words: first in a fragment, then in a finished pixel. */
 enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WORD_DEPTH = 0, WORD_RGBA = 1 };
 
-/* ---- joining ------------------------------------------------------------------------------------------------- */
+/* ---- joining ---------------------------------------------------------------------------------------------------- */
 
 /* Returns the lanes in `both` where the fragment of `other` is in front of that of `all`. Equal depths and NaN are
  * resolved by fragment_compare(). */
@@ -54,7 +54,7 @@ static void join_sheets(comp_sheet *all, const comp_sheet *other, uint16_t left[
     all->is_opaque = are_opaque;
 }
 
-/* ---- finishing ----------------------------------------------------------------------------------------------- */
+/* ---- finishing -------------------------------------------------------------------------------------------------- */
 
 static void finish_pixels(const comp_sheet *fragments, const float background[4], comp_sheet *pixels)
 {
@@ -80,7 +80,7 @@ static void finish_pixels(const comp_sheet *fragments, const float background[4]
     }
 }
 
-/* ---- storing ------------------------------------------------------------------------------------------------- */
+/* ---- storing ---------------------------------------------------------------------------------------------------- */
 
 /* The addresses of a row of the picture. */
 typedef struct picture_row {

@@ -90,7 +90,7 @@ ROWS_INLINE void start_prediction(prediction *f, lanes values)
     f->slope = (lanes){0};
 }
 
-/* ---- nibbles --------------------------------------------------------------------------------------------------- */
+/* ---- nibbles ---------------------------------------------------------------------------------------------------- */
 
 static inline unsigned nibble_count(uint32_t greatest)
 {
@@ -222,7 +222,7 @@ static void expand_sheet(const comp_sheet *compact, const sheet_plan *plan, int 
     }
 }
 
-/* ---- writing ------------------------------------------------------------------------------------------------- */
+/* ---- writing ---------------------------------------------------------------------------------------------------- */
 
 /* The residuals of a word for both predictions, indexed by WORD_LINEAR or WORD_CONSTANT. */
 typedef struct word_residuals {
@@ -314,7 +314,7 @@ static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *pla
     return out;
 }
 
-/* ---- reading ------------------------------------------------------------------------------------------------- */
+/* ---- reading ---------------------------------------------------------------------------------------------------- */
 
 ROWS_INLINE lanes read_first(lanes residuals, unsigned mask, uint32_t value)
 {

@@ -27,7 +27,7 @@ int comp_gather_children(const comp_route *route, int place)
     return ranks - 1 + below;
 }
 
-/* ---- to the parent ------------------------------------------------------------------------------------------- */
+/* ---- to the parent ---------------------------------------------------------------------------------------------- */
 
 /* The connection to the parent in the gather tree. */
 typedef struct parent_link {
@@ -64,7 +64,7 @@ static void send_own(parent_link *link, const comp_messages *finished)
     }
 }
 
-/* ---- from the children --------------------------------------------------------------------------------------- */
+/* ---- from the children ------------------------------------------------------------------------------------------ */
 
 static int receive(comp_transport *transport, int *bytes)
 {

@@ -15,7 +15,7 @@ enum { TAG_ROUND = 32, TAG_FOLD = 8, LAST_MESSAGE_BYTES = COMP_MESSAGE_HEAD };
 
 static const unsigned char last_message[LAST_MESSAGE_BYTES] = {0};
 
-/* ---- messages ------------------------------------------------------------------------------------------------ */
+/* ---- messages --------------------------------------------------------------------------------------------------- */
 
 void comp_messages_free(comp_messages *messages)
 {
@@ -96,7 +96,7 @@ void comp_writer_commit(comp_writer *w, unsigned char *end, uint32_t records)
     put_head(m, w->parcel, head[0], head[1] + records);
 }
 
-/* ---- rounds -------------------------------------------------------------------------------------------------- */
+/* ---- rounds ----------------------------------------------------------------------------------------------------- */
 
 insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error *error)
 {

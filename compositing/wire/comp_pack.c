@@ -13,7 +13,7 @@ static insitu_status no_memory(base_error *error, const char *what)
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory to %s fragments", what);
 }
 
-/* ---- fragments into messages --------------------------------------------------------------------------------- */
+/* ---- fragments into messages ------------------------------------------------------------------------------------ */
 
 /* The strips in which this rank has fragments, sorted by owner. */
 typedef struct owner_strips {
@@ -131,7 +131,7 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
     return no_memory(error, "send");
 }
 
-/* ---- forwarding ------------------------------------------------------------------------------------------------ */
+/* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
 /* Forwards the parcels for owners with this digit in this round. Of the digits of earlier rounds, these owners share
  * those of this place, because the other parcels were sent in the earlier rounds. */
@@ -171,7 +171,7 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
     return INSITU_OK;
 }
 
-/* ---- unpacking ------------------------------------------------------------------------------------------------- */
+/* ---- unpacking -------------------------------------------------------------------------------------------------- */
 
 /* If sheets is NULL, counts the sheets of each strip in starts. Otherwise stores the address of each sheet in the
  * counting sort's position of its strip. */

@@ -12,7 +12,7 @@ enum { LONGEST_SORTED = 64, LEAST_PART = 1 << 14, MOST_PARTS = 256 };
 
 _Static_assert(sizeof(fragment) == (1 + COMP_WORDS) * sizeof(uint32_t), "a fragment is a pixel and words");
 
-/* ---- ranges -------------------------------------------------------------------------------------------------- */
+/* ---- ranges ----------------------------------------------------------------------------------------------------- */
 
 /* The ranges that one thread found in its part of the list, in the order of the list. */
 typedef struct part {
@@ -129,7 +129,7 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip)
     return count;
 }
 
-/* ---- sheets -------------------------------------------------------------------------------------------------- */
+/* ---- sheets ----------------------------------------------------------------------------------------------------- */
 
 /* Fills a sheet with all fragments of the strip; returns false if a pixel has more than one. */
 static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)

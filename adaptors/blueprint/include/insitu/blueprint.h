@@ -85,26 +85,26 @@ INSITU_API insitu_status insitu_blueprint_create(insitu_session *session, const 
  * If the node is invalid, returns INSITU_ERROR_MESH or INSITU_ERROR_FIELD, with the path in the message. The next step
  * then returns this error on all ranks and draws nothing. Other errors are those of insitu_set_mesh() and
  * insitu_set_field(). */
-INSITU_API insitu_status insitu_blueprint_set(insitu_blueprint *door, const char *name, const void *node);
+INSITU_API insitu_status insitu_blueprint_set(insitu_blueprint *adaptor, const char *name, const void *node);
 
 /* Makes the next step fail for a reason of the caller's own, as if a node were invalid: the step returns this status on
  * all ranks. If there are several reasons, the first one counts. Local. */
-INSITU_API void insitu_blueprint_refuse(insitu_blueprint *door, insitu_status status, const char *message);
+INSITU_API void insitu_blueprint_refuse(insitu_blueprint *adaptor, insitu_status status, const char *message);
 
 /* Performs a step of the session with the meshes and fields that have been set. If cycle or time is NULL, the largest
  * state/cycle or state/time of all domains on all ranks is used; if no domain has them, the cycle is one more than the
  * last one, and the time equals the cycle. Collective; returns the same status on all ranks. */
-INSITU_API insitu_status insitu_blueprint_step(insitu_blueprint *door, const int64_t *cycle, const double *time);
+INSITU_API insitu_status insitu_blueprint_step(insitu_blueprint *adaptor, const int64_t *cycle, const double *time);
 
 /* Returns the report of the last step. Local. */
-INSITU_API const insitu_blueprint_report *insitu_blueprint_last_report(const insitu_blueprint *door);
+INSITU_API const insitu_blueprint_report *insitu_blueprint_last_report(const insitu_blueprint *adaptor);
 
 /* Returns the message of the last call that failed on this adaptor, or "" if none did. It is valid until the next call.
  * For NULL, returns the message of this thread's last insitu_blueprint_create() that failed. Local. */
-INSITU_API const char *insitu_blueprint_error(const insitu_blueprint *door);
+INSITU_API const char *insitu_blueprint_error(const insitu_blueprint *adaptor);
 
 /* Removes the meshes from the session and sets *adaptor to NULL. NULL and a pointer to NULL are allowed. Collective. */
-INSITU_API void insitu_blueprint_destroy(insitu_blueprint **door);
+INSITU_API void insitu_blueprint_destroy(insitu_blueprint **adaptor);
 
 #ifdef __cplusplus
 }

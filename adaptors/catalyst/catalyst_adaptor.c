@@ -1,4 +1,4 @@
-#include "catalyst_door.h"
+#include "catalyst_adaptor.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,22 +9,22 @@
 enum { PARAMETERS = 64 };
 
 /* A parameter of the scene whose value the simulation requested for its results. */
-typedef struct wanted {
+typedef struct requested_parameter {
     char name[NODE_NAME];
     double value;
-} wanted;
+} requested_parameter;
 
 static struct catalyst_state {
     const insitu_conduit *conduit;
     insitu_session *session;
-    insitu_blueprint *door;
+    insitu_blueprint *adaptor;
     int rank;
-    bool has_begun_mpi;
+    bool has_initialized_mpi;
     insitu_status status; /* status of the last call */
     char message[NODE_MESSAGE + 64];
-    char told[2048]; /* last text about left out items that was printed to stderr */
-    int wanted_count;
-    wanted parameters[PARAMETERS];
+    char last_left_out[2048]; /* last text about left out items that was printed to stderr */
+    int parameter_count;
+    requested_parameter parameters[PARAMETERS];
 } state;
 
 /* Stores the error, and prints the message to stderr on rank 0, because Catalyst's functions return only a status and
@@ -37,17 +37,17 @@ static insitu_status fail(insitu_status status, const char *message)
     return status;
 }
 
-/* ---- initialize -------------------------------------------------------------------------------------------------- */
+/* ---- initialize ------------------------------------------------------------------------------------------------- */
 
 /* Initializes MPI if the simulation has not, and determines the communicator. */
 static bool find_communicator(const node *root, MPI_Comm *comm)
 {
-    int is_begun;
+    int is_initialized;
     int64_t handle = 0;
-    MPI_Initialized(&is_begun);
-    if (!is_begun) {
-        if (MPI_Init(NULL, NULL)) return node_fail(root, "", INSITU_ERROR_MPI, "MPI_Init returned an error");
-        state.has_begun_mpi = true;
+    MPI_Initialized(&is_initialized);
+    if (!is_initialized) {
+        if (MPI_Init(NULL, NULL)) return node_set_error(root, "", INSITU_ERROR_MPI, "MPI_Init returned an error");
+        state.has_initialized_mpi = true;
     }
     *comm = MPI_COMM_WORLD;
     if (!node_integer(root, "catalyst/mpi_comm", false, &handle)) return false;
@@ -85,18 +85,18 @@ static bool find_scene(const node *root, const char **scene, bool *is_text)
     if (*is_text) return node_string(root, "catalyst/insitu/scene_text", scene);
     *scene = find_script(root);
     if (!*scene) *scene = getenv("INSITU_SCENE");
-    return *scene || node_fail(root, "catalyst", INSITU_ERROR_SCENE,
-                               "there is no scene: give insitu/scene, a *.yaml among scripts, or INSITU_SCENE");
+    return *scene || node_set_error(root, "catalyst", INSITU_ERROR_SCENE,
+                                    "there is no scene: give insitu/scene, a *.yaml among scripts, or INSITU_SCENE");
 }
 
 /* Stores the names in catalyst/insitu/parameters, with the values to return if the scene lacks these parameters. */
 static bool find_parameters(const node *root)
 {
     node all, one;
-    state.wanted_count = 0;
+    state.parameter_count = 0;
     if (!node_find(root, "catalyst/insitu/parameters", &all)) return true;
-    for (int64_t i = 0; i < node_child_count(&all) && state.wanted_count < PARAMETERS; i++) {
-        wanted *p = &state.parameters[state.wanted_count++];
+    for (int64_t i = 0; i < node_child_count(&all) && state.parameter_count < PARAMETERS; i++) {
+        requested_parameter *p = &state.parameters[state.parameter_count++];
         node_child(&all, i, &one);
         snprintf(p->name, sizeof p->name, "%s", one.name);
         p->value = 0;
@@ -119,11 +119,11 @@ static insitu_status open_session(MPI_Comm comm, const char *scene, bool is_text
     insitu_status status =
         is_text ? insitu_create_from_text(comm, scene, &state.session) : insitu_create(comm, scene, &state.session);
     if (status) return fail(status, insitu_error(NULL));
-    status = insitu_blueprint_create(state.session, state.conduit, comm, &state.door);
+    status = insitu_blueprint_create(state.session, state.conduit, comm, &state.adaptor);
     return status ? fail(status, insitu_blueprint_error(NULL)) : status;
 }
 
-insitu_status catalyst_door_initialize(const insitu_conduit *conduit, const void *params)
+insitu_status catalyst_adaptor_initialize(const insitu_conduit *conduit, const void *params)
 {
     node_log log = {.status = INSITU_OK};
     const node root = {conduit, &log, params, NULL, {0}};
@@ -140,7 +140,7 @@ insitu_status catalyst_door_initialize(const insitu_conduit *conduit, const void
     return status;
 }
 
-/* ---- execute ----------------------------------------------------------------------------------------------------- */
+/* ---- execute ---------------------------------------------------------------------------------------------------- */
 
 /* Sets the data of a channel: a mesh of one or several domains, or several named meshes. */
 static bool set_channel(const node *channel)
@@ -152,12 +152,13 @@ static bool set_channel(const node *channel)
     if (!node_find(channel, "data", &data)) return true; /* this rank has no data */
     const bool is_multimesh = strcmp(type, "multimesh") == 0;
     if (!is_multimesh && strcmp(type, "mesh") != 0 && strcmp(type, "amrmesh") != 0)
-        return node_fail(channel, "type", INSITU_ERROR_MESH, "is \"%s\", expected mesh, multimesh or amrmesh", type);
-    if (!is_multimesh) return !insitu_blueprint_set(state.door, channel->name, data.at);
+        return node_set_error(channel, "type", INSITU_ERROR_MESH, "is \"%s\", expected mesh, multimesh or amrmesh",
+                              type);
+    if (!is_multimesh) return !insitu_blueprint_set(state.adaptor, channel->name, data.at);
     for (int64_t i = 0; i < node_child_count(&data); i++) {
         node_child(&data, i, &mesh);
         snprintf(name, sizeof name, "%s/%s", channel->name, mesh.name);
-        if (insitu_blueprint_set(state.door, name, mesh.at)) return false;
+        if (insitu_blueprint_set(state.adaptor, name, mesh.at)) return false;
     }
     return true;
 }
@@ -173,11 +174,11 @@ static bool set_channels(const node *root)
     return true;
 }
 
-static void tell_left_out(const insitu_blueprint_report *report)
+static void print_left_out(const insitu_blueprint_report *report)
 {
-    if (state.rank || strncmp(state.told, report->left_out, sizeof state.told - 1) == 0) return;
-    snprintf(state.told, sizeof state.told, "%s", report->left_out);
-    if (*state.told) fprintf(stderr, "catalyst-insitu: left out:\n%s\n", state.told);
+    if (state.rank || strncmp(state.last_left_out, report->left_out, sizeof state.last_left_out - 1) == 0) return;
+    snprintf(state.last_left_out, sizeof state.last_left_out, "%s", report->left_out);
+    if (*state.last_left_out) fprintf(stderr, "catalyst-insitu: left out:\n%s\n", state.last_left_out);
 }
 
 /* Reads the cycle and time, and whether the node has them. */
@@ -189,59 +190,59 @@ static bool read_state(const node *root, int64_t *cycle, double *time, bool *has
     return node_integer(root, path, false, cycle) && node_real(root, "catalyst/state/time", false, time);
 }
 
-insitu_status catalyst_door_execute(const void *params)
+insitu_status catalyst_adaptor_execute(const void *params)
 {
     node_log log = {.status = INSITU_OK};
     const node root = {state.conduit, &log, params, NULL, {0}};
     int64_t cycle = 0;
     double time = 0;
     bool has_cycle = false, has_time = false;
-    if (!state.session || !state.door) return fail(INSITU_ERROR_ARGUMENT, "catalyst_initialize() has not succeeded");
-    insitu_blueprint_set(state.door, "", NULL); /* begins a step even if there is no channel */
+    if (!state.session || !state.adaptor) return fail(INSITU_ERROR_ARGUMENT, "catalyst_initialize() has not succeeded");
+    insitu_blueprint_set(state.adaptor, "", NULL); /* begins a step even if there is no channel */
     if (read_state(&root, &cycle, &time, &has_cycle, &has_time)) set_channels(&root);
-    if (log.status) insitu_blueprint_refuse(state.door, log.status, log.message);
-    state.status = insitu_blueprint_step(state.door, has_cycle ? &cycle : NULL, has_time ? &time : NULL);
-    tell_left_out(insitu_blueprint_last_report(state.door));
+    if (log.status) insitu_blueprint_refuse(state.adaptor, log.status, log.message);
+    state.status = insitu_blueprint_step(state.adaptor, has_cycle ? &cycle : NULL, has_time ? &time : NULL);
+    print_left_out(insitu_blueprint_last_report(state.adaptor));
     node_log_free(&log);
     *state.message = 0;
-    for (int i = 0; i < state.wanted_count; i++)
+    for (int i = 0; i < state.parameter_count; i++)
         insitu_parameter(state.session, state.parameters[i].name, &state.parameters[i].value);
-    return state.status ? fail(state.status, insitu_blueprint_error(state.door)) : INSITU_OK;
+    return state.status ? fail(state.status, insitu_blueprint_error(state.adaptor)) : INSITU_OK;
 }
 
-/* ---- finalize, results, about ------------------------------------------------------------------------------------ */
+/* ---- finalize, results, about ----------------------------------------------------------------------------------- */
 
-insitu_status catalyst_door_finalize(void)
+insitu_status catalyst_adaptor_finalize(void)
 {
-    insitu_blueprint_destroy(&state.door);
+    insitu_blueprint_destroy(&state.adaptor);
     insitu_status status = insitu_destroy(&state.session);
     if (status) fail(status, insitu_error(NULL));
-    if (state.has_begun_mpi) MPI_Finalize();
-    state.has_begun_mpi = false;
+    if (state.has_initialized_mpi) MPI_Finalize();
+    state.has_initialized_mpi = false;
     return status;
 }
 
-void catalyst_door_results(const catalyst_writer *writer, void *node)
+void catalyst_adaptor_results(const catalyst_writer *writer, void *node)
 {
     char path[NODE_NAME + 32];
     writer->set_string(node, "insitu/status", insitu_status_name(state.status));
     writer->set_string(node, "insitu/error", state.message);
-    if (!state.session || !state.door) return;
+    if (!state.session || !state.adaptor) return;
     const insitu_report *report = insitu_last_report(state.session);
-    const insitu_blueprint_report *of_door = insitu_blueprint_last_report(state.door);
+    const insitu_blueprint_report *adaptor_report = insitu_blueprint_last_report(state.adaptor);
     writer->set_integer(node, "insitu/cycle", report->cycle);
     writer->set_integer(node, "insitu/images", report->images);
     writer->set_real(node, "insitu/total_ms", report->total_ms);
-    writer->set_integer(node, "insitu/bytes_copied", report->bytes_copied + of_door->bytes_copied);
+    writer->set_integer(node, "insitu/bytes_copied", report->bytes_copied + adaptor_report->bytes_copied);
     writer->set_string(node, "insitu/warnings", report->warnings ? report->warnings : "");
-    writer->set_string(node, "insitu/left_out", of_door->left_out);
-    for (int i = 0; i < state.wanted_count; i++) {
+    writer->set_string(node, "insitu/left_out", adaptor_report->left_out);
+    for (int i = 0; i < state.parameter_count; i++) {
         snprintf(path, sizeof path, "insitu/parameters/%s", state.parameters[i].name);
         writer->set_real(node, path, state.parameters[i].value);
     }
 }
 
-void catalyst_door_about(const catalyst_writer *writer, void *node)
+void catalyst_adaptor_about(const catalyst_writer *writer, void *node)
 {
     writer->set_string(node, "catalyst/implementation", "insitu");
     writer->set_string(node, "catalyst/tpl/libinsitu/license", "Apache-2.0");
