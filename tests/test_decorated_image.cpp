@@ -43,7 +43,7 @@ std::vector<float> draw(const std::vector<float> &rgba, const insitu_decorations
     std::vector<float> out = rgba;
     decorate(image, out);
     insitu_word_faults faults;
-    check_words(image, faults);
+    check_text(image, faults);
     for (const char *fault : {faults.font, faults.letters, faults.room}) assert_string_equal(fault, "");
     return out;
 }

@@ -64,7 +64,7 @@ std::vector<float> draw(const char *text, std::string &warning)
     std::vector<float> out = rgba;
     insitu_word_faults faults;
     decorate(image, out);
-    check_words(image, faults);
+    check_text(image, faults);
     warning = faults.letters;
     std::vector<float> red;
     for (std::size_t i = 0; i < out.size(); i += 4) red.push_back(out[i]);
@@ -182,7 +182,7 @@ std::string font_fault(const std::string &folders)
     what.words = &words;
     insitu_word_faults faults;
     setenv("OPENIMAGEIO_FONTS", folders.c_str(), 1);
-    check_words({width, height, nullptr, nullptr, &what, 0, nullptr, nullptr}, faults);
+    check_text({width, height, nullptr, nullptr, &what, 0, nullptr, nullptr}, faults);
     unsetenv("OPENIMAGEIO_FONTS");
     return faults.font;
 }

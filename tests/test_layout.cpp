@@ -48,7 +48,7 @@ void check_lines(const block &b)
 {
     for (std::size_t i = 0; i < b.lines.size(); i++) {
         const area box = box_of(b.lines[i], b.size);
-        assert_true(box.x0 >= b.room.x0 && box.y0 >= b.room.y0 && box.x1 <= b.room.x1 && box.y1 <= b.room.y1);
+        assert_true(box.x0 >= b.bounds.x0 && box.y0 >= b.bounds.y0 && box.x1 <= b.bounds.x1 && box.y1 <= b.bounds.y1);
         for (std::size_t k = 0; k < i; k++) assert_true(are_apart(box, box_of(b.lines[k], b.size)));
         if (b.kind == block_kind::bar) assert_true(are_apart(box, b.gradient));
     }
@@ -57,7 +57,7 @@ void check_lines(const block &b)
 void check_bar(const block &b)
 {
     const area &g = b.gradient;
-    assert_true(g.x0 >= b.room.x0 && g.x1 <= b.room.x1 && g.y0 >= b.room.y0 && g.y1 <= b.room.y1);
+    assert_true(g.x0 >= b.bounds.x0 && g.x1 <= b.bounds.x1 && g.y0 >= b.bounds.y0 && g.y1 <= b.bounds.y1);
     assert_true(g.y1 - g.y0 >= 3.9 * b.size);
 }
 
@@ -77,8 +77,8 @@ void check_layout(const layout &places, const insitu_image &image)
 {
     for (std::size_t i = 0; i < places.blocks.size(); i++) {
         const block &b = places.blocks[i];
-        assert_true(b.room.x0 >= 0 && b.room.y0 >= 0 && b.room.x1 <= image.width && b.room.y1 <= image.height);
-        for (std::size_t k = 0; k < i; k++) assert_true(are_apart(b.room, places.blocks[k].room));
+        assert_true(b.bounds.x0 >= 0 && b.bounds.y0 >= 0 && b.bounds.x1 <= image.width && b.bounds.y1 <= image.height);
+        for (std::size_t k = 0; k < i; k++) assert_true(are_apart(b.bounds, places.blocks[k].bounds));
         check_lines(b);
         if (b.kind == block_kind::bar) check_bar(b);
     }
@@ -141,7 +141,7 @@ void a_label_of_many_letters_is_wrapped(void **)
         const layout places = make_layout(image, measure);
         check_layout(places, image);
         assert_int_equal(places.blocks.size(), 1);
-        assert_true(places.blocks[0].room.x0 > 640 * 2 / 3);
+        assert_true(places.blocks[0].bounds.x0 > 640 * 2 / 3);
     }
 }
 

@@ -13,7 +13,7 @@
 /* A mesh that was passed to the session. */
 typedef struct known_mesh {
     char *name;
-    int64_t step_number; /* step counter when the mesh was last set */
+    int64_t step_number; /* value of the step counter when the mesh was last set */
     uint64_t coordinate_hash, cell_hash, field_names_hash;
     owned_arrays owned;
 } known_mesh;
@@ -24,10 +24,10 @@ struct insitu_blueprint {
     MPI_Comm comm;
     int known_count;
     known_mesh *known_meshes;
-    int next_search;       /* index at which the next search begins */
-    int64_t step_number;   /* number of steps so far */
+    int next_search;       /* index in known_meshes at which the next search begins */
+    int64_t step_number;   /* step counter: the number of steps so far */
     bool has_pending_sets; /* true if something has been set for the next step */
-    node_log log;          /* messages of the calls since the last step */
+    node_log log;          /* errors and reports of the calls since the last step */
     bool has_cycle;        /* a domain of the next step has state/cycle; cycle is the largest */
     int64_t cycle, last_cycle;
     bool has_time;

@@ -12,7 +12,7 @@ enum { SHAPE_POINT = 1, SHAPE_LINE = 3, MAP_SIZE = 65536 };
 typedef struct shape {
     const char *name;
     int type;
-    int vertices; /* 0 if it differs from cell to cell */
+    int vertices; /* vertices per cell; 0 if their number differs from cell to cell */
 } shape;
 
 static const shape shapes[] = {{"tri", INSITU_TRIANGLE, 3},      {"quad", INSITU_QUAD, 4},
@@ -57,8 +57,8 @@ static bool require_integers(const node *parent, const char *path, node_array *o
 /* Lists of vertices or faces, one after the other in connectivity. */
 typedef struct row_list {
     node_array connectivity, sizes, offsets;
-    int64_t count; /* number of lists */
-    int vertices;  /* length of every list; 0 if the lengths are in sizes */
+    int64_t count; /* number of lists in connectivity */
+    int vertices;  /* length of each list; 0 if the lists have different lengths, which are in sizes */
 } row_list;
 
 static int64_t row_size(const row_list *rows, int64_t i)

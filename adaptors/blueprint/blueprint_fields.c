@@ -9,7 +9,7 @@
 typedef struct blueprint_field {
     node at, values;
     bool is_element;
-    int64_t first;      /* index of the first vertex's or cell's tuple in the array */
+    int64_t first;      /* index in the array of the tuple of the first vertex or cell */
     int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
 } blueprint_field;
 
@@ -42,8 +42,8 @@ static bool belongs_to(const node *field, const char *topology)
     return strcmp(name, topology) == 0;
 }
 
-/* Finds the values and association of a field. Returns false if the field is invalid (which sets the error) or is left
- * out (which is reported if `tells`). */
+/* Finds the values and association of a field. Returns false if the field is invalid, which sets the error, or is left
+ * out, which is reported only if reports_left_out. */
 static bool find_field(const node *field, blueprint_field *out, bool reports_left_out)
 {
     const char *association;
@@ -69,7 +69,7 @@ static bool find_field(const node *field, blueprint_field *out, bool reports_lef
 typedef struct field_walk {
     const node *domain;
     const char *topology;
-    bool reports_left_out; /* reports fields that are left out */
+    bool reports_left_out; /* true if fields that are left out are reported */
     node fields, field;
     int64_t next;
     blueprint_field found;

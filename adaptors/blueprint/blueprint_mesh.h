@@ -14,10 +14,10 @@ typedef struct owned_arrays {
 
 typedef struct blueprint_mesh {
     insitu_mesh mesh;
-    insitu_lattice lattice; /* mesh.lattice points to it, unless the topology is unstructured */
-    bool is_left_out;       /* the topology is not drawn; the log contains the reason */
-    bool has_cell_strides;  /* lattice.cell_strides are those of an element field */
-    int *type_map;          /* mesh.cell_type_map points to it, unless NULL */
+    insitu_lattice lattice; /* the lattice to which mesh.lattice points, unless the topology is unstructured */
+    bool is_left_out;       /* true if the topology is not drawn; the log contains the reason */
+    bool has_cell_strides;  /* true if lattice.cell_strides are those of an element field */
+    int *type_map;          /* the table to which mesh.cell_type_map points; may be NULL */
     owned_arrays owned;
 } blueprint_mesh;
 

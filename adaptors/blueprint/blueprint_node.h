@@ -14,7 +14,7 @@ enum { NODE_NAME = 256, NODE_PATH = 512, NODE_MESSAGE = 1024 };
 typedef struct node_log {
     insitu_status status;
     char message[NODE_MESSAGE];
-    char *left_out, *copied_why; /* one line per item; NULL if there is none */
+    char *left_out, *copied_why; /* report texts with one line per item; NULL if there are no items */
     int64_t bytes_copied;
 } node_log;
 
@@ -23,7 +23,7 @@ typedef struct node {
     const insitu_conduit *conduit;
     node_log *log;
     const void *at;
-    const struct node *parent; /* NULL for the root, whose name the caller chose */
+    const struct node *parent; /* parent node; NULL for the root, whose name the caller chose */
     char name[NODE_NAME];
 } node;
 

@@ -20,9 +20,9 @@ static struct catalyst_state {
     insitu_blueprint *adaptor;
     int rank;
     bool has_initialized_mpi;
-    insitu_status status; /* status of the last call */
+    insitu_status status; /* status of the last call to Catalyst's API */
     char message[NODE_MESSAGE + 64];
-    char last_left_out[2048]; /* last text about left out items that was printed to stderr */
+    char last_left_out[2048]; /* last report about left out items that was printed to stderr */
     int parameter_count;
     requested_parameter parameters[PARAMETERS];
 } state;
@@ -149,7 +149,7 @@ static bool set_channel(const node *channel)
     node data, mesh;
     char name[2 * NODE_NAME];
     if (!node_string(channel, "type", &type)) return false;
-    if (!node_find(channel, "data", &data)) return true; /* this rank has no data */
+    if (!node_find(channel, "data", &data)) return true; /* a channel may have no data on this rank */
     const bool is_multimesh = strcmp(type, "multimesh") == 0;
     if (!is_multimesh && strcmp(type, "mesh") != 0 && strcmp(type, "amrmesh") != 0)
         return node_set_error(channel, "type", INSITU_ERROR_MESH, "is \"%s\", expected mesh, multimesh or amrmesh",
@@ -198,7 +198,7 @@ insitu_status catalyst_adaptor_execute(const void *params)
     double time = 0;
     bool has_cycle = false, has_time = false;
     if (!state.session || !state.adaptor) return fail(INSITU_ERROR_ARGUMENT, "catalyst_initialize() has not succeeded");
-    insitu_blueprint_set(state.adaptor, "", NULL); /* begins a step even if there is no channel */
+    insitu_blueprint_set(state.adaptor, "", NULL); /* makes the adaptor begin a step even if there is no channel */
     if (read_state(&root, &cycle, &time, &has_cycle, &has_time)) set_channels(&root);
     if (log.status) insitu_blueprint_refuse(state.adaptor, log.status, log.message);
     state.status = insitu_blueprint_step(state.adaptor, has_cycle ? &cycle : NULL, has_time ? &time : NULL);

@@ -15,16 +15,16 @@
 namespace
 {
 
-struct sheet {
+struct drawing {
     const insitu_image &image;
-    const insitu_decorations &what;
+    const insitu_decorations &decorations;
     std::vector<float> &rgba;
-    typeface *font; /* NULL if there is no text */
+    typeface *font; /* font of the text; NULL if there is no text */
 };
 
 /* ---- pixels ----------------------------------------------------------------------------------------------------- */
 
-float *pixel_at(sheet &s, int x, int y)
+float *pixel_at(drawing &s, int x, int y)
 {
     return &s.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(s.image.width) +
                         static_cast<std::size_t>(x))];
@@ -39,27 +39,28 @@ void blend(float *pixel, const float colour[3], double opacity, bool is_behind)
         pixel[c] = static_cast<float>(pixel[c] * kept + (c < 3 ? static_cast<double>(colour[c]) : 1.0) * seen);
 }
 
-void put_background(sheet &s)
+void blend_background(drawing &s)
 {
     for (std::size_t i = 0; i < s.rgba.size(); i += 4) {
         const float left = 1 - std::min(1.0F, s.rgba[i + 3]);
-        for (std::size_t c = 0; c < 4; c++) s.rgba[i + c] += left * s.what.background[c];
+        for (std::size_t c = 0; c < 4; c++) s.rgba[i + c] += left * s.decorations.background[c];
     }
 }
 
 /* Returns the fraction of the pixel [x, x + 1) that the interval covers. */
-double covered(double low, double high, int x)
+double pixel_coverage(double low, double high, int x)
 {
     return std::clamp(std::min(high, x + 1.0) - std::max(low, static_cast<double>(x)), 0.0, 1.0);
 }
 
-void fill(sheet &s, const area &a, const float colour[3], double opacity)
+void fill(drawing &s, const area &a, const float colour[3], double opacity)
 {
     const int x1 = std::min(s.image.width, static_cast<int>(std::ceil(a.x1)));
     const int y1 = std::min(s.image.height, static_cast<int>(std::ceil(a.y1)));
     for (int y = std::max(0, static_cast<int>(a.y0)); y < y1; y++)
         for (int x = std::max(0, static_cast<int>(a.x0)); x < x1; x++)
-            blend(pixel_at(s, x, y), colour, opacity * covered(a.x0, a.x1, x) * covered(a.y0, a.y1, y), false);
+            blend(pixel_at(s, x, y), colour, opacity * pixel_coverage(a.x0, a.x1, x) * pixel_coverage(a.y0, a.y1, y),
+                  false);
 }
 
 double distance_to(const insitu_stroke &line, double x, double y)
@@ -73,7 +74,7 @@ double distance_to(const insitu_stroke &line, double x, double y)
 
 /* Visits row by row the columns that the line may cross, so that the cost of a line is proportional to its length and
  * not to its bounding box. */
-void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float colour[3], double opacity = 1)
+void draw_stroke(drawing &s, const insitu_stroke &line, double width, const float colour[3], double opacity = 1)
 {
     const double reach = 0.5 * width + 1, dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
     const double top = std::min(line.from[1], line.to[1]) - reach, bottom = std::max(line.from[1], line.to[1]) + reach;
@@ -94,59 +95,62 @@ void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float 
     }
 }
 
-double line_width(const sheet &s)
+double line_width(const drawing &s)
 {
     return std::max(1.0, s.image.height / 540.0);
 }
 
-void draw_strokes(sheet &s, bool behind)
+void draw_strokes(drawing &s, bool behind)
 {
-    for (int i = 0; i < s.what.stroke_count; i++)
-        if (s.what.strokes[i].is_behind == behind) draw_stroke(s, s.what.strokes[i], line_width(s), s.what.colour);
+    for (int i = 0; i < s.decorations.stroke_count; i++)
+        if (s.decorations.strokes[i].is_behind == behind)
+            draw_stroke(s, s.decorations.strokes[i], line_width(s), s.decorations.colour);
 }
 
 /* ---- text ------------------------------------------------------------------------------------------------------- */
 
 /* The opacity of the halo around text and its lines. The halo has the background's colour; there is none if the
  * background is transparent. */
-const double rim_opacity = 0.75;
+const double halo_opacity = 0.75;
 
-double rim_of(int size)
+double halo_width(int size)
 {
     return std::max(1.0, 0.1 * size);
 }
 
-bool find_rim_colour(const sheet &s, float colour[3])
+bool find_halo_colour(const drawing &s, float colour[3])
 {
-    const float alpha = s.what.background[3];
-    for (int c = 0; c < 3; c++) colour[c] = alpha > 0 ? s.what.background[c] / alpha : 0;
+    const float alpha = s.decorations.background[3];
+    for (int c = 0; c < 3; c++) colour[c] = alpha > 0 ? s.decorations.background[c] / alpha : 0;
     return alpha > 0;
 }
 
-void cover_words(sheet &s, const placed_line &line, int size, double rim, const float colour[3], double opacity)
+void draw_glyphs(drawing &s, const placed_line &line, int size, double halo, const float colour[3], double opacity)
 {
     const int left = static_cast<int>(std::lround(line.x)), top = static_cast<int>(std::lround(line.baseline));
-    s.font->draw(line.text, size, rim, [&](int column, int row, double covered) {
+    s.font->draw(line.text, size, halo, [&](int column, int row, double pixel_coverage) {
         const int x = left + column, y = top + row;
         if (x >= 0 && y >= 0 && x < s.image.width && y < s.image.height)
-            blend(pixel_at(s, x, y), colour, opacity * covered, false);
+            blend(pixel_at(s, x, y), colour, opacity * pixel_coverage, false);
     });
 }
 
-void write_line(sheet &s, const placed_line &line, int size)
+void draw_text_line(drawing &s, const placed_line &line, int size)
 {
-    float rim[3];
+    float halo[3];
     if (!s.font || line.text.empty()) return;
-    if (find_rim_colour(s, rim))
-        cover_words(s, line, size, rim_of(size), rim, rim_opacity * static_cast<double>(s.what.background[3]));
-    cover_words(s, line, size, 0, s.what.colour, 1);
+    if (find_halo_colour(s, halo))
+        draw_glyphs(s, line, size, halo_width(size), halo,
+                    halo_opacity * static_cast<double>(s.decorations.background[3]));
+    draw_glyphs(s, line, size, 0, s.decorations.colour, 1);
 }
 
-void draw_rimmed_stroke(sheet &s, const insitu_stroke &line, double width, int size, const float colour[3])
+void draw_stroke_with_halo(drawing &s, const insitu_stroke &line, double width, int size, const float colour[3])
 {
-    float rim[3];
-    if (find_rim_colour(s, rim))
-        draw_stroke(s, line, width + 2 * rim_of(size), rim, rim_opacity * static_cast<double>(s.what.background[3]));
+    float halo[3];
+    if (find_halo_colour(s, halo))
+        draw_stroke(s, line, width + 2 * halo_width(size), halo,
+                    halo_opacity * static_cast<double>(s.decorations.background[3]));
     draw_stroke(s, line, width, colour);
 }
 
@@ -165,7 +169,7 @@ void colour_at(const insitu_colour_bar &bar, double place, float out[3])
     }
 }
 
-void draw_gradient(sheet &s, const insitu_colour_bar &bar, const area &where)
+void draw_gradient(drawing &s, const insitu_colour_bar &bar, const area &where)
 {
     for (int y = static_cast<int>(where.y0); y < where.y1; y++) {
         float colour[3];
@@ -175,17 +179,17 @@ void draw_gradient(sheet &s, const insitu_colour_bar &bar, const area &where)
     }
 }
 
-void draw_frame(sheet &s, const area &a)
+void draw_frame(drawing &s, const area &a)
 {
     const double corners[4][2] = {{a.x0, a.y0}, {a.x1, a.y0}, {a.x1, a.y1}, {a.x0, a.y1}};
     for (int i = 0; i < 4; i++) {
         const double *from = corners[i], *to = corners[(i + 1) % 4];
-        draw_stroke(s, {{from[0], from[1]}, {to[0], to[1]}, false}, line_width(s), s.what.colour);
+        draw_stroke(s, {{from[0], from[1]}, {to[0], to[1]}, false}, line_width(s), s.decorations.colour);
     }
 }
 
 /* Draws small boxes beyond the ends of the bar, if values outside the range have colours of their own. */
-void draw_outside(sheet &s, const insitu_colour_bar &bar, const block &b)
+void draw_out_of_range(drawing &s, const insitu_colour_bar &bar, const block &b)
 {
     const double height = 0.45 * b.size;
     const area &g = b.gradient, below = {g.x0, g.y1, g.x1, g.y1 + height}, above = {g.x0, g.y0 - height, g.x1, g.y0};
@@ -194,55 +198,55 @@ void draw_outside(sheet &s, const insitu_colour_bar &bar, const block &b)
 }
 
 /* Draws a colour bar with its ticks on the right. The numbers and the label are lines of the block. */
-void draw_bar(sheet &s, const block &b)
+void draw_bar(drawing &s, const block &b)
 {
-    const insitu_colour_bar &bar = s.what.bars[b.index];
+    const insitu_colour_bar &bar = s.decorations.bars[b.index];
     draw_gradient(s, bar, b.gradient);
     draw_frame(s, b.gradient);
-    draw_outside(s, bar, b);
+    draw_out_of_range(s, bar, b);
     for (const int i : b.ticks) {
         const double y = tick_row(bar.ticks[i], b.gradient);
-        draw_rimmed_stroke(s, {{b.gradient.x1, y}, {b.gradient.x1 + 0.3 * b.size, y}, false}, line_width(s), b.size,
-                           s.what.colour);
+        draw_stroke_with_halo(s, {{b.gradient.x1, y}, {b.gradient.x1 + 0.3 * b.size, y}, false}, line_width(s), b.size,
+                              s.decorations.colour);
     }
 }
 
 /* ---- scale bar and axes ----------------------------------------------------------------------------------------- */
 
 /* Draws the scale bar below its text. */
-void draw_scale_bar(sheet &s, const block &b)
+void draw_scale_bar(drawing &s, const block &b)
 {
-    const double middle = 0.5 * (b.room.x0 + b.room.x1), half = 0.5 * s.what.scale_bar.length;
-    const double y = b.room.y1 - 0.45 * b.size, tick = 0.25 * b.size, width = 1.5 * line_width(s);
+    const double middle = 0.5 * (b.bounds.x0 + b.bounds.x1), half = 0.5 * s.decorations.scale_bar.length;
+    const double y = b.bounds.y1 - 0.45 * b.size, tick = 0.25 * b.size, width = 1.5 * line_width(s);
     const insitu_stroke strokes[] = {{{middle - half, y}, {middle + half, y}, false},
                                      {{middle - half, y - tick}, {middle - half, y + tick}, false},
                                      {{middle + half, y - tick}, {middle + half, y + tick}, false}};
-    for (const insitu_stroke &stroke : strokes) draw_rimmed_stroke(s, stroke, width, b.size, s.what.colour);
-    for (const insitu_stroke &stroke : strokes) draw_stroke(s, stroke, width, s.what.colour);
+    for (const insitu_stroke &stroke : strokes) draw_stroke_with_halo(s, stroke, width, b.size, s.decorations.colour);
+    for (const insitu_stroke &stroke : strokes) draw_stroke(s, stroke, width, s.decorations.colour);
 }
 
 /* Draws the axes x, y and z in red, green and blue, beginning with the one farthest from the viewer. */
-void draw_axes(sheet &s, const block &b)
+void draw_axes(drawing &s, const block &b)
 {
     static const float colours[3][3] = {{0.8F, 0.05F, 0.05F}, {0.05F, 0.5F, 0.05F}, {0.08F, 0.2F, 0.9F}};
     const double arm = 2.2 * b.size, to_name = arm + 0.6 * b.size;
-    const double middle[2] = {0.5 * (b.room.x0 + b.room.x1), 0.5 * (b.room.y0 + b.room.y1)};
+    const double middle[2] = {0.5 * (b.bounds.x0 + b.bounds.x1), 0.5 * (b.bounds.y0 + b.bounds.y1)};
     int order[3] = {0, 1, 2};
-    std::sort(order, order + 3, [&](int a, int c) { return s.what.axes[a][2] < s.what.axes[c][2]; });
+    std::sort(order, order + 3, [&](int a, int c) { return s.decorations.axes[a][2] < s.decorations.axes[c][2]; });
     for (const int axis : order) {
-        const double *d = s.what.axes[axis];
+        const double *d = s.decorations.axes[axis];
         const double tip[2] = {middle[0] + arm * d[0], middle[1] - arm * d[1]};
         const std::string name(1, static_cast<char>('x' + axis));
-        draw_rimmed_stroke(s, {{middle[0], middle[1]}, {tip[0], tip[1]}, false}, 1.5 * line_width(s), b.size,
-                           colours[axis]);
-        write_line(s, {name, middle[0] + to_name * d[0] - 0.3 * b.size, middle[1] - to_name * d[1] + 0.3 * b.size},
-                   b.size);
+        draw_stroke_with_halo(s, {{middle[0], middle[1]}, {tip[0], tip[1]}, false}, 1.5 * line_width(s), b.size,
+                              colours[axis]);
+        draw_text_line(s, {name, middle[0] + to_name * d[0] - 0.3 * b.size, middle[1] - to_name * d[1] + 0.3 * b.size},
+                       b.size);
     }
 }
 
 /* ---- all decorations -------------------------------------------------------------------------------------------- */
 
-void draw_block(sheet &s, const block &b)
+void draw_block(drawing &s, const block &b)
 {
     switch (b.kind) {
     case block_kind::bar: draw_bar(s, b); break;
@@ -251,13 +255,13 @@ void draw_block(sheet &s, const block &b)
     case block_kind::words:
     case block_kind::label: break;
     }
-    for (const placed_line &line : b.lines) write_line(s, line, b.size);
+    for (const placed_line &line : b.lines) draw_text_line(s, line, b.size);
 }
 
-bool has_words(const insitu_decorations &what)
+bool has_text(const insitu_decorations &decorations)
 {
-    return what.words_count > 0 || what.bar_count > 0 || what.has_axes || what.label_count > 0 ||
-           what.scale_bar.length > 0;
+    return decorations.words_count > 0 || decorations.bar_count > 0 || decorations.has_axes ||
+           decorations.label_count > 0 || decorations.scale_bar.length > 0;
 }
 
 layout place_blocks(const insitu_image &image, const typeface *font)
@@ -280,28 +284,28 @@ std::string describe_left_out(const insitu_image &image, const std::vector<std::
 
 void decorate(const insitu_image &image, std::vector<float> &rgba)
 {
-    const insitu_decorations &what = *image.decorations;
-    sheet s{image, what, rgba, nullptr};
+    const insitu_decorations &decorations = *image.decorations;
+    drawing s{image, decorations, rgba, nullptr};
     std::optional<typeface> font;
-    if (has_words(what)) s.font = &font.emplace();
+    if (has_text(decorations)) s.font = &font.emplace();
     draw_strokes(s, true);
-    put_background(s);
+    blend_background(s);
     draw_strokes(s, false);
     for (const block &b : place_blocks(image, s.font).blocks) draw_block(s, b);
 }
 
-void check_words(const insitu_image &image, insitu_word_faults &out)
+void check_text(const insitu_image &image, insitu_word_faults &out)
 {
-    const auto tell = [](char(&text)[1024], const std::string &words) {
+    const auto store_message = [](char(&text)[1024], const std::string &words) {
         std::snprintf(text, sizeof text, "%s", words.c_str());
     };
     out = {};
-    if (!has_words(*image.decorations)) return;
+    if (!has_text(*image.decorations)) return;
     typeface font;
     const layout places = place_blocks(image, &font);
     for (const block &b : places.blocks)
-        for (const placed_line &line : b.lines) font.look_up(line.text);
-    tell(out.font, font.fault());
-    tell(out.letters, font.missing());
-    tell(out.room, describe_left_out(image, places.left_out));
+        for (const placed_line &line : b.lines) font.record_missing(line.text);
+    store_message(out.font, font.font_fault());
+    store_message(out.letters, font.missing());
+    store_message(out.room, describe_left_out(image, places.left_out));
 }

@@ -10,6 +10,6 @@
 void decorate(const insitu_image &image, std::vector<float> &rgba);
 
 /* Reports text that decorate() leaves out or draws differently: missing fonts, missing glyphs, or lack of space. */
-void check_words(const insitu_image &image, insitu_word_faults &out);
+void check_text(const insitu_image &image, insitu_word_faults &out);
 
 #endif

@@ -88,7 +88,7 @@ class srgb_codes
         return least;
     }
 
-    std::array<double, CODES + 1> begin_{}; /* smallest value of each code */
+    std::array<double, CODES + 1> begin_{}; /* smallest linear value of each sRGB code */
     std::array<std::uint8_t, BINS + 1> first_{};
 };
 
@@ -135,7 +135,7 @@ std::size_t exr_channels(const insitu_image &image)
     return 4 + (image.depth ? 1 : 0) + static_cast<std::size_t>(image.channel_count);
 }
 
-std::vector<float> with_channels(const insitu_image &image)
+std::vector<float> interleave_channels(const insitu_image &image)
 {
     const std::size_t count = exr_channels(image);
     std::vector<float> all(pixel_count(image) * count);
@@ -151,7 +151,7 @@ std::vector<float> with_channels(const insitu_image &image)
 struct layout {
     int channels;
     OIIO::TypeDesc type;
-    const char *file_name; /* the extension selects OpenImageIO's format */
+    const char *file_name; /* a name whose extension selects OpenImageIO's format */
     OIIO::ImageSpec (*describe)(const insitu_image &, const layout &);
 };
 
@@ -164,7 +164,7 @@ OIIO::ImageSpec describe_png(const insitu_image &image, const layout &l)
     spec.attribute("png:compressionLevel", 1);
     spec.attribute("png:filter", 0x10);
     spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("oiio:UnassociatedAlpha", 1); /* the codes are not premultiplied */
+    spec.attribute("oiio:UnassociatedAlpha", 1); /* the pixel values are not premultiplied by alpha */
     return spec;
 }
 
@@ -216,7 +216,7 @@ void write_exr(const insitu_image &image, const std::string &path)
 {
     const std::size_t count = exr_channels(image);
     const layout l{static_cast<int>(count), OIIO::TypeDesc(OIIO::TypeDesc::FLOAT), "picture.exr", describe_exr};
-    const std::vector<float> all = count > 4 ? with_channels(image) : std::vector<float>();
+    const std::vector<float> all = count > 4 ? interleave_channels(image) : std::vector<float>();
     write_pixels(image, l, count > 4 ? all.data() : image.rgba, path);
 }
 
@@ -242,7 +242,7 @@ void write(const insitu_image &image, insitu_image_format format, const std::str
     write_undecorated(finished, format, path);
 }
 
-void place(const insitu_image &image, const insitu_place &at)
+void copy_into_montage(const insitu_image &image, const insitu_place &at)
 {
     std::vector<float> rgba(image.rgba, image.rgba + 4 * pixel_count(image));
     const std::size_t row = 4 * static_cast<std::size_t>(image.width);
@@ -266,7 +266,7 @@ extern "C" insitu_status insitu_image_check_words(const insitu_image *image, ins
 {
     if (!image || !out || !image->decorations || image->width < 1 || image->height < 1) return INSITU_ERROR_ARGUMENT;
     try {
-        check_words(*image, *out);
+        check_text(*image, *out);
         return INSITU_OK;
     } catch (...) {
         *out = {};
@@ -282,7 +282,7 @@ extern "C" insitu_status insitu_image_place(const insitu_image *image, const ins
     if (message && size) std::snprintf(message, size, "%s", is_in ? "" : "no image, or no place for it");
     if (!is_in) return INSITU_ERROR_ARGUMENT;
     try {
-        place(*image, *at);
+        copy_into_montage(*image, *at);
         return INSITU_OK;
     } catch (...) {
         if (message && size) std::snprintf(message, size, "no memory for a picture beside others");

@@ -10,17 +10,17 @@ namespace
 {
 
 /* Lengths relative to the size of the text. */
-const double border = 0.55, pad = 0.15, line_height = 1.2, baseline = 0.95, thickness = 0.9;
+const double border = 0.55, padding = 0.15, line_height = 1.2, baseline = 0.95, thickness = 0.9;
 const double label_width = 7, foot = 0.5, shortest_bar = 4, tick_distance = 1.2, column_gap = 0.5;
-const double shrinking[] = {1, 0.85, 0.7, 0.55, 0.45};
-enum { SMALLEST = 6, MOST_LINES = 3, MOST_LABEL_LINES = 4 }; /* text of 6 pixels is the smallest that is legible */
+const double size_factors[] = {1, 0.85, 0.7, 0.55, 0.45};
+enum { SMALLEST = 6, MOST_LINES = 3, MOST_LABEL_LINES = 4 }; /* text of 6 pixels is the smallest that can be read */
 
-struct sheet {
+struct layout_state {
     const insitu_image &image;
-    const insitu_decorations &what;
-    const word_measure &measure;
+    const insitu_decorations &decorations;
+    const text_measure &measure;
     int size;
-    double x0, y0, x1, y1; /* the picture without its border, in pixels */
+    double x0, y0, x1, y1; /* rectangle of the picture without its border, in pixels */
     layout out;
 };
 
@@ -34,7 +34,7 @@ double pixels(double share, int size)
 std::vector<int> sizes_from(double size)
 {
     std::vector<int> out;
-    for (const double factor : shrinking) {
+    for (const double factor : size_factors) {
         const int next = std::max(static_cast<int>(std::lround(factor * size)),
                                   std::min<int>(SMALLEST, std::max(1, static_cast<int>(size))));
         if (out.empty() || next < out.back()) out.push_back(next);
@@ -49,11 +49,11 @@ bool are_apart(const area &a, const area &b)
     return a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
 }
 
-bool is_free(const sheet &s, const area &room)
+bool is_free(const layout_state &s, const area &bounds)
 {
-    if (!(room.x0 >= s.x0 && room.y0 >= s.y0 && room.x1 <= s.x1 && room.y1 <= s.y1)) return false;
+    if (!(bounds.x0 >= s.x0 && bounds.y0 >= s.y0 && bounds.x1 <= s.x1 && bounds.y1 <= s.y1)) return false;
     return std::all_of(s.out.blocks.begin(), s.out.blocks.end(),
-                       [&](const block &b) { return are_apart(room, b.room); });
+                       [&](const block &b) { return are_apart(bounds, b.bounds); });
 }
 
 bool is_left(insitu_anchor at)
@@ -71,7 +71,7 @@ bool is_at_side(insitu_anchor at)
     return at == INSITU_LEFT || at == INSITU_RIGHT;
 }
 
-area room_at(const sheet &s, insitu_anchor at, double width, double height)
+area bounds_at(const layout_state &s, insitu_anchor at, double width, double height)
 {
     const double middle_x = std::floor(0.5 * (s.image.width - width)),
                  middle_y = std::floor(0.5 * (s.image.height - height));
@@ -82,21 +82,21 @@ area room_at(const sheet &s, insitu_anchor at, double width, double height)
 
 /* Finds the free position of a rectangle of this size that is nearest to its anchor. Horizontal distances count three
  * times, so that blocks with the same anchor are stacked. */
-bool find_room(const sheet &s, insitu_anchor at, double width, double height, area &room)
+bool find_free_bounds(const layout_state &s, insitu_anchor at, double width, double height, area &bounds)
 {
-    const area wanted = room_at(s, at, width, height);
-    std::vector<double> xs{wanted.x0}, ys{wanted.y0};
+    const area anchored = bounds_at(s, at, width, height);
+    std::vector<double> xs{anchored.x0}, ys{anchored.y0};
     for (const block &b : s.out.blocks) {
-        xs.insert(xs.end(), {b.room.x1, b.room.x0 - width});
-        ys.insert(ys.end(), {b.room.y1, b.room.y0 - height});
+        xs.insert(xs.end(), {b.bounds.x1, b.bounds.x0 - width});
+        ys.insert(ys.end(), {b.bounds.y1, b.bounds.y0 - height});
     }
     double least = HUGE_VAL;
     for (const double x : xs)
         for (const double y : ys) {
-            const double way = 3 * std::abs(x - wanted.x0) + std::abs(y - wanted.y0);
-            if (!(way < least) || !is_free(s, {x, y, x + width, y + height})) continue;
-            least = way;
-            room = {x, y, x + width, y + height};
+            const double distance = 3 * std::abs(x - anchored.x0) + std::abs(y - anchored.y0);
+            if (!(distance < least) || !is_free(s, {x, y, x + width, y + height})) continue;
+            least = distance;
+            bounds = {x, y, x + width, y + height};
         }
     return least < HUGE_VAL;
 }
@@ -105,22 +105,23 @@ bool find_room(const sheet &s, insitu_anchor at, double width, double height, ar
 
 /* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters count, and
  * at least one is returned. */
-std::size_t bytes_that_fit(const sheet &s, const std::string &word, int size, double room)
+std::size_t bytes_that_fit(const layout_state &s, const std::string &word, int size, double available_width)
 {
     const double width = s.measure(word, size);
-    auto bytes = static_cast<std::size_t>(static_cast<double>(word.size()) * room / std::max(1.0, width));
+    auto bytes = static_cast<std::size_t>(static_cast<double>(word.size()) * available_width / std::max(1.0, width));
     const auto is_within = [&](std::size_t i) { return (static_cast<unsigned char>(word[i]) & 0xC0) == 0x80; };
     for (bytes = std::min(bytes, word.size()); bytes > 0; bytes--)
-        if (bytes == word.size() || (!is_within(bytes) && s.measure(word.substr(0, bytes), size) <= room)) return bytes;
+        if (bytes == word.size() || (!is_within(bytes) && s.measure(word.substr(0, bytes), size) <= available_width))
+            return bytes;
     for (bytes = 1; bytes < word.size() && is_within(bytes);) bytes++;
     return bytes;
 }
 
 /* Wraps text at blanks. A word that is wider than the available width is split. */
-std::vector<std::string> wrap(const sheet &s, const std::string &text, int size, double room)
+std::vector<std::string> wrap(const layout_state &s, const std::string &text, int size, double available_width)
 {
     std::vector<std::string> lines;
-    if (s.measure(text, size) <= room) return {text};
+    if (s.measure(text, size) <= available_width) return {text};
     std::string line;
     for (std::size_t at = 0; at < text.size();) {
         const std::size_t end = std::min(text.find(' ', at), text.size());
@@ -129,13 +130,14 @@ std::vector<std::string> wrap(const sheet &s, const std::string &text, int size,
         std::string longer = line;
         if (!line.empty()) longer += ' ';
         longer += word;
-        if (s.measure(longer, size) <= room) {
+        if (s.measure(longer, size) <= available_width) {
             line = longer;
             continue;
         }
         if (!line.empty()) lines.push_back(line);
-        while (s.measure(word, size) > room && !word.empty()) { /* each iteration removes at least one character */
-            const std::size_t bytes = bytes_that_fit(s, word, size, room);
+        while (s.measure(word, size) > available_width &&
+               !word.empty()) { /* each iteration removes at least one character */
+            const std::size_t bytes = bytes_that_fit(s, word, size, available_width);
             lines.push_back(word.substr(0, bytes));
             word.erase(0, bytes);
         }
@@ -145,7 +147,7 @@ std::vector<std::string> wrap(const sheet &s, const std::string &text, int size,
     return lines;
 }
 
-double width_of(const sheet &s, const std::vector<std::string> &lines, int size)
+double width_of(const layout_state &s, const std::vector<std::string> &lines, int size)
 {
     int width = 0;
     for (const std::string &line : lines) width = std::max(width, s.measure(line, size));
@@ -153,7 +155,7 @@ double width_of(const sheet &s, const std::vector<std::string> &lines, int size)
 }
 
 /* Checks whether the text was wrapped only at blanks. */
-bool is_whole(const std::string &text, const std::vector<std::string> &lines)
+bool is_wrapped_at_blanks(const std::string &text, const std::vector<std::string> &lines)
 {
     std::string joined;
     for (const std::string &line : lines) joined += (joined.empty() ? "" : " ") + line;
@@ -161,33 +163,33 @@ bool is_whole(const std::string &text, const std::vector<std::string> &lines)
 }
 
 /* Adds lines to the block, aligned to the side of the anchor. */
-void put_lines(const sheet &s, const std::vector<std::string> &lines, insitu_anchor at, block &b)
+void align_lines(const layout_state &s, const std::vector<std::string> &lines, insitu_anchor at, block &b)
 {
-    double y = b.room.y0 + pixels(pad, b.size) + baseline * b.size;
+    double y = b.bounds.y0 + pixels(padding, b.size) + baseline * b.size;
     for (const std::string &line : lines) {
-        const double left = b.room.x0 + pixels(pad, b.size),
-                     over = b.room.x1 - pixels(pad, b.size) - left - s.measure(line, b.size);
+        const double left = b.bounds.x0 + pixels(padding, b.size),
+                     over = b.bounds.x1 - pixels(padding, b.size) - left - s.measure(line, b.size);
         b.lines.push_back({line, left + (is_left(at) ? 0 : is_right(at) ? over : 0.5 * over), y});
         y += line_height * b.size;
     }
 }
 
-bool place_words(sheet &s, int index)
+bool place_words(layout_state &s, int index)
 {
     static const double shares[] = {1, 0.5, 0.3};
-    const insitu_words &words = s.what.words[index];
+    const insitu_words &words = s.decorations.words[index];
     const std::vector<int> sizes = sizes_from(s.size * static_cast<double>(words.size));
     for (const int size : sizes)
         for (const double share : shares) {
-            const double pads = 2 * pixels(pad, size), room = share * (s.x1 - s.x0) - pads;
-            if (!(room > size)) continue;
-            const std::vector<std::string> lines = wrap(s, words.text, size, room);
+            const double pads = 2 * pixels(padding, size), available_width = share * (s.x1 - s.x0) - pads;
+            if (!(available_width > size)) continue;
+            const std::vector<std::string> lines = wrap(s, words.text, size, available_width);
             const bool is_last = size == sizes.back();
-            if (!is_last && (lines.size() > MOST_LINES || !is_whole(words.text, lines))) continue;
+            if (!is_last && (lines.size() > MOST_LINES || !is_wrapped_at_blanks(words.text, lines))) continue;
             block b{block_kind::words, index, size, {}, {}, {}, {}};
             const double height = std::ceil(static_cast<double>(lines.size()) * line_height * size) + pads;
-            if (!find_room(s, words.at, width_of(s, lines, size) + pads, height, b.room)) continue;
-            put_lines(s, lines, words.at, b);
+            if (!find_free_bounds(s, words.at, width_of(s, lines, size) + pads, height, b.bounds)) continue;
+            align_lines(s, lines, words.at, b);
             s.out.blocks.push_back(b);
             return true;
         }
@@ -204,27 +206,27 @@ struct bar_group {
     int size;
     double width, head;
     std::vector<std::vector<std::string>> labels;
-    bool is_readable; /* labels have few lines and no split words */
+    bool is_readable; /* true if the labels have few lines and no split words */
 };
 
-bar_group make_group(const sheet &s, const std::vector<int> &bars, insitu_anchor at, int size)
+bar_group make_group(const layout_state &s, const std::vector<int> &bars, insitu_anchor at, int size)
 {
     bar_group g{bars, at, size, 0, 0, {}, true};
     std::size_t lines = 0;
     for (const int i : bars) {
-        const insitu_colour_bar &bar = s.what.bars[i];
+        const insitu_colour_bar &bar = s.decorations.bars[i];
         int numbers = 0;
         for (int k = 0; k < bar.tick_count; k++) numbers = std::max(numbers, s.measure(bar.ticks[k].text, size));
         const double body = (thickness + 0.5) * size + numbers;
-        const double most = std::min(std::max(body, label_width * size), s.x1 - s.x0 - 2 * pixels(pad, size));
+        const double most = std::min(std::max(body, label_width * size), s.x1 - s.x0 - 2 * pixels(padding, size));
         g.labels.push_back(wrap(s, bar.label, size, most));
-        g.is_readable =
-            g.is_readable && g.labels.back().size() <= MOST_LABEL_LINES && is_whole(bar.label, g.labels.back());
+        g.is_readable = g.is_readable && g.labels.back().size() <= MOST_LABEL_LINES &&
+                        is_wrapped_at_blanks(bar.label, g.labels.back());
         g.width = std::max({g.width, body, width_of(s, g.labels.back(), size)});
         lines = std::max(lines, g.labels.back().size());
     }
-    g.width = std::ceil(g.width) + 2 * pixels(pad, size);
-    g.head = std::ceil(line_height * static_cast<double>(lines) * size + 0.5 * size) + pixels(pad, size);
+    g.width = std::ceil(g.width) + 2 * pixels(padding, size);
+    g.head = std::ceil(line_height * static_cast<double>(lines) * size + 0.5 * size) + pixels(padding, size);
     return g;
 }
 
@@ -240,9 +242,9 @@ std::vector<int> choose_ticks(const insitu_colour_bar &bar, double length, int s
             bool is_apart = true;
             double letters = 0;
             for (int i = first; i < bar.tick_count; i += every) {
-                const double way =
+                const double distance =
                     chosen.empty() ? HUGE_VAL : (bar.ticks[i].place - bar.ticks[chosen.back()].place) * length;
-                is_apart = is_apart && way >= tick_distance * size;
+                is_apart = is_apart && distance >= tick_distance * size;
                 letters += static_cast<double>(std::string(bar.ticks[i].text).size());
                 chosen.push_back(i);
             }
@@ -254,16 +256,16 @@ std::vector<int> choose_ticks(const insitu_colour_bar &bar, double length, int s
     return bar.tick_count ? std::vector<int>{0} : std::vector<int>{};
 }
 
-block make_bar(const sheet &s, const bar_group &g, std::size_t n, const area &room)
+block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const area &bounds)
 {
-    const insitu_colour_bar &bar = s.what.bars[g.bars[n]];
-    const double left = room.x0 + pixels(pad, g.size), edge = pixels(foot + pad, g.size);
-    block b{block_kind::bar, g.bars[n], g.size, room, {}, {}, {}};
-    put_lines(s, g.labels[n], INSITU_LEFT, b);
-    const double spare = std::floor(g.head - pixels(pad, g.size) - 0.5 * g.size -
+    const insitu_colour_bar &bar = s.decorations.bars[g.bars[n]];
+    const double left = bounds.x0 + pixels(padding, g.size), edge = pixels(foot + padding, g.size);
+    block b{block_kind::bar, g.bars[n], g.size, bounds, {}, {}, {}};
+    align_lines(s, g.labels[n], INSITU_LEFT, b);
+    const double spare = std::floor(g.head - pixels(padding, g.size) - 0.5 * g.size -
                                     line_height * g.size * static_cast<double>(b.lines.size()));
     for (placed_line &line : b.lines) line.baseline += spare; /* labels with fewer lines are aligned to the bar */
-    b.gradient = {left, room.y0 + g.head, left + thickness * g.size, room.y1 - edge};
+    b.gradient = {left, bounds.y0 + g.head, left + thickness * g.size, bounds.y1 - edge};
     b.ticks = choose_ticks(bar, b.gradient.y1 - b.gradient.y0, g.size);
     for (const int i : b.ticks)
         b.lines.push_back(
@@ -272,20 +274,20 @@ block make_bar(const sheet &s, const bar_group &g, std::size_t n, const area &ro
 }
 
 /* Finds the part of a vertical strip's height that other blocks leave free, around the middle of the picture. */
-void free_height(const sheet &s, double x0, double x1, double &top, double &bottom)
+void free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;
     for (const block &b : s.out.blocks) {
-        if (b.room.x1 <= x0 || b.room.x0 >= x1) continue;
-        if (b.room.y0 + b.room.y1 < s.image.height)
-            top = std::max(top, b.room.y1);
+        if (b.bounds.x1 <= x0 || b.bounds.x0 >= x1) continue;
+        if (b.bounds.y0 + b.bounds.y1 < s.image.height)
+            top = std::max(top, b.bounds.y1);
         else
-            bottom = std::min(bottom, b.room.y0);
+            bottom = std::min(bottom, b.bounds.y0);
     }
 }
 
 /* Stacks `count` bars of the group, from `first` on, in the column. Returns false if they would be too short. */
-bool fill_column(const sheet &s, const bar_group &g, std::size_t first, std::size_t count, int column,
+bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, std::size_t count, int column,
                  std::vector<block> &out)
 {
     const double pitch = g.width + pixels(column_gap, g.size);
@@ -295,20 +297,20 @@ bool fill_column(const sheet &s, const bar_group &g, std::size_t first, std::siz
     const double share = count == 1 ? 0.62 : count == 2 ? 0.8 : 1;
     const double total = std::min(bottom - top, share * s.image.height);
     const double height = std::floor(total / static_cast<double>(count));
-    if (height - g.head - pixels(foot + pad, g.size) < shortest_bar * g.size) return false;
+    if (height - g.head - pixels(foot + padding, g.size) < shortest_bar * g.size) return false;
     const double middle = std::floor(0.5 * (s.image.height - height * static_cast<double>(count)));
     double y = std::clamp(middle, top, std::max(top, bottom - height * static_cast<double>(count)));
     for (std::size_t n = first; n < first + count; n++, y += height) {
-        const area room = {x0, y, x0 + g.width, y + height};
-        if (!is_free(s, room)) return false;
-        out.push_back(make_bar(s, g, n, room));
+        const area bounds = {x0, y, x0 + g.width, y + height};
+        if (!is_free(s, bounds)) return false;
+        out.push_back(make_bar(s, g, n, bounds));
     }
     return true;
 }
 
 /* Places all bars of the group in the smallest number of columns in which they fit. Several columns may cover at most
  * half of the picture's width, a single one all of it. */
-bool place_group(sheet &s, const bar_group &g)
+bool place_group(layout_state &s, const bar_group &g)
 {
     const std::size_t count = g.bars.size();
     for (std::size_t columns = 1; columns <= count; columns++) {
@@ -317,7 +319,7 @@ bool place_group(sheet &s, const bar_group &g)
         const std::size_t rows = (count + columns - 1) / columns;
         bool is_placed = true;
         const std::size_t used = (count + rows - 1) / rows;
-        for (std::size_t i = 0; i < used && is_placed; i++) { /* the first column is the leftmost */
+        for (std::size_t i = 0; i < used && is_placed; i++) { /* the first column is the leftmost one */
             const std::size_t column = g.at == INSITU_LEFT ? i : used - 1 - i;
             is_placed = fill_column(s, g, i * rows, std::min(rows, count - i * rows), static_cast<int>(column), bars);
         }
@@ -328,7 +330,7 @@ bool place_group(sheet &s, const bar_group &g)
     return false;
 }
 
-bool place_at_any_size(sheet &s, const std::vector<int> &bars, insitu_anchor at)
+bool place_at_largest_size(layout_state &s, const std::vector<int> &bars, insitu_anchor at)
 {
     const std::vector<int> sizes = sizes_from(s.size);
     for (const int size : sizes) {
@@ -338,7 +340,7 @@ bool place_at_any_size(sheet &s, const std::vector<int> &bars, insitu_anchor at)
     return false;
 }
 
-std::string named(const char *what, const char *text)
+std::string quoted_name(const char *decorations, const char *text)
 {
     enum { NAMED = 60 };
     std::string name = text;
@@ -348,43 +350,43 @@ std::string named(const char *what, const char *text)
         if (!name.empty()) name.pop_back(); /* removes the first byte of the cut character, or the last letter */
         name += "...";
     }
-    return std::string(what) + " \"" + name + "\"";
+    return std::string(decorations) + " \"" + name + "\"";
 }
 
 /* Places the bars of a side. If there is not enough space for all, the last ones are left out. */
-void place_bars(sheet &s, insitu_anchor at)
+void place_bars(layout_state &s, insitu_anchor at)
 {
     std::vector<int> bars;
-    for (int i = 0; i < s.what.bar_count; i++)
-        if ((s.what.bars[i].at == INSITU_LEFT) == (at == INSITU_LEFT)) bars.push_back(i);
-    while (!bars.empty() && !place_at_any_size(s, bars, at)) {
-        s.out.left_out.push_back(named("the colour bar", s.what.bars[bars.back()].label));
+    for (int i = 0; i < s.decorations.bar_count; i++)
+        if ((s.decorations.bars[i].at == INSITU_LEFT) == (at == INSITU_LEFT)) bars.push_back(i);
+    while (!bars.empty() && !place_at_largest_size(s, bars, at)) {
+        s.out.left_out.push_back(quoted_name("the colour bar", s.decorations.bars[bars.back()].label));
         bars.pop_back();
     }
 }
 
 /* ---- other decorations ------------------------------------------------------------------------------------------ */
 
-bool place_scale_bar(sheet &s)
+bool place_scale_bar(layout_state &s)
 {
-    const insitu_scale_bar &bar = s.what.scale_bar;
+    const insitu_scale_bar &bar = s.decorations.scale_bar;
     for (const int size : sizes_from(s.size)) {
-        const double pads = 2 * pixels(pad, size),
+        const double pads = 2 * pixels(padding, size),
                      width = std::ceil(std::max<double>(s.measure(bar.text, size), bar.length));
         block b{block_kind::scale_bar, 0, size, {}, {}, {}, {}};
-        if (!find_room(s, bar.at, width + pads, pixels(1.8, size) + pads, b.room)) continue;
-        put_lines(s, {bar.text}, INSITU_TOP, b);
+        if (!find_free_bounds(s, bar.at, width + pads, pixels(1.8, size) + pads, b.bounds)) continue;
+        align_lines(s, {bar.text}, INSITU_TOP, b);
         s.out.blocks.push_back(b);
         return true;
     }
     return false;
 }
 
-bool place_axes(sheet &s)
+bool place_axes(layout_state &s)
 {
     for (const int size : sizes_from(s.size)) {
         block b{block_kind::axes, 0, size, {}, {}, {}, {}};
-        if (!find_room(s, INSITU_BOTTOM_LEFT, pixels(6.8, size), pixels(6.8, size), b.room)) continue;
+        if (!find_free_bounds(s, INSITU_BOTTOM_LEFT, pixels(6.8, size), pixels(6.8, size), b.bounds)) continue;
         s.out.blocks.push_back(b);
         return true;
     }
@@ -393,34 +395,34 @@ bool place_axes(sheet &s)
 
 /* Places a label so that the box of its text has the given distance from its point. The label is omitted if the place
  * is occupied. */
-void place_label(sheet &s, int index)
+void place_label(layout_state &s, int index)
 {
-    const insitu_label &label = s.what.labels[index];
+    const insitu_label &label = s.decorations.labels[index];
     const double width = s.measure(label.text, s.size), height = 0.75 * s.size;
     const double reach =
         label.gap * s.size + 0.5 * (std::abs(label.away[0]) * width + std::abs(label.away[1]) * height);
     const double x = label.at[0] + reach * label.away[0], y = label.at[1] + reach * label.away[1];
-    const double gap = pad * s.size;
-    const area room = {std::floor(x - 0.5 * width - gap), std::floor(y - 0.5 * height - gap),
-                       std::ceil(x + 0.5 * width + gap), std::ceil(y + 0.5 * height + gap)};
+    const double gap = padding * s.size;
+    const area bounds = {std::floor(x - 0.5 * width - gap), std::floor(y - 0.5 * height - gap),
+                         std::ceil(x + 0.5 * width + gap), std::ceil(y + 0.5 * height + gap)};
     const area all = {s.x0, s.y0, s.x1, s.y1};
     s.x0 = s.y0 = 0, s.x1 = s.image.width, s.y1 = s.image.height;
-    if (is_free(s, room))
+    if (is_free(s, bounds))
         s.out.blocks.push_back(
-            {block_kind::label, index, s.size, room, {{label.text, x - 0.5 * width, y + 0.5 * height}}, {}, {}});
+            {block_kind::label, index, s.size, bounds, {{label.text, x - 0.5 * width, y + 0.5 * height}}, {}, {}});
     s.x0 = all.x0, s.y0 = all.y0, s.x1 = all.x1, s.y1 = all.y1;
 }
 
-void place_all_words(sheet &s, bool at_sides)
+void place_all_words(layout_state &s, bool at_sides)
 {
-    for (int i = 0; i < s.what.words_count; i++)
-        if (*s.what.words[i].text && is_at_side(s.what.words[i].at) == at_sides && !place_words(s, i))
-            s.out.left_out.push_back(named("the words", s.what.words[i].text));
+    for (int i = 0; i < s.decorations.words_count; i++)
+        if (*s.decorations.words[i].text && is_at_side(s.decorations.words[i].at) == at_sides && !place_words(s, i))
+            s.out.left_out.push_back(quoted_name("the words", s.decorations.words[i].text));
 }
 
 } // namespace
 
-int word_size(const insitu_image &image)
+int text_size(const insitu_image &image)
 {
     return std::max(1, static_cast<int>(std::lround(image.decorations->size * image.height)));
 }
@@ -430,18 +432,18 @@ double tick_row(const insitu_tick &tick, const area &gradient)
     return gradient.y1 - tick.place * (gradient.y1 - gradient.y0);
 }
 
-layout make_layout(const insitu_image &image, const word_measure &measure)
+layout make_layout(const insitu_image &image, const text_measure &measure)
 {
-    const int size = word_size(image);
+    const int size = text_size(image);
     const double edge = pixels(border, size);
-    sheet s{image, *image.decorations, measure, size, edge, edge, image.width - edge, image.height - edge, {}};
+    layout_state s{image, *image.decorations, measure, size, edge, edge, image.width - edge, image.height - edge, {}};
     place_all_words(s, false);
     place_bars(s, INSITU_RIGHT);
     place_bars(s, INSITU_LEFT);
     place_all_words(s, true);
-    if (s.what.scale_bar.length > 0 && !place_scale_bar(s))
-        s.out.left_out.push_back(named("the scale bar", s.what.scale_bar.text));
-    if (s.what.has_axes && !place_axes(s)) s.out.left_out.emplace_back("the axes");
-    for (int i = 0; i < s.what.label_count; i++) place_label(s, i);
+    if (s.decorations.scale_bar.length > 0 && !place_scale_bar(s))
+        s.out.left_out.push_back(quoted_name("the scale bar", s.decorations.scale_bar.text));
+    if (s.decorations.has_axes && !place_axes(s)) s.out.left_out.emplace_back("the axes");
+    for (int i = 0; i < s.decorations.label_count; i++) place_label(s, i);
     return s.out;
 }

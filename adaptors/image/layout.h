@@ -29,25 +29,26 @@ struct placed_line {
 struct block {
     block_kind kind;
     int index; /* index of the decoration among those of its kind */
-    int size;  /* height of its text in pixels */
-    area room;
+    int size;  /* height of the block's text in pixels */
+    area bounds;
     std::vector<placed_line> lines;
-    area gradient;          /* rectangle of a bar's colours */
+    area gradient;          /* rectangle of a colour bar's colours */
     std::vector<int> ticks; /* indices of the bar's ticks whose numbers are drawn, in ascending order */
 };
 
 struct layout {
     std::vector<block> blocks;
-    std::vector<std::string> left_out; /* for example "the axes"; labels that do not fit are not listed */
+    std::vector<std::string>
+        left_out; /* names of decorations without space, for example "the axes"; labels are not listed */
 };
 
 /* Returns the width in pixels of text with letters of this height. */
-using word_measure = std::function<int(const std::string &text, int size)>;
+using text_measure = std::function<int(const std::string &text, int size)>;
 
-layout make_layout(const insitu_image &image, const word_measure &measure);
+layout make_layout(const insitu_image &image, const text_measure &measure);
 
 /* Returns the height of the text in pixels. */
-int word_size(const insitu_image &image);
+int text_size(const insitu_image &image);
 
 /* Returns the y coordinate of a bar's tick. */
 double tick_row(const insitu_tick &tick, const area &gradient);

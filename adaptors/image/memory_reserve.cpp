@@ -10,13 +10,13 @@ namespace
 
 std::atomic<void *> reserve;
 std::atomic<std::new_handler> handler_before;
-std::mutex lock; /* held as long as a reserve exists */
+std::mutex lock; /* locked while a reserve exists, because there may be only one */
 
 /* Number of bytes left free in addition to the reserve, for allocations that do not use operator new: the loader
  * terminates the process if it has no memory for a thread's variables, and compressors fail. */
 enum { SPARE_BYTES = 4 << 20 };
 
-void give_back()
+void release_reserve()
 {
     void *block = reserve.exchange(nullptr);
     if (block) {
@@ -42,12 +42,12 @@ memory_reserve::memory_reserve(std::size_t bytes)
         throw std::bad_alloc();
     }
     reserve = block;
-    handler_before = std::set_new_handler(give_back);
+    handler_before = std::set_new_handler(release_reserve);
 }
 
 memory_reserve::~memory_reserve()
 {
-    if (std::get_new_handler() == give_back) std::set_new_handler(handler_before);
+    if (std::get_new_handler() == release_reserve) std::set_new_handler(handler_before);
     std::free(reserve.exchange(nullptr));
     lock.unlock();
 }

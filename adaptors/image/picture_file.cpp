@@ -69,7 +69,7 @@ bool is_temporary(const char *name)
 /* ---- temporary files of killed runs ---- */
 
 /* Removes a temporary file of this user if it is not locked. A running writer would hold a lock on it. */
-void remove_if_left(int folder, const char *name)
+void remove_if_unlocked(int folder, const char *name)
 {
     const descriptor file(openat(folder, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     struct stat found;
@@ -78,7 +78,7 @@ void remove_if_left(int folder, const char *name)
     if (flock(file.number(), LOCK_EX | LOCK_NB) == 0) unlinkat(folder, name, 0);
 }
 
-void remove_left_files(int folder)
+void remove_stale_files(int folder)
 {
     const int again = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     const std::unique_ptr<DIR, int (*)(DIR *)> entries(again < 0 ? nullptr : fdopendir(again), closedir);
@@ -86,27 +86,27 @@ void remove_left_files(int folder)
     while (entries) {
         const dirent *entry = readdir(entries.get());
         if (!entry) return;
-        if (is_temporary(entry->d_name)) remove_if_left(folder, entry->d_name);
+        if (is_temporary(entry->d_name)) remove_if_unlocked(folder, entry->d_name);
     }
 }
 
 /* Removes old temporary files of a folder, once per process, because reading a folder with many pictures is slow. */
-void tidy(int folder)
+void remove_stale_files_once(int folder)
 {
-    static std::set<std::pair<dev_t, ino_t>> tidied;
+    static std::set<std::pair<dev_t, ino_t>> cleaned_folders;
     static std::mutex lock;
     struct stat found;
     if (fstat(folder, &found) != 0) return;
     {
         const std::lock_guard<std::mutex> guard(lock);
-        if (!tidied.insert({found.st_dev, found.st_ino}).second) return;
+        if (!cleaned_folders.insert({found.st_dev, found.st_ino}).second) return;
     }
-    remove_left_files(folder);
+    remove_stale_files(folder);
 }
 
 /* ---- the temporary file ---- */
 
-/* A temporary file that is deleted by the destructor, unless keep() has renamed it. */
+/* A temporary file that is deleted by the destructor, unless commit() has renamed it. */
 class temporary_file
 {
   public:
@@ -115,18 +115,18 @@ class temporary_file
         /* Another process that cleans the folder may have removed the file before it was locked. On file systems
          * without locks no files are removed. */
         struct stat made;
-        is_lost_ = flock(file_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-        is_lost_ = is_lost_ || fstat(file_.number(), &made) != 0 || made.st_nlink == 0;
+        was_removed_ = flock(file_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+        was_removed_ = was_removed_ || fstat(file_.number(), &made) != 0 || made.st_nlink == 0;
     }
     temporary_file(const temporary_file &) = delete;
     temporary_file &operator=(const temporary_file &) = delete;
     ~temporary_file()
     {
-        if (!is_kept_) unlinkat(folder_, name_.c_str(), 0);
+        if (!is_committed_) unlinkat(folder_, name_.c_str(), 0);
     }
-    bool is_lost() const { return is_lost_; }
+    bool was_removed() const { return was_removed_; }
     void write(const unsigned char *bytes, std::size_t size);
-    bool keep(const std::string &name);
+    bool commit(const std::string &name);
 
   private:
     int make() const
@@ -139,7 +139,7 @@ class temporary_file
     int folder_;
     std::string name_;
     descriptor file_;
-    bool is_lost_ = false, is_kept_ = false;
+    bool was_removed_ = false, is_committed_ = false;
 };
 
 void temporary_file::write(const unsigned char *bytes, std::size_t size)
@@ -155,13 +155,13 @@ void temporary_file::write(const unsigned char *bytes, std::size_t size)
 
 /* Closes the file and renames it. Returns false if it no longer exists. Closing releases the lock; some file systems
  * report a full disk only when a file is closed. */
-bool temporary_file::keep(const std::string &name)
+bool temporary_file::commit(const std::string &name)
 {
     const int code = file_.close();
     if (code) fail("", code);
-    is_kept_ = renameat(folder_, name_.c_str(), folder_, name.c_str()) == 0;
-    if (!is_kept_ && errno != ENOENT) fail("", errno);
-    return is_kept_;
+    is_committed_ = renameat(folder_, name_.c_str(), folder_, name.c_str()) == 0;
+    if (!is_committed_ && errno != ENOENT) fail("", errno);
+    return is_committed_;
 }
 
 /* ---- the picture ---- */
@@ -180,7 +180,7 @@ int open_folder(const std::filesystem::path &folder)
 
 /* Throws unless the name is free, a regular file or a link: renaming would replace a pipe or a device by the
  * picture. */
-void check_place(int folder, const std::string &name)
+void check_target(int folder, const std::string &name)
 {
     struct stat found;
     if (name.empty()) fail("", EISDIR);
@@ -197,9 +197,9 @@ void check_place(int folder, const std::string &name)
 bool try_to_write(int folder, const std::string &name, const unsigned char *bytes, std::size_t size)
 {
     temporary_file file(folder);
-    if (file.is_lost()) return false;
+    if (file.was_removed()) return false;
     file.write(bytes, size);
-    return file.keep(name);
+    return file.commit(name);
 }
 
 } // namespace
@@ -209,8 +209,8 @@ void write_picture_file(const std::string &path, const unsigned char *bytes, std
     const std::filesystem::path target(path);
     const std::string name = target.filename().string();
     const descriptor folder(open_folder(target.parent_path()));
-    check_place(folder.number(), name);
-    tidy(folder.number());
+    check_target(folder.number(), name);
+    remove_stale_files_once(folder.number());
     /* Another process that cleans the folder may remove the temporary file as one of a killed run: before the file is
      * locked, or if locks do not work across nodes. */
     enum { TRIES = 8 };

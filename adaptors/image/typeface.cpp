@@ -22,7 +22,7 @@ const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-R
 const char32_t replacement = 0xFFFD;
 
 /* Returns whether the call succeeded; throws std::bad_alloc if memory ran out. */
-bool is_done(FT_Error code)
+bool succeeded(FT_Error code)
 {
     if (code == FT_Err_Out_Of_Memory) throw std::bad_alloc();
     return code == FT_Err_Ok;
@@ -44,7 +44,7 @@ std::vector<std::string> find_files(const std::string &folder, const std::string
     return out;
 }
 
-std::string own_folders()
+std::string configured_folders()
 {
     const char *own = std::getenv("OPENIMAGEIO_FONTS");
     return own ? own : "";
@@ -70,7 +70,7 @@ struct opened_font {
 bool try_font(FT_Library library, const char *name, const std::string &path, opened_font &out)
 {
     FT_Face face = nullptr;
-    if (!is_done(FT_New_Face(library, path.c_str(), 0, &face)) || !FT_IS_SCALABLE(face)) {
+    if (!succeeded(FT_New_Face(library, path.c_str(), 0, &face)) || !FT_IS_SCALABLE(face)) {
         if (face) FT_Done_Face(face);
         if (out.unreadable.empty()) out.unreadable = path;
         return false;
@@ -88,7 +88,7 @@ bool open_font(FT_Library library, const std::vector<std::string> &folders, open
     return false;
 }
 
-std::string usual_fonts()
+std::string known_fonts()
 {
     std::string out;
     for (const char *font : fonts) out += (out.empty() ? "" : ", ") + std::string(font);
@@ -129,13 +129,13 @@ int kerning(FT_Face face, FT_UInt before, FT_UInt glyph)
 {
     FT_Vector step = {0, 0};
     if (!before || !glyph || !FT_HAS_KERNING(face)) return 0;
-    if (!is_done(FT_Get_Kerning(face, before, glyph, FT_KERNING_DEFAULT, &step))) return 0;
+    if (!succeeded(FT_Get_Kerning(face, before, glyph, FT_KERNING_DEFAULT, &step))) return 0;
     return static_cast<int>(step.x >> 6);
 }
 
 bool set_size(FT_Face face, int size)
 {
-    return face->size->metrics.y_ppem == size || is_done(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(size)));
+    return face->size->metrics.y_ppem == size || succeeded(FT_Set_Pixel_Sizes(face, 0, static_cast<FT_UInt>(size)));
 }
 
 int advance_of_loaded(FT_Face face)
@@ -145,7 +145,7 @@ int advance_of_loaded(FT_Face face)
 
 /* Loads each glyph and calls visit(x) with the pen's position; returns the position behind the last glyph. */
 template <typename visitor>
-int walk(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int32 flags, visitor visit)
+int lay_out_glyphs(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int32 flags, visitor visit)
 {
     int x = 0;
     FT_UInt before = 0;
@@ -154,7 +154,7 @@ int walk(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int
         const FT_UInt glyph = glyph_of(face, character);
         x += kerning(face, before, glyph);
         before = glyph;
-        if (!is_done(FT_Load_Glyph(face, glyph, flags))) continue;
+        if (!succeeded(FT_Load_Glyph(face, glyph, flags))) continue;
         const int advance = advance_of_loaded(face);
         visit(x);
         x += advance;
@@ -162,7 +162,7 @@ int walk(FT_Face face, const std::vector<char32_t> &characters, int size, FT_Int
     return x;
 }
 
-void cover_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &cover)
+void draw_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &cover)
 {
     for (unsigned row = 0; row < map.rows; row++)
         for (unsigned column = 0; column < map.width; column++) {
@@ -172,16 +172,16 @@ void cover_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &co
 }
 
 /* Covers the pixels within the stroker's radius of the loaded glyph. */
-void cover_widened(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
+void draw_widened(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
 {
     FT_Glyph glyph = nullptr;
-    if (slot->format != FT_GLYPH_FORMAT_OUTLINE || !is_done(FT_Get_Glyph(slot, &glyph))) return;
+    if (slot->format != FT_GLYPH_FORMAT_OUTLINE || !succeeded(FT_Get_Glyph(slot, &glyph))) return;
     FT_Error code = FT_Glyph_StrokeBorder(&glyph, stroker, 0, 1);
     if (!code) code = FT_Glyph_To_Bitmap(&glyph, FT_RENDER_MODE_NORMAL, nullptr, 1);
     const std::unique_ptr<FT_GlyphRec_, void (*)(FT_Glyph)> guard(glyph, FT_Done_Glyph);
-    if (!is_done(code)) return;
+    if (!succeeded(code)) return;
     const auto *const bitmap = reinterpret_cast<FT_BitmapGlyph>(glyph);
-    cover_bitmap(bitmap->bitmap, x + bitmap->left, bitmap->top, cover);
+    draw_bitmap(bitmap->bitmap, x + bitmap->left, bitmap->top, cover);
 }
 
 } // namespace
@@ -200,10 +200,10 @@ std::vector<char32_t> decode_utf8(const std::string &text, bool &is_bad)
 
 typeface::typeface()
 {
-    if (!is_done(FT_Init_FreeType(&library_))) return;
+    if (!succeeded(FT_Init_FreeType(&library_))) return;
     try {
         opened_font font{};
-        is_from_system_ = !open_font(library_, split_folders(own_folders()), font) &&
+        is_from_system_ = !open_font(library_, split_folders(configured_folders()), font) &&
                           open_font(library_, {"/usr/share/fonts", "/usr/local/share/fonts"}, font);
         face_ = font.face, name_ = font.name, file_ = font.file, unreadable_ = font.unreadable;
     } catch (...) {
@@ -236,7 +236,7 @@ int typeface::advance_of(unsigned glyph, int size) const
 {
     const auto known = advances_.find({size, glyph});
     if (known != advances_.end()) return known->second;
-    const int advance = is_done(FT_Load_Glyph(face_, glyph, FT_LOAD_DEFAULT)) ? advance_of_loaded(face_) : 0;
+    const int advance = succeeded(FT_Load_Glyph(face_, glyph, FT_LOAD_DEFAULT)) ? advance_of_loaded(face_) : 0;
     advances_[{size, glyph}] = advance;
     return advance;
 }
@@ -248,33 +248,34 @@ void typeface::draw(const std::string &text, int size, double halo, const cover_
     const std::vector<char32_t> characters = decode_utf8(text, is_bad);
     if (!(halo > 0)) {
         const FT_GlyphSlot slot = face_->glyph;
-        walk(face_, characters, size, FT_LOAD_RENDER,
-             [&](int x) { cover_bitmap(slot->bitmap, x + slot->bitmap_left, slot->bitmap_top, cover); });
+        lay_out_glyphs(face_, characters, size, FT_LOAD_RENDER,
+                       [&](int x) { draw_bitmap(slot->bitmap, x + slot->bitmap_left, slot->bitmap_top, cover); });
         return;
     }
     FT_Stroker stroker = nullptr;
-    if (!is_done(FT_Stroker_New(library_, &stroker))) return;
+    if (!succeeded(FT_Stroker_New(library_, &stroker))) return;
     const std::unique_ptr<FT_StrokerRec_, void (*)(FT_Stroker)> guard(stroker, FT_Stroker_Done);
     FT_Stroker_Set(stroker, std::lround(64 * halo), FT_STROKER_LINECAP_ROUND, FT_STROKER_LINEJOIN_ROUND, 0);
-    walk(face_, characters, size, FT_LOAD_NO_BITMAP, [&](int x) { cover_widened(face_->glyph, stroker, x, cover); });
+    lay_out_glyphs(face_, characters, size, FT_LOAD_NO_BITMAP,
+                   [&](int x) { draw_widened(face_->glyph, stroker, x, cover); });
 }
 
-void typeface::look_up(const std::string &text)
+void typeface::record_missing(const std::string &text)
 {
     if (!face_) return;
     for (const char32_t character : decode_utf8(text, has_bad_bytes_))
         if (glyph_of(face_, character) == 0) missing_.insert(character);
 }
 
-std::string typeface::fault() const
+std::string typeface::font_fault() const
 {
-    const std::string own = own_folders();
+    const std::string own = configured_folders();
     const std::string read = unreadable_.empty() ? "" : " (" + unreadable_ + " cannot be read as a font)";
     if (!face_)
         return "no font was found, so its words are left out" + read +
                "; expected DejaVuSans in the system's fonts or in a folder that OPENIMAGEIO_FONTS names";
     if (own.empty() || !is_from_system_) return "";
-    return "no font was found in OPENIMAGEIO_FONTS, which is " + own + read + "; expected a file of " + usual_fonts() +
+    return "no font was found in OPENIMAGEIO_FONTS, which is " + own + read + "; expected a file of " + known_fonts() +
            "; words are drawn by " + file_;
 }
 

@@ -33,12 +33,12 @@ class typeface
     /* Draws a line of text; halo > 0 widens the glyphs by this number of pixels on every side. */
     void draw(const std::string &text, int size, double halo, const cover_pixel &cover);
     /* Records the characters of the line that are drawn as boxes, for missing(). */
-    void look_up(const std::string &text);
+    void record_missing(const std::string &text);
     /* Returns a message about characters that are drawn as boxes, or an empty string. */
     std::string missing() const;
     /* Returns a message if no font was found, or none in the folders of OPENIMAGEIO_FONTS; otherwise an empty
      * string. */
-    std::string fault() const;
+    std::string font_fault() const;
 
   private:
     int advance_of(unsigned glyph, int size) const;

@@ -39,10 +39,10 @@ namespace
 
 /* One mesh as it is set on the session, with the memory that it uses. The names of the fields belong to VTK's arrays;
  * the session copies them. */
-struct part {
-    hold held;
+struct mesh_part {
+    held_arrays held;
     insitu_mesh mesh;
-    std::unique_ptr<insitu_lattice> lattice; // mesh.lattice points to it, if the data set is structured
+    std::unique_ptr<insitu_lattice> lattice; // the lattice to which mesh.lattice points, if the data set is structured
     std::vector<insitu_field> fields;
 };
 
@@ -53,8 +53,8 @@ struct failure {
 };
 
 /* The accumulated result over all leaves of one insitu_vtk_set(). */
-struct outcome {
-    tally count;
+struct set_result {
+    conversion_log log;
     cell_counts cells;
     int64_t cells_set = 0;
     int meshes = 0;
@@ -66,46 +66,47 @@ struct outcome {
 
 struct insitu_vtk_adaptor {
     insitu_session *session = nullptr;
-    std::map<std::string, std::map<std::string, part>> parts; // by the name given to insitu_vtk_set(), then by mesh
+    std::map<std::string, std::map<std::string, mesh_part>>
+        parts; // mesh parts, by the name given to insitu_vtk_set() and the mesh's name
     std::string error, copied_why, cells_why, warnings;
 };
 
 namespace
 {
 
-constexpr unsigned char ghosts_not_drawn =
+constexpr unsigned char hiding_bits =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
 
 /* Sets the ghost flags. VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array is used if
  * it contains only the former, and no array is set if nothing is hidden. */
 void set_ghosts(vtkDataSet *grid, const vtkSmartPointer<vtkUnsignedCharArray> &ghosts, const cell_list &cells,
-                const std::string &what, tally &count, part &p)
+                const std::string &what, conversion_log &log, mesh_part &p)
 {
     if (!ghosts) return;
     const unsigned char *flags = ghosts->GetPointer(0);
     const vtkIdType flag_count = ghosts->GetNumberOfValues();
     unsigned all = 0;
     for (vtkIdType i = 0; i < flag_count; i++) all |= flags[i];
-    if ((all & ghosts_not_drawn) == 0) return;
-    if (cells.is_one_to_one && (all & ~static_cast<unsigned>(ghosts_not_drawn)) == 0) {
+    if ((all & hiding_bits) == 0) return;
+    if (cells.is_one_to_one && (all & ~static_cast<unsigned>(hiding_bits)) == 0) {
         p.held.objects.emplace_back(ghosts);
         p.mesh.ghosts = {flags, INSITU_UINT8, 0};
         if (ghosts == grid->GetCellGhostArray())
-            count.bytes_borrowed += cells.count;
+            log.bytes_borrowed += cells.count;
         else
-            count.copied(what + " ghosts", "flags that are no bytes of VTK's", cells.count);
+            log.copied(what + " ghosts", "flags that are no bytes of VTK's", cells.count);
         return;
     }
     auto *copy = reinterpret_cast<unsigned char *>(p.held.allocate(static_cast<size_t>(cells.count)));
     for (int64_t i = 0; i < cells.count; i++) {
         const int64_t from = cells.is_one_to_one ? i : cells.source[static_cast<size_t>(i)];
-        copy[i] = (flags[from] & ghosts_not_drawn) != 0;
+        copy[i] = (flags[from] & hiding_bits) != 0;
     }
     p.mesh.ghosts = {copy, INSITU_UINT8, 0};
-    count.copied(what + " ghosts", "flags that hide a cell picked out", cells.count);
+    log.copied(what + " ghosts", "flags that hide a cell picked out", cells.count);
 }
 
-void add_field(const char *name, insitu_centring centring, const array_view &view, part &p)
+void add_field(const char *name, insitu_centring centring, const array_view &view, mesh_part &p)
 {
     insitu_field field;
     insitu_field_defaults(&field);
@@ -118,7 +119,7 @@ void add_field(const char *name, insitu_centring centring, const array_view &vie
     p.fields.push_back(field);
 }
 
-bool has_field(const part &p, const std::string &name)
+bool has_field(const mesh_part &p, const std::string &name)
 {
     for (const insitu_field &field : p.fields)
         if (name == field.name) return true;
@@ -127,64 +128,65 @@ bool has_field(const part &p, const std::string &name)
 
 /* Checks whether an array becomes a field: it must be numeric, have a name and the right length, and not be VTK's ghost
  * flags. */
-bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, tally &count)
+bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, conversion_log &log)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
     if (name.empty() || name == vtkDataSetAttributes::GhostArrayName() || name == "avtGhostZones") return false;
     if (array->GetNumberOfTuples() == expected && array->GetNumberOfComponents() > 0) return true;
-    count.warn(what + ": array '" + name + "' has " + std::to_string(array->GetNumberOfTuples()) +
-               " tuples, expected " + std::to_string(expected) + ": left out");
+    log.warn(what + ": array '" + name + "' has " + std::to_string(array->GetNumberOfTuples()) + " tuples, expected " +
+             std::to_string(expected) + ": left out");
     return false;
 }
 
-void add_point_fields(vtkDataSet *grid, const std::string &what, tally &count, part &p)
+void add_point_fields(vtkDataSet *grid, const std::string &what, conversion_log &log, mesh_part &p)
 {
     vtkPointData *data = grid->GetPointData();
     for (int i = 0; i < data->GetNumberOfArrays(); i++) {
         vtkDataArray *array = data->GetArray(i);
-        if (!is_field(array, grid->GetNumberOfPoints(), what, count)) continue;
+        if (!is_field(array, grid->GetNumberOfPoints(), what, log)) continue;
         const std::string field = what + " field '" + array->GetName() + "'";
         p.held.objects.emplace_back(array);
-        add_field(array->GetName(), INSITU_VERTEX, view_array(array, field, p.held, count), p);
+        add_field(array->GetName(), INSITU_VERTEX, view_array(array, field, p.held, log), p);
     }
 }
 
-void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
+void add_cell_fields(vtkDataSet *grid, const cell_list &cells, const std::string &what, conversion_log &log,
+                     mesh_part &p)
 {
     vtkCellData *data = grid->GetCellData();
     for (int i = 0; i < data->GetNumberOfArrays(); i++) {
         vtkDataArray *array = data->GetArray(i);
-        if (!is_field(array, grid->GetNumberOfCells(), what, count)) continue;
+        if (!is_field(array, grid->GetNumberOfCells(), what, log)) continue;
         const std::string field = what + " field '" + array->GetName() + "'";
         if (has_field(p, array->GetName())) {
-            count.warn(field + " of the cells left out: the points have one of that name");
+            log.warn(field + " of the cells left out: the points have one of that name");
             continue;
         }
         p.held.objects.emplace_back(array);
         if (cells.is_one_to_one) {
-            add_field(array->GetName(), INSITU_CELL, view_array(array, field, p.held, count), p);
+            add_field(array->GetName(), INSITU_CELL, view_array(array, field, p.held, log), p);
             continue;
         }
-        hold passing;
-        tally not_kept;
-        const array_view picked = gather(view_array(array, field, passing, not_kept), cells.source, p.held);
-        count.copied(field, "cells split or left out", picked.tuple_count * picked.tuple_stride_bytes);
+        held_arrays temporary;
+        conversion_log discarded_log;
+        const array_view picked = gather(view_array(array, field, temporary, discarded_log), cells.source, p.held);
+        log.copied(field, "cells split or left out", picked.tuple_count * picked.tuple_stride_bytes);
         add_field(array->GetName(), INSITU_CELL, picked, p);
     }
 }
 
 /* Fills p from grid. If there is nothing to draw, p.mesh.cell_count is 0. */
-void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out, part &p)
+void make_mesh_part(vtkUnstructuredGrid *grid, const std::string &name, set_result &out, mesh_part &p)
 {
     const std::string what = "mesh '" + name + "'";
     insitu_mesh_defaults(&p.mesh);
     cell_list cells;
     cell_counts counts;
-    tally count;
+    conversion_log log;
     std::string error;
-    const cells_view view = {what, p.held, count, p.mesh, cells, counts};
+    const cells_view view = {what, p.held, log, p.mesh, cells, counts};
     if (!view_cells(grid, view, error)) throw failure{INSITU_ERROR_MESH, error};
-    tell_about_cells(counts, what, out.count);
+    log_cells(counts, what, out.log);
     out.cells.split += counts.split;
     out.cells.linear += counts.linear;
     out.cells.flat += counts.flat;
@@ -194,32 +196,32 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     vtkPoints *points = grid->GetPoints();
     if (!points || points->GetNumberOfPoints() == 0) throw failure{INSITU_ERROR_MESH, what + ": cells without points"};
     p.mesh.vertex_count = points->GetNumberOfPoints();
-    view_points(points->GetData(), what + " points", p.held, count, p.mesh.coordinates);
+    view_points(points->GetData(), what + " points", p.held, log, p.mesh.coordinates);
     set_ghosts(grid,
                vtkSmartPointer<vtkUnsignedCharArray>::Take(
                    insitu_vtk_ghost_flags(grid->GetCellData(), grid->GetNumberOfCells())),
-               cells, what, count, p);
-    add_point_fields(grid, what, count, p);
-    add_cell_fields(grid, cells, what, count, p);
+               cells, what, log, p);
+    add_point_fields(grid, what, log, p);
+    add_cell_fields(grid, cells, what, log, p);
 
-    out.count.add(count);
+    out.log.add(log);
     out.cells_set += cells.count;
 }
 
 /* Fills p from a structured data set. Returns false if data is not structured. */
-bool make_lattice_part(vtkDataSet *data, const std::string &name, outcome &out, part &p)
+bool make_lattice_part(vtkDataSet *data, const std::string &name, set_result &out, mesh_part &p)
 {
     const std::string what = "mesh '" + name + "'";
-    tally count;
+    conversion_log log;
     cell_list cells;
     insitu_mesh_defaults(&p.mesh);
     p.lattice = std::make_unique<insitu_lattice>();
-    if (!view_lattice(data, what, p.held, count, p.mesh, *p.lattice)) return false;
+    if (!view_lattice(data, what, p.held, log, p.mesh, *p.lattice)) return false;
     cells.count = p.mesh.cell_count;
-    set_ghosts(data, lattice_flags(data, *p.lattice), cells, what, count, p);
-    add_point_fields(data, what, count, p);
-    add_cell_fields(data, cells, what, count, p);
-    out.count.add(count);
+    set_ghosts(data, lattice_flags(data, *p.lattice), cells, what, log, p);
+    add_point_fields(data, what, log, p);
+    add_cell_fields(data, cells, what, log, p);
+    out.log.add(log);
     out.cells_set += cells.count;
     return true;
 }
@@ -229,14 +231,14 @@ void check(insitu_vtk_adaptor *adaptor, insitu_status status)
     if (status != INSITU_OK) throw failure{status, insitu_error(adaptor->session)};
 }
 
-void set_part(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name, part &&fresh,
-              outcome &out)
+void set_part(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
+              mesh_part &&new_part, set_result &out)
 {
-    if (fresh.mesh.cell_count == 0) return;
+    if (new_part.mesh.cell_count == 0) return;
     out.names.insert(name);
-    part &kept = parts[name];
-    check(adaptor, insitu_set_mesh(adaptor->session, name.c_str(), &fresh.mesh));
-    kept = std::move(fresh);
+    mesh_part &kept = parts[name];
+    check(adaptor, insitu_set_mesh(adaptor->session, name.c_str(), &new_part.mesh));
+    kept = std::move(new_part);
     out.meshes++;
     for (const insitu_field &field : kept.fields) {
         check(adaptor, insitu_set_field(adaptor->session, name.c_str(), &field));
@@ -244,16 +246,16 @@ void set_part(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     }
 }
 
-void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-              vtkUnstructuredGrid *grid, outcome &out)
+void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
+              vtkUnstructuredGrid *grid, set_result &out)
 {
-    part fresh;
-    make_part(grid, name, out, fresh);
-    set_part(adaptor, parts, name, std::move(fresh), out);
+    mesh_part new_part;
+    make_mesh_part(grid, name, out, new_part);
+    set_part(adaptor, parts, name, std::move(new_part), out);
 }
 
 /* Reports the bytes of the lists that insitu_vtk_make_grid() allocated for data. */
-void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, tally &count)
+void log_made_lists(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, conversion_log &log)
 {
     if (grid->GetNumberOfCells() == 0) return;
     const std::string of = std::string(" of a ") + data->GetClassName();
@@ -262,20 +264,20 @@ void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::
     const int64_t id = cells->IsStorage64Bit() ? 8 : 4;
     const int64_t lists = cells->GetNumberOfConnectivityIds() + cells->GetNumberOfCells() + 1;
     if (polygons && polygons->GetPolys() == cells)
-        count.copied(what, "the types" + of + "'s cells listed", grid->GetNumberOfCells());
+        log.copied(what, "the types" + of + "'s cells listed", grid->GetNumberOfCells());
     else
-        count.copied(what, "the cells" + of + " listed", lists * id + grid->GetNumberOfCells());
+        log.copied(what, "the cells" + of + " listed", lists * id + grid->GetNumberOfCells());
     if (!vtkPointSet::SafeDownCast(data)) {
         const int64_t point = 3 * grid->GetPoints()->GetData()->GetDataTypeSize();
-        count.copied(what + " points", "those" + of + " listed", point * grid->GetNumberOfPoints());
+        log.copied(what + " points", "those" + of + " listed", point * grid->GetNumberOfPoints());
     }
     if (grid->GetCellGhostArray() != data->GetCellGhostArray())
-        count.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
+        log.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
 }
 
 /* Sets a data set that is not an unstructured grid. flags, unless null, replace its ghost flags. */
-void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-               vtkDataSet *data, vtkUnsignedCharArray *flags, outcome &out)
+void set_converted(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
+                   vtkDataSet *data, vtkUnsignedCharArray *flags, set_result &out)
 {
     vtkSmartPointer<vtkDataSet> flagged = data;
     if (flags) {
@@ -283,36 +285,35 @@ void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, 
         flagged->ShallowCopy(data);
         flagged->GetCellData()->AddArray(flags);
     }
-    part fresh;
-    if (make_lattice_part(flagged, name, out, fresh)) {
+    mesh_part new_part;
+    if (make_lattice_part(flagged, name, out, new_part)) {
         if (flags)
-            out.count.copied("mesh '" + name + "' ghosts", "cells that are hidden or refined, flagged",
-                             fresh.mesh.cell_count);
-        set_part(adaptor, parts, name, std::move(fresh), out);
+            out.log.copied("mesh '" + name + "' ghosts", "cells that are hidden or refined, flagged",
+                           new_part.mesh.cell_count);
+        set_part(adaptor, parts, name, std::move(new_part), out);
         return;
     }
     const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(flagged));
-    tell_what_was_made(grid, data, "mesh '" + name + "'", out.count);
+    log_made_lists(grid, data, "mesh '" + name + "'", out.log);
     set_leaf(adaptor, parts, name, grid, out);
 }
 
 /* Sets the leaf of a composite at the iterator, unless it is an unstructured grid. */
-void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-                    vtkCompositeDataSet *composite, vtkCompositeDataIterator *it, outcome &out)
+void set_converted_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
+                        vtkCompositeDataSet *composite, vtkCompositeDataIterator *it, set_result &out)
 {
     auto *data = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
     auto *amr = vtkOverlappingAMR::SafeDownCast(composite);
     auto *at = vtkUniformGridAMRDataIterator::SafeDownCast(it);
     vtkSmartPointer<vtkUnsignedCharArray> flags;
     if (amr && at)
-        flags =
-            refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'", out.count);
-    set_other(adaptor, parts, name, data, flags, out);
+        flags = refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'", out.log);
+    set_converted(adaptor, parts, name, data, flags, out);
 }
 
 /* Sets every leaf. Empty leaves are counted, so that a leaf has the same number on all ranks. */
-void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-                vtkCompositeDataSet *composite, outcome &out)
+void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
+                vtkCompositeDataSet *composite, set_result &out)
 {
     const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
     it->SkipEmptyNodesOff();
@@ -324,14 +325,14 @@ void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts,
         if (auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf))
             set_leaf(adaptor, parts, leaf_name, grid, out);
         else if (vtkDataSet::SafeDownCast(leaf))
-            set_other_leaf(adaptor, parts, leaf_name, composite, it, out);
+            set_converted_leaf(adaptor, parts, leaf_name, composite, it, out);
         else
-            out.count.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
+            out.log.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
     }
 }
 
-void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-              vtkDataObject *data, outcome &out)
+void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
+              vtkDataObject *data, set_result &out)
 {
     if (!data) return;
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data))
@@ -339,14 +340,15 @@ void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     else if (auto *composite = vtkCompositeDataSet::SafeDownCast(data))
         set_leaves(adaptor, parts, name, composite, out);
     else if (auto *other = vtkDataSet::SafeDownCast(data))
-        set_other(adaptor, parts, name, other, nullptr, out);
+        set_converted(adaptor, parts, name, other, nullptr, out);
     else
         throw failure{INSITU_ERROR_ARGUMENT, "mesh '" + name + "': a " + data->GetClassName() +
                                                  " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
 /* Removes the meshes that an earlier call set and this one did not. */
-void remove_others(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::set<std::string> &names)
+void remove_meshes_not_set(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts,
+                           const std::set<std::string> &names)
 {
     for (auto it = parts.begin(); it != parts.end();) {
         if (names.count(it->first) > 0) {
@@ -358,23 +360,23 @@ void remove_others(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &par
     }
 }
 
-void set_all(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data, outcome &out)
+void set_all(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data, set_result &out)
 {
     if (!name || !name[0]) throw failure{INSITU_ERROR_ARGUMENT, "insitu_vtk_set: a mesh needs a name"};
-    std::map<std::string, part> &parts = adaptor->parts[name];
+    std::map<std::string, mesh_part> &parts = adaptor->parts[name];
     set_data(adaptor, parts, name, data, out);
-    remove_others(adaptor, parts, out.names);
+    remove_meshes_not_set(adaptor, parts, out.names);
     if (out.cells_set == 0 && out.cells.not_drawn > 0)
         throw failure{INSITU_ERROR_MESH, "mesh '" + std::string(name) + "': none of its " +
                                              std::to_string(out.cells.not_drawn) +
-                                             " cells can be drawn: " + out.count.cells_why};
+                                             " cells can be drawn: " + out.log.cells_why};
 }
 
-void fill_report(insitu_vtk_adaptor *adaptor, outcome &out, insitu_vtk_report *report)
+void fill_report(insitu_vtk_adaptor *adaptor, set_result &out, insitu_vtk_report *report)
 {
-    adaptor->copied_why = std::move(out.count.copied_why);
-    adaptor->cells_why = std::move(out.count.cells_why);
-    adaptor->warnings = std::move(out.count.warnings);
+    adaptor->copied_why = std::move(out.log.copied_why);
+    adaptor->cells_why = std::move(out.log.cells_why);
+    adaptor->warnings = std::move(out.log.warnings);
     if (!report) return;
     *report = {out.meshes,
                out.fields,
@@ -383,15 +385,15 @@ void fill_report(insitu_vtk_adaptor *adaptor, outcome &out, insitu_vtk_report *r
                out.cells.linear,
                out.cells.flat,
                out.cells.not_drawn,
-               out.count.bytes_borrowed,
-               out.count.bytes_copied,
+               out.log.bytes_borrowed,
+               out.log.bytes_copied,
                adaptor->copied_why.c_str(),
                adaptor->cells_why.c_str(),
                adaptor->warnings.c_str()};
 }
 
 /* Calls body and converts any exception to a status and a message. */
-template <typename Body> insitu_status guarded(insitu_vtk_adaptor *adaptor, Body body) noexcept
+template <typename Body> insitu_status catch_exceptions(insitu_vtk_adaptor *adaptor, Body body) noexcept
 {
     try {
         adaptor->error.clear();
@@ -432,8 +434,8 @@ insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkD
 {
     if (report) *report = {0, 0, 0, 0, 0, 0, 0, 0, 0, "", "", ""};
     if (!adaptor) return INSITU_ERROR_ARGUMENT;
-    outcome out;
-    const insitu_status status = guarded(adaptor, [&] { set_all(adaptor, name, data, out); });
+    set_result out;
+    const insitu_status status = catch_exceptions(adaptor, [&] { set_all(adaptor, name, data, out); });
     fill_report(adaptor, out, report);
     return status;
 }

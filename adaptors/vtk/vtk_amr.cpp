@@ -52,7 +52,7 @@ box cells_of(const vtkAMRBox &of, int64_t ratio)
     return b;
 }
 
-box common(const box &a, const box &b)
+box intersection(const box &a, const box &b)
 {
     box c;
     for (size_t axis = 0; axis < 3; axis++) {
@@ -93,7 +93,7 @@ vtkSmartPointer<vtkUnsignedCharArray> copied_flags(vtkDataSet *data)
 }
 
 /* Sets REFINEDCELL for the cells of box `in` that lie in `part`. In the array i varies fastest. */
-void mark(const box &in, const box &part, vtkUnsignedCharArray *flags)
+void flag_refined(const box &in, const box &part, vtkUnsignedCharArray *flags)
 {
     for (int64_t k = part.low[2]; k < part.high[2]; k++)
         for (int64_t j = part.low[1]; j < part.high[1]; j++) {
@@ -106,7 +106,7 @@ void mark(const box &in, const box &part, vtkUnsignedCharArray *flags)
 } // namespace
 
 vtkSmartPointer<vtkUnsignedCharArray> refined_flags(vtkOverlappingAMR *amr, unsigned level, unsigned number,
-                                                    vtkDataSet *data, const std::string &what, tally &count)
+                                                    vtkDataSet *data, const std::string &what, conversion_log &log)
 {
     vtkSmartPointer<vtkUnsignedCharArray> flags;
     if (!amr->GetAMRInfo() || level + 1 >= amr->GetNumberOfLevels()) return flags;
@@ -114,16 +114,15 @@ vtkSmartPointer<vtkUnsignedCharArray> refined_flags(vtkOverlappingAMR *amr, unsi
     const box own = cells_of(amr->GetAMRBox(level, number), 1);
     const int64_t ratio = ratio_to_next(amr, level);
     if (finer > 0 && (own.cells() != data->GetNumberOfCells() || ratio < 1)) {
-        count.warn(what +
-                   ": the AMR's boxes, spacings or ratios are not set, or are not those of its grids: only ghost "
-                   "flags tell which of its cells are refined");
+        log.warn(what + ": the AMR's boxes, spacings or ratios are not set, or are not those of its grids: only ghost "
+                        "flags tell which of its cells are refined");
         return flags;
     }
     for (unsigned i = 0; i < finer; i++) {
-        const box part = common(own, cells_of(amr->GetAMRBox(level + 1, i), ratio));
+        const box part = intersection(own, cells_of(amr->GetAMRBox(level + 1, i), ratio));
         if (part.is_empty()) continue;
         if (!flags) flags = copied_flags(data);
-        mark(own, part, flags);
+        flag_refined(own, part, flags);
     }
     return flags;
 }

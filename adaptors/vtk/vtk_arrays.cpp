@@ -53,7 +53,7 @@ template <typename T> bool borrow_aos(vtkDataArray *array, array_view &view)
 }
 
 /* Returns the distance in bytes between blocks if they are equally spaced in ascending order, otherwise 0. */
-template <typename T> int64_t even_stride(vtkSOADataArrayTemplate<T> *array)
+template <typename T> int64_t block_stride(vtkSOADataArrayTemplate<T> *array)
 {
     auto address = [array](int c) { return reinterpret_cast<uintptr_t>(array->GetComponentArrayPointer(c)); };
     const int components = array->GetNumberOfComponents();
@@ -69,7 +69,7 @@ template <typename T> bool borrow_soa(vtkDataArray *array, array_view &view)
 {
     auto *typed = vtkSOADataArrayTemplate<T>::FastDownCast(array);
     if (!typed || array->GetNumberOfTuples() == 0) return false;
-    const int64_t stride = even_stride(typed);
+    const int64_t stride = block_stride(typed);
     if (stride == 0) return false;
     view = shape_of(array, element_type<T>());
     view.data = typed->GetComponentArrayPointer(0);
@@ -84,7 +84,7 @@ template <typename T> bool borrow(vtkDataArray *array, array_view &view)
 }
 
 /* Copies values of VTK's type From to type To, which must represent them all. */
-template <typename From, typename To> bool convert(vtkDataArray *array, hold &held, array_view &view)
+template <typename From, typename To> bool convert(vtkDataArray *array, held_arrays &held, array_view &view)
 {
     auto *typed = vtkAOSDataArrayTemplate<From>::FastDownCast(array);
     if (!typed) return false;
@@ -98,7 +98,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, hold &he
 }
 
 /* Copies an array of any class, through VTK's access by double. */
-template <typename To> array_view convert_any(vtkDataArray *array, hold &held)
+template <typename To> array_view convert_any(vtkDataArray *array, held_arrays &held)
 {
     array_view view = shape_of(array, element_type<To>());
     const size_t count = static_cast<size_t>(view.tuple_count) * static_cast<size_t>(view.component_count);
@@ -109,7 +109,7 @@ template <typename To> array_view convert_any(vtkDataArray *array, hold &held)
     return view;
 }
 
-array_view copy_array(vtkDataArray *array, hold &held)
+array_view copy_array(vtkDataArray *array, held_arrays &held)
 {
     array_view view;
     if (convert<char, int32_t>(array, held, view) || convert<signed char, int32_t>(array, held, view) ||
@@ -166,29 +166,29 @@ void add_lines(std::string &text, const std::string &lines)
 
 } // namespace
 
-std::byte *hold::allocate(size_t bytes)
+std::byte *held_arrays::allocate(size_t bytes)
 {
     copies.push_back(std::make_unique<std::byte[]>(bytes > 0 ? bytes : 1));
     return copies.back().get();
 }
 
-void tally::copied(const std::string &what, const std::string &why, int64_t bytes)
+void conversion_log::copied(const std::string &what, const std::string &why, int64_t bytes)
 {
     bytes_copied += bytes;
     add_lines(copied_why, what + ": " + why + " (" + std::to_string(bytes) + " bytes)");
 }
 
-void tally::about_cells(const std::string &text)
+void conversion_log::note_cells(const std::string &text)
 {
     add_lines(cells_why, text);
 }
 
-void tally::warn(const std::string &text)
+void conversion_log::warn(const std::string &text)
 {
     add_lines(warnings, text);
 }
 
-void tally::add(const tally &other)
+void conversion_log::add(const conversion_log &other)
 {
     bytes_borrowed += other.bytes_borrowed;
     bytes_copied += other.bytes_copied;
@@ -217,39 +217,40 @@ int64_t type_size(insitu_type type)
     }
 }
 
-array_view view_array(vtkDataArray *array, const std::string &what, hold &held, tally &count)
+array_view view_array(vtkDataArray *array, const std::string &what, held_arrays &held, conversion_log &log)
 {
     array_view view;
     if (borrow<float>(array, view) || borrow<double>(array, view) || borrow<int>(array, view) ||
         borrow<long>(array, view) || borrow<long long>(array, view)) {
         held.objects.emplace_back(array);
-        count.bytes_borrowed += bytes_of(view);
+        log.bytes_borrowed += bytes_of(view);
         return view;
     }
     view = copy_array(array, held);
-    count.copied(what, why_copied(array, view), bytes_of(view));
+    log.copied(what, why_copied(array, view), bytes_of(view));
     return view;
 }
 
-void view_points(vtkDataArray *points, const std::string &what, hold &held, tally &count, insitu_array coordinates[3])
+void view_points(vtkDataArray *points, const std::string &what, held_arrays &held, conversion_log &log,
+                 insitu_array coordinates[3])
 {
     if (borrow_soa_points<float>(points, coordinates) || borrow_soa_points<double>(points, coordinates)) {
         held.objects.emplace_back(points);
-        count.bytes_borrowed += points->GetNumberOfTuples() * 3 * type_size(coordinates[0].type);
+        log.bytes_borrowed += points->GetNumberOfTuples() * 3 * type_size(coordinates[0].type);
         return;
     }
     array_view view;
     if (borrow_aos<float>(points, view) || borrow_aos<double>(points, view)) {
         held.objects.emplace_back(points);
-        count.bytes_borrowed += bytes_of(view);
+        log.bytes_borrowed += bytes_of(view);
     } else {
         view = convert_any<double>(points, held);
-        count.copied(what, std::string(points->GetDataTypeAsString()) + " coordinates to float64", bytes_of(view));
+        log.copied(what, std::string(points->GetDataTypeAsString()) + " coordinates to float64", bytes_of(view));
     }
     for (int c = 0; c < 3; c++) coordinates[c] = view.component(c);
 }
 
-array_view gather(const array_view &view, const std::vector<int64_t> &source, hold &held)
+array_view gather(const array_view &view, const std::vector<int64_t> &source, held_arrays &held)
 {
     const auto size = static_cast<size_t>(type_size(view.type));
     array_view packed = view;

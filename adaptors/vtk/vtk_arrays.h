@@ -19,8 +19,8 @@ namespace insitu_vtk
 {
 
 /* The memory that one mesh keeps alive while the session may read it: references to VTK's arrays, and conversions.
- * Moving a hold does not move this memory. */
-struct hold {
+ * Moving the struct does not move this memory. */
+struct held_arrays {
     std::vector<vtkSmartPointer<vtkObject>> objects;
     std::vector<std::unique_ptr<std::byte[]>> copies;
 
@@ -28,7 +28,7 @@ struct hold {
 };
 
 /* Counts of what was borrowed and copied during one insitu_vtk_set(), and its warnings. */
-struct tally {
+struct conversion_log {
     int64_t bytes_borrowed = 0;
     int64_t bytes_copied = 0;
     std::string copied_why;
@@ -36,9 +36,9 @@ struct tally {
     std::string warnings;
 
     void copied(const std::string &what, const std::string &why, int64_t bytes);
-    void about_cells(const std::string &text);
+    void note_cells(const std::string &text);
     void warn(const std::string &text);
-    void add(const tally &other);
+    void add(const conversion_log &other);
 };
 
 /* An array in memory with tuple_count × component_count elements. */
@@ -58,13 +58,14 @@ int64_t type_size(insitu_type type);
 
 /* Returns the array as a field's values: borrowed, or copied if libinsitu does not support VTK's type or layout. `what`
  * is the name of the array in reports. */
-array_view view_array(vtkDataArray *array, const std::string &what, hold &held, tally &count);
+array_view view_array(vtkDataArray *array, const std::string &what, held_arrays &held, conversion_log &log);
 
 /* Describes the coordinates of points as three arrays: borrowed if they are AOS or SOA, otherwise copied. */
-void view_points(vtkDataArray *points, const std::string &what, hold &held, tally &count, insitu_array coordinates[3]);
+void view_points(vtkDataArray *points, const std::string &what, held_arrays &held, conversion_log &log,
+                 insitu_array coordinates[3]);
 
 /* Copies the tuples source[0], source[1], ... of a view to a packed array, which `held` owns. */
-array_view gather(const array_view &view, const std::vector<int64_t> &source, hold &held);
+array_view gather(const array_view &view, const std::vector<int64_t> &source, held_arrays &held);
 
 } // namespace insitu_vtk
 

@@ -1,6 +1,7 @@
-/* For each VTK cell type that libinsitu draws, a recipe contains the linear cell that represents it, and which of its
- * points are the linear cell's vertices. If all cells of a grid are supported as they are (tets, hexes, wedges,
- * pyramids), VTK's arrays are used unchanged; if a single cell is not, all cells are copied to a new list.
+/* For each VTK cell type that libinsitu draws, a table (cell_conversion) contains the linear cell that represents it,
+ * and which of its points are the linear cell's vertices. If all cells of a grid are supported as they are (tets,
+ * hexes, wedges, pyramids), VTK's arrays are used unchanged; if a single cell is not, all cells are copied to a new
+ * list.
  *
  * A voxel differs from a hexahedron only in the order of its points. Polyhedra and prisms of five and six sides become
  * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). The corners of higher-order cells are their first
@@ -22,76 +23,76 @@ namespace insitu_vtk
 namespace
 {
 
-enum class kind { not_drawn, flat, as_it_is, polygon, reordered, faces, linear };
+enum class conversion_kind { not_drawn, flat, as_it_is, polygon, reordered, faces, linear };
 
-struct piece {
+struct linear_cell {
     uint8_t type;
     uint8_t vertex_count;
     std::array<uint8_t, 8> vertices; // indices into the cell's points
 };
 
-struct recipe {
-    kind what = kind::not_drawn;
+struct cell_conversion {
+    conversion_kind kind = conversion_kind::not_drawn;
     int needed_points = 0;
-    int piece_count = 0;
-    piece part{};
+    int linear_cell_count = 0;
+    linear_cell replacement{};
 };
 
-constexpr piece tet = {INSITU_TET, 4, {0, 1, 2, 3}};
-constexpr piece hex = {INSITU_HEX, 8, {0, 1, 2, 3, 4, 5, 6, 7}};
-constexpr piece wedge = {INSITU_WEDGE, 6, {0, 1, 2, 3, 4, 5}};
-constexpr piece pyramid = {INSITU_PYRAMID, 5, {0, 1, 2, 3, 4}};
-constexpr piece voxel = {INSITU_HEX, 8, {0, 1, 3, 2, 4, 5, 7, 6}};
-constexpr piece triangle = {INSITU_TRIANGLE, 3, {0, 1, 2}};
-constexpr piece quad = {INSITU_QUAD, 4, {0, 1, 2, 3}};
-constexpr piece pixel = {INSITU_QUAD, 4, {0, 1, 3, 2}};
+constexpr linear_cell tet = {INSITU_TET, 4, {0, 1, 2, 3}};
+constexpr linear_cell hex = {INSITU_HEX, 8, {0, 1, 2, 3, 4, 5, 6, 7}};
+constexpr linear_cell wedge = {INSITU_WEDGE, 6, {0, 1, 2, 3, 4, 5}};
+constexpr linear_cell pyramid = {INSITU_PYRAMID, 5, {0, 1, 2, 3, 4}};
+constexpr linear_cell voxel = {INSITU_HEX, 8, {0, 1, 3, 2, 4, 5, 7, 6}};
+constexpr linear_cell triangle = {INSITU_TRIANGLE, 3, {0, 1, 2}};
+constexpr linear_cell quad = {INSITU_QUAD, 4, {0, 1, 2, 3}};
+constexpr linear_cell pixel = {INSITU_QUAD, 4, {0, 1, 3, 2}};
 
-using recipe_table = std::array<recipe, 256>;
+using conversion_table = std::array<cell_conversion, 256>;
 
-void add(recipe_table &table, kind what, const piece &of, std::initializer_list<int> types)
+void add(conversion_table &table, conversion_kind kind, const linear_cell &of, std::initializer_list<int> types)
 {
-    for (const int type : types) table[static_cast<size_t>(type)] = {what, of.vertex_count, 1, of};
+    for (const int type : types) table[static_cast<size_t>(type)] = {kind, of.vertex_count, 1, of};
 }
 
-recipe_table make_recipes()
+conversion_table make_conversions()
 {
-    recipe_table table;
-    add(table, kind::as_it_is, tet, {VTK_TETRA});
-    add(table, kind::as_it_is, hex, {VTK_HEXAHEDRON});
-    add(table, kind::as_it_is, wedge, {VTK_WEDGE});
-    add(table, kind::as_it_is, pyramid, {VTK_PYRAMID});
-    add(table, kind::as_it_is, triangle, {VTK_TRIANGLE});
-    add(table, kind::as_it_is, quad, {VTK_QUAD});
-    add(table, kind::reordered, voxel, {VTK_VOXEL});
-    add(table, kind::reordered, pixel, {VTK_PIXEL});
-    add(table, kind::linear, tet, {VTK_QUADRATIC_TETRA, VTK_LAGRANGE_TETRAHEDRON, VTK_BEZIER_TETRAHEDRON});
-    add(table, kind::linear, hex,
+    conversion_table table;
+    add(table, conversion_kind::as_it_is, tet, {VTK_TETRA});
+    add(table, conversion_kind::as_it_is, hex, {VTK_HEXAHEDRON});
+    add(table, conversion_kind::as_it_is, wedge, {VTK_WEDGE});
+    add(table, conversion_kind::as_it_is, pyramid, {VTK_PYRAMID});
+    add(table, conversion_kind::as_it_is, triangle, {VTK_TRIANGLE});
+    add(table, conversion_kind::as_it_is, quad, {VTK_QUAD});
+    add(table, conversion_kind::reordered, voxel, {VTK_VOXEL});
+    add(table, conversion_kind::reordered, pixel, {VTK_PIXEL});
+    add(table, conversion_kind::linear, tet, {VTK_QUADRATIC_TETRA, VTK_LAGRANGE_TETRAHEDRON, VTK_BEZIER_TETRAHEDRON});
+    add(table, conversion_kind::linear, hex,
         {VTK_QUADRATIC_HEXAHEDRON, VTK_TRIQUADRATIC_HEXAHEDRON, VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON,
          VTK_LAGRANGE_HEXAHEDRON, VTK_BEZIER_HEXAHEDRON});
-    add(table, kind::linear, wedge,
+    add(table, conversion_kind::linear, wedge,
         {VTK_QUADRATIC_WEDGE, VTK_QUADRATIC_LINEAR_WEDGE, VTK_BIQUADRATIC_QUADRATIC_WEDGE, VTK_LAGRANGE_WEDGE,
          VTK_BEZIER_WEDGE});
-    add(table, kind::linear, pyramid,
+    add(table, conversion_kind::linear, pyramid,
         {VTK_QUADRATIC_PYRAMID, VTK_TRIQUADRATIC_PYRAMID, VTK_LAGRANGE_PYRAMID, VTK_BEZIER_PYRAMID});
-    add(table, kind::linear, triangle,
+    add(table, conversion_kind::linear, triangle,
         {VTK_QUADRATIC_TRIANGLE, VTK_BIQUADRATIC_TRIANGLE, VTK_LAGRANGE_TRIANGLE, VTK_BEZIER_TRIANGLE});
-    add(table, kind::linear, quad,
+    add(table, conversion_kind::linear, quad,
         {VTK_QUADRATIC_QUAD, VTK_BIQUADRATIC_QUAD, VTK_QUADRATIC_LINEAR_QUAD, VTK_LAGRANGE_QUADRILATERAL,
          VTK_BEZIER_QUADRILATERAL});
-    table[VTK_POLYGON] = {kind::polygon, 3, 1, {INSITU_POLYGON, 0, {}}};
-    table[VTK_POLYHEDRON] = {kind::faces, 4, 0, piece{}};
-    table[VTK_PENTAGONAL_PRISM] = {kind::faces, 10, 0, piece{}};
-    table[VTK_HEXAGONAL_PRISM] = {kind::faces, 12, 0, piece{}};
+    table[VTK_POLYGON] = {conversion_kind::polygon, 3, 1, {INSITU_POLYGON, 0, {}}};
+    table[VTK_POLYHEDRON] = {conversion_kind::faces, 4, 0, linear_cell{}};
+    table[VTK_PENTAGONAL_PRISM] = {conversion_kind::faces, 10, 0, linear_cell{}};
+    table[VTK_HEXAGONAL_PRISM] = {conversion_kind::faces, 12, 0, linear_cell{}};
     for (const int type :
          {VTK_EMPTY_CELL, VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE, VTK_POLY_LINE, VTK_QUADRATIC_EDGE, VTK_CUBIC_LINE,
           VTK_PARAMETRIC_CURVE, VTK_HIGHER_ORDER_EDGE, VTK_LAGRANGE_CURVE, VTK_BEZIER_CURVE})
-        table[static_cast<size_t>(type)].what = kind::flat;
+        table[static_cast<size_t>(type)].kind = conversion_kind::flat;
     return table;
 }
 
-const recipe_table &recipes()
+const conversion_table &cell_conversions()
 {
-    static const recipe_table table = make_recipes();
+    static const conversion_table table = make_conversions();
     return table;
 }
 
@@ -104,9 +105,9 @@ template <typename Id> struct raw_cells {
 
     int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
     /* Returns the number of points of the linear cell that represents the cell. */
-    int64_t linear_size(int64_t cell, const recipe &r) const
+    int64_t linear_size(int64_t cell, const cell_conversion &r) const
     {
-        return r.what == kind::polygon ? size(cell) : r.part.vertex_count;
+        return r.kind == conversion_kind::polygon ? size(cell) : r.replacement.vertex_count;
     }
 };
 
@@ -118,64 +119,67 @@ struct new_size {
 };
 
 /* The cells with faces, in their order. has[i] is true if VTK's cell i is one of them and all its faces are valid. */
-struct faced_cells {
+struct cells_with_faces {
     face_list faces;
     std::vector<bool> has;
 };
 
-template <typename Id> void read_faces(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, faced_cells &faced)
+template <typename Id>
+void read_faces(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, cells_with_faces &with_faces)
 {
     for (int64_t i = 0; i < raw.count; i++) {
-        const recipe &r = recipes()[raw.types[i]];
-        if (r.what != kind::faces || raw.size(i) < r.needed_points) continue;
-        if (faced.has.empty()) faced.has.resize(static_cast<size_t>(raw.count));
+        const cell_conversion &r = cell_conversions()[raw.types[i]];
+        if (r.kind != conversion_kind::faces || raw.size(i) < r.needed_points) continue;
+        if (with_faces.has.empty()) with_faces.has.resize(static_cast<size_t>(raw.count));
         const std::vector<int64_t> points(raw.connectivity + raw.offsets[i], raw.connectivity + raw.offsets[i + 1]);
-        faced.has[static_cast<size_t>(i)] = faced.faces.add_cell(grid, i, raw.types[i], points.data());
+        with_faces.has[static_cast<size_t>(i)] = with_faces.faces.add_cell(grid, i, raw.types[i], points.data());
     }
 }
 
-template <typename Id> new_size count_new(const raw_cells<Id> &raw, const faced_cells &faced, cell_counts &counts)
+template <typename Id>
+new_size count_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, cell_counts &counts)
 {
     new_size size;
     size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
-        const recipe &r = recipes()[raw.types[i]];
-        const bool is_faced = !faced.has.empty() && faced.has[static_cast<size_t>(i)];
-        const bool is_drawn = is_faced || (r.piece_count > 0 && raw.size(i) >= r.needed_points);
-        if (r.what == kind::flat)
+        const cell_conversion &r = cell_conversions()[raw.types[i]];
+        const bool is_faced = !with_faces.has.empty() && with_faces.has[static_cast<size_t>(i)];
+        const bool is_drawn = is_faced || (r.linear_cell_count > 0 && raw.size(i) >= r.needed_points);
+        if (r.kind == conversion_kind::flat)
             counts.flat++;
         else if (!is_drawn)
             counts.not_drawn++, counts.left_out[raw.types[i]]++;
-        if (is_drawn && r.what == kind::linear) counts.linear++;
+        if (is_drawn && r.kind == conversion_kind::linear) counts.linear++;
         if (!is_drawn) size.is_one_to_one = false;
         if (!is_drawn) continue;
         size.cells++;
-        size.vertices += is_faced ? faced.faces.cell_size(number++) : raw.linear_size(i, r);
+        size.vertices += is_faced ? with_faces.faces.cell_size(number++) : raw.linear_size(i, r);
     }
     return size;
 }
 
 template <typename Id>
-void fill_new(const raw_cells<Id> &raw, const faced_cells &faced, uint8_t *types, int64_t *offsets, Id *connectivity,
-              std::vector<int64_t> *source)
+void fill_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint8_t *types, int64_t *offsets,
+              Id *connectivity, std::vector<int64_t> *source)
 {
     int64_t at = 0;
     size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
-        const recipe &r = recipes()[raw.types[i]];
-        const bool is_faced = !faced.has.empty() && faced.has[static_cast<size_t>(i)];
-        if (!is_faced && (r.piece_count == 0 || raw.size(i) < r.needed_points)) continue;
-        *types++ = is_faced ? static_cast<uint8_t>(INSITU_POLYHEDRON) : r.part.type;
+        const cell_conversion &r = cell_conversions()[raw.types[i]];
+        const bool is_faced = !with_faces.has.empty() && with_faces.has[static_cast<size_t>(i)];
+        if (!is_faced && (r.linear_cell_count == 0 || raw.size(i) < r.needed_points)) continue;
+        *types++ = is_faced ? static_cast<uint8_t>(INSITU_POLYHEDRON) : r.replacement.type;
         *offsets++ = at;
         if (source) source->push_back(i);
         if (is_faced) {
-            const int64_t *faces = faced.faces.cell_faces(number), count = faced.faces.cell_size(number);
+            const int64_t *faces = with_faces.faces.cell_faces(number), count = with_faces.faces.cell_size(number);
             for (int64_t k = 0; k < count; k++) connectivity[at++] = static_cast<Id>(faces[k]);
             number++;
             continue;
         }
         for (int64_t v = 0; v < raw.linear_size(i, r); v++) {
-            const int64_t point = r.what == kind::polygon ? v : r.part.vertices[static_cast<size_t>(v)];
+            const int64_t point =
+                r.kind == conversion_kind::polygon ? v : r.replacement.vertices[static_cast<size_t>(v)];
             connectivity[at++] = raw.connectivity[raw.offsets[i] + point];
         }
     }
@@ -194,7 +198,7 @@ std::string why_converted(const std::array<int64_t, 256> &by_type)
                                    "higher-order cells by their corners"};
     std::array<bool, 7> has{};
     for (size_t type = 0; type < 256; type++)
-        if (by_type[type] > 0) has[static_cast<size_t>(recipes()[type].what)] = true;
+        if (by_type[type] > 0) has[static_cast<size_t>(cell_conversions()[type].kind)] = true;
     std::string why;
     for (size_t k = 0; k < has.size(); k++)
         if (has[k] && reasons[k][0]) why += (why.empty() ? "" : ", ") + std::string(reasons[k]);
@@ -204,12 +208,12 @@ std::string why_converted(const std::array<int64_t, 256> &by_type)
 template <typename Id>
 void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::string &why, const cells_view &view)
 {
-    hold &held = view.held;
+    held_arrays &held = view.held;
     insitu_mesh &mesh = view.mesh;
     cell_list &cells = view.cells;
-    faced_cells faced;
-    read_faces(grid, raw, faced);
-    const new_size size = count_new(raw, faced, view.counts);
+    cells_with_faces with_faces;
+    read_faces(grid, raw, with_faces);
+    const new_size size = count_new(raw, with_faces, view.counts);
     cells.count = size.cells;
     cells.is_one_to_one = size.is_one_to_one;
     if (!cells.is_one_to_one) cells.source.reserve(static_cast<size_t>(size.cells));
@@ -218,17 +222,16 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
     auto *types = reinterpret_cast<uint8_t *>(held.allocate(static_cast<size_t>(size.cells)));
     auto *offsets = reinterpret_cast<int64_t *>(held.allocate(static_cast<size_t>(size.cells + 1) * 8));
     auto *connectivity = reinterpret_cast<Id *>(held.allocate(static_cast<size_t>(size.vertices) * sizeof(Id)));
-    fill_new(raw, faced, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
+    fill_new(raw, with_faces, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
 
     mesh.cell_count = size.cells;
     mesh.cell_types = {types, INSITU_UINT8, 0};
     mesh.offsets = {offsets, INSITU_INT64, 0};
     mesh.connectivity = {connectivity, sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64, 0};
     mesh.connectivity_count = size.vertices;
-    const int64_t face_bytes = faced.has.empty() ? 0 : faced.faces.hand_over(held, mesh);
-    view.count.copied(view.what + " cells", why,
-                      size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) +
-                          face_bytes);
+    const int64_t face_bytes = with_faces.has.empty() ? 0 : with_faces.faces.copy_to_mesh(held, mesh);
+    view.log.copied(view.what + " cells", why,
+                    size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) + face_bytes);
 }
 
 /* Borrows VTK's arrays; all cells must be supported as they are. If all have the same type and size, types and offsets
@@ -237,17 +240,17 @@ template <typename Id>
 void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::array<int64_t, 256> &by_type,
                   int64_t connectivity_count, const cells_view &view)
 {
-    hold &held = view.held;
-    tally &count = view.count;
+    held_arrays &held = view.held;
+    conversion_log &log = view.log;
     insitu_mesh &mesh = view.mesh;
     const auto id_type = sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64;
     held.objects.emplace_back(grid->GetCells());
     mesh.cell_count = raw.count;
     mesh.connectivity = {raw.connectivity, id_type, 0};
     mesh.connectivity_count = connectivity_count;
-    count.bytes_borrowed += connectivity_count * static_cast<int64_t>(sizeof(Id));
-    const recipe &first = recipes()[raw.types[0]];
-    if (first.what != kind::polygon && by_type[raw.types[0]] == raw.count &&
+    log.bytes_borrowed += connectivity_count * static_cast<int64_t>(sizeof(Id));
+    const cell_conversion &first = cell_conversions()[raw.types[0]];
+    if (first.kind != conversion_kind::polygon && by_type[raw.types[0]] == raw.count &&
         grid->GetCells()->IsHomogeneous() == first.needed_points) {
         mesh.cell_type = static_cast<insitu_cell_type>(raw.types[0]);
         return;
@@ -255,7 +258,7 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
     held.objects.emplace_back(grid->GetCellTypesArray());
     mesh.cell_types = {raw.types, INSITU_UINT8, 0};
     mesh.offsets = {raw.offsets, id_type, 0};
-    count.bytes_borrowed += raw.count + (raw.count + 1) * static_cast<int64_t>(sizeof(Id));
+    log.bytes_borrowed += raw.count + (raw.count + 1) * static_cast<int64_t>(sizeof(Id));
 }
 
 template <typename Array>
@@ -270,15 +273,15 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
     bool is_as_it_is = true;
     for (int64_t i = 0; i < raw.count; i++) {
         by_type[raw.types[i]]++;
-        const recipe &r = recipes()[raw.types[i]];
+        const cell_conversion &r = cell_conversions()[raw.types[i]];
         if (raw.offsets[i] < 0 || raw.offsets[i] > raw.offsets[i + 1] || raw.offsets[i + 1] > connectivity_count) {
             error = view.what + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) + ", " +
                     std::to_string(raw.offsets[i + 1]) + " are not within the connectivity's " +
                     std::to_string(connectivity_count) + " entries";
             return false;
         }
-        is_as_it_is = is_as_it_is && ((r.what == kind::as_it_is && raw.size(i) == r.needed_points) ||
-                                      (r.what == kind::polygon && raw.size(i) >= r.needed_points));
+        is_as_it_is = is_as_it_is && ((r.kind == conversion_kind::as_it_is && raw.size(i) == r.needed_points) ||
+                                      (r.kind == conversion_kind::polygon && raw.size(i) >= r.needed_points));
     }
     if (is_as_it_is) {
         view.cells.count = raw.count;
@@ -306,18 +309,18 @@ bool view_cells(vtkUnstructuredGrid *grid, const cells_view &view, std::string &
     return view_typed(grid, array->GetOffsetsArray32(), array->GetConnectivityArray32(), view, error);
 }
 
-void tell_about_cells(const cell_counts &counts, const std::string &what, tally &count)
+void log_cells(const cell_counts &counts, const std::string &what, conversion_log &log)
 {
     if (counts.linear > 0)
-        count.about_cells(what + ": " + std::to_string(counts.linear) +
-                          " higher-order cells drawn by their corners as linear ones");
+        log.note_cells(what + ": " + std::to_string(counts.linear) +
+                       " higher-order cells drawn by their corners as linear ones");
     for (const auto &[type, number] : counts.left_out) {
-        const char *why = recipes()[static_cast<size_t>(type)].needed_points > 0 ? " with too few points or faces" : "";
-        count.about_cells(what + ": " + std::to_string(number) + " cells of type " + std::to_string(type) + " (" +
-                          vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
+        const char *why =
+            cell_conversions()[static_cast<size_t>(type)].needed_points > 0 ? " with too few points or faces" : "";
+        log.note_cells(what + ": " + std::to_string(number) + " cells of type " + std::to_string(type) + " (" +
+                       vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
     }
-    if (counts.flat > 0)
-        count.about_cells(what + ": " + std::to_string(counts.flat) + " points and lines are not drawn");
+    if (counts.flat > 0) log.note_cells(what + ": " + std::to_string(counts.flat) + " points and lines are not drawn");
 }
 
 } // namespace insitu_vtk

@@ -25,15 +25,15 @@ struct cell_counts {
 
 struct cell_list {
     int64_t count = 0;
-    bool is_one_to_one = true;   // cell i is VTK's cell i; otherwise VTK's cell is in source
-    std::vector<int64_t> source; // index of VTK's cell for each cell
+    bool is_one_to_one = true;   // true if cell i is VTK's cell i; otherwise source contains VTK's cell
+    std::vector<int64_t> source; // index of VTK's cell for each cell of the mesh
 };
 
 //  The outputs of view_cells(), and the name of the grid for messages.
 struct cells_view {
     const std::string &what; // name of the grid in messages
-    hold &held;
-    tally &count;
+    held_arrays &held;
+    conversion_log &log;
     insitu_mesh &mesh;
     cell_list &cells;
     cell_counts &counts;
@@ -43,8 +43,8 @@ struct cells_view {
  * connectivity are not checked. Returns false and a message if the sizes of grid's arrays are inconsistent. */
 bool view_cells(vtkUnstructuredGrid *grid, const cells_view &view, std::string &error);
 
-/* Reports in `count` which cells were left out or simplified. */
-void tell_about_cells(const cell_counts &counts, const std::string &what, tally &count);
+/* Reports in `log` which cells were left out or simplified. */
+void log_cells(const cell_counts &counts, const std::string &what, conversion_log &log);
 
 } // namespace insitu_vtk
 

@@ -28,9 +28,9 @@ int64_t face_list::face(const int64_t *points, size_t count)
             return it->second;
     }
     const auto made = static_cast<int64_t>(starts.size()) - 1;
-    loops.insert(loops.end(), points, points + count);
+    face_points.insert(face_points.end(), points, points + count);
     sorted.insert(sorted.end(), key.begin(), key.end());
-    starts.push_back(static_cast<int64_t>(loops.size()));
+    starts.push_back(static_cast<int64_t>(face_points.size()));
     by_points.emplace(hash, made);
     return made;
 }
@@ -83,7 +83,7 @@ bool face_list::add_cell(vtkUnstructuredGrid *grid, int64_t cell, int type, cons
     return is_whole;
 }
 
-int64_t face_list::hand_over(hold &held, insitu_mesh &mesh) const
+int64_t face_list::copy_to_mesh(held_arrays &held, insitu_mesh &mesh) const
 {
     auto copy = [&held](const std::vector<int64_t> &from) -> insitu_array {
         std::byte *to = held.allocate(from.size() * sizeof(int64_t));
@@ -92,9 +92,9 @@ int64_t face_list::hand_over(hold &held, insitu_mesh &mesh) const
     };
     mesh.face_count = static_cast<int64_t>(starts.size()) - 1;
     mesh.face_offsets = copy(starts);
-    mesh.face_connectivity_count = static_cast<int64_t>(loops.size());
-    mesh.face_connectivity = copy(loops);
-    return static_cast<int64_t>((starts.size() + loops.size()) * sizeof(int64_t));
+    mesh.face_connectivity_count = static_cast<int64_t>(face_points.size());
+    mesh.face_connectivity = copy(face_points);
+    return static_cast<int64_t>((starts.size() + face_points.size()) * sizeof(int64_t));
 }
 
 } // namespace insitu_vtk

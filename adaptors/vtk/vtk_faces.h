@@ -26,14 +26,15 @@ class face_list
     int64_t cell_size(size_t number) const { return cell_starts[number + 1] - cell_starts[number]; }
 
     /* Sets the faces of mesh to copies owned by `held`; returns their size in bytes. */
-    int64_t hand_over(hold &held, insitu_mesh &mesh) const;
+    int64_t copy_to_mesh(held_arrays &held, insitu_mesh &mesh) const;
 
   private:
     int64_t face(const int64_t *points, size_t count);
     bool add_stream(vtkUnstructuredGrid *grid, int64_t cell);
     void add_prism(const int64_t *points, int sides);
 
-    std::vector<int64_t> starts{0}, loops, sorted; // points of the faces in order around them, and sorted
+    std::vector<int64_t> starts{0}, face_points,
+        sorted; // offsets of the faces; their points in order around the face, and sorted
     std::unordered_multimap<uint64_t, int64_t> by_points;
     std::vector<int64_t> cell_starts{0}, cells;
 };

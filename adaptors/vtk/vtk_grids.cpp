@@ -30,16 +30,16 @@ namespace
 
 /* The number of points along each axis that has more than one: three axes, or two for a flat grid. */
 struct lattice {
-    int64_t line = 1, rows = 1, layers = 1;
+    int64_t row_points = 1, row_count = 1, layer_count = 1;
 
-    int64_t points() const { return line * rows * layers; }
-    bool is_flat() const { return layers == 1; }
+    int64_t points() const { return row_points * row_count * layer_count; }
+    bool is_flat() const { return layer_count == 1; }
     int corners() const { return is_flat() ? 4 : 8; }
-    int64_t cells() const { return (line - 1) * (rows - 1) * (is_flat() ? 1 : layers - 1); }
+    int64_t cells() const { return (row_points - 1) * (row_count - 1) * (is_flat() ? 1 : layer_count - 1); }
 };
 
 /* Returns false if data is not a structured data set with at least two such axes. */
-bool get_lattice(vtkDataSet *data, lattice &l)
+bool find_lattice(vtkDataSet *data, lattice &l)
 {
     int64_t cells[3], axes[3] = {1, 1, 1};
     if (!insitu_vtk::cells_of_lattice(data, cells)) return false;
@@ -54,18 +54,18 @@ bool get_lattice(vtkDataSet *data, lattice &l)
 template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice &l)
 {
     using id = typename Array::ValueType;
-    const int64_t line = l.line, plane = l.line * l.rows, count = l.cells();
+    const int64_t row_points = l.row_points, plane = l.row_points * l.row_count, count = l.cells();
     vtkNew<Array> offsets, connectivity;
     offsets->SetNumberOfValues(count + 1);
     connectivity->SetNumberOfValues(count * l.corners());
     for (int64_t i = 0; i <= count; i++) offsets->SetValue(i, static_cast<id>(i) * l.corners());
     id *to = connectivity->GetPointer(0);
-    for (int64_t k = 0; k < (l.is_flat() ? 1 : l.layers - 1); k++)
-        for (int64_t j = 0; j + 1 < l.rows; j++)
-            for (int64_t i = 0; i + 1 < line; i++) {
-                const int64_t low = i + j * line + k * plane, last = l.is_flat() ? low : low + plane;
+    for (int64_t k = 0; k < (l.is_flat() ? 1 : l.layer_count - 1); k++)
+        for (int64_t j = 0; j + 1 < l.row_count; j++)
+            for (int64_t i = 0; i + 1 < row_points; i++) {
+                const int64_t low = i + j * row_points + k * plane, last = l.is_flat() ? low : low + plane;
                 for (int64_t first = low; first <= last; first += plane)
-                    for (const int64_t corner : {first, first + 1, first + 1 + line, first + line})
+                    for (const int64_t corner : {first, first + 1, first + 1 + row_points, first + row_points})
                         *to++ = static_cast<id>(corner);
             }
     auto cells = vtkSmartPointer<vtkCellArray>::New();
@@ -180,7 +180,7 @@ vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data)
     grid->GetFieldData()->ShallowCopy(data->GetFieldData());
     set_points(data, grid);
     lattice l;
-    if (get_lattice(data, l)) {
+    if (find_lattice(data, l)) {
         set_lattice(l, grid);
         hide_cells_of_hidden_points(data, grid);
     } else if (!borrow_polygons(vtkPolyData::SafeDownCast(data), grid)) {

@@ -37,17 +37,18 @@ bool set_uniform(vtkImageData *image, insitu_lattice &lattice)
     return true;
 }
 
-bool set_axes(vtkRectilinearGrid *grid, const std::string &what, hold &held, tally &count, insitu_lattice &lattice)
+bool set_axes(vtkRectilinearGrid *grid, const std::string &what, held_arrays &held, conversion_log &log,
+              insitu_lattice &lattice)
 {
     if (!grid) return false;
     vtkDataArray *axes[3] = {grid->GetXCoordinates(), grid->GetYCoordinates(), grid->GetZCoordinates()};
     for (int a = 0; a < 3; a++) {
-        array_view view = view_array(axes[a], what + " axis", held, count);
+        array_view view = view_array(axes[a], what + " axis", held, log);
         held.objects.emplace_back(axes[a]);
         if (view.type != INSITU_FLOAT32 && view.type != INSITU_FLOAT64) {
             auto *copy = reinterpret_cast<double *>(held.allocate(static_cast<size_t>(view.tuple_count) * 8));
             for (vtkIdType i = 0; i < axes[a]->GetNumberOfTuples(); i++) copy[i] = axes[a]->GetComponent(i, 0);
-            count.copied(what + " axis", "numbers that are no floats", view.tuple_count * 8);
+            log.copied(what + " axis", "numbers that are no floats", view.tuple_count * 8);
             view = {copy, INSITU_FLOAT64, view.tuple_count, 1, 8, 8};
         }
         lattice.axes[a] = {view.data, view.type, view.tuple_stride_bytes};
@@ -56,13 +57,13 @@ bool set_axes(vtkRectilinearGrid *grid, const std::string &what, hold &held, tal
 }
 
 /* Lists the points of an image whose axes are rotated or have no spacing. */
-void list_points(vtkDataSet *data, const std::string &what, hold &held, tally &count, insitu_mesh &mesh)
+void list_points(vtkDataSet *data, const std::string &what, held_arrays &held, conversion_log &log, insitu_mesh &mesh)
 {
     const vtkIdType points = data->GetNumberOfPoints();
     auto *xyz = reinterpret_cast<double *>(held.allocate(static_cast<size_t>(points) * 24));
     for (vtkIdType i = 0; i < points; i++) data->GetPoint(i, xyz + 3 * i);
     for (int a = 0; a < 3; a++) mesh.coordinates[a] = {xyz + a, INSITU_FLOAT64, 24};
-    count.copied(what + " points", std::string("those of a ") + data->GetClassName() + " listed", points * 24);
+    log.copied(what + " points", std::string("those of a ") + data->GetClassName() + " listed", points * 24);
 }
 
 } // namespace
@@ -85,7 +86,7 @@ bool cells_of_lattice(vtkDataSet *data, int64_t cells[3])
     return count > 1;
 }
 
-bool view_lattice(vtkDataSet *data, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
+bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, conversion_log &log, insitu_mesh &mesh,
                   insitu_lattice &lattice)
 {
     lattice = {};
@@ -96,10 +97,10 @@ bool view_lattice(vtkDataSet *data, const std::string &what, hold &held, tally &
     mesh.cell_type = lattice.cells[0] && lattice.cells[1] && lattice.cells[2] ? INSITU_HEX : INSITU_QUAD;
     auto *set = vtkPointSet::SafeDownCast(data);
     if (set && set->GetPoints())
-        view_points(set->GetPoints()->GetData(), what + " points", held, count, mesh.coordinates);
+        view_points(set->GetPoints()->GetData(), what + " points", held, log, mesh.coordinates);
     else if (!set && !set_uniform(vtkImageData::SafeDownCast(data), lattice) &&
-             !set_axes(vtkRectilinearGrid::SafeDownCast(data), what, held, count, lattice))
-        list_points(data, what, held, count, mesh);
+             !set_axes(vtkRectilinearGrid::SafeDownCast(data), what, held, log, lattice))
+        list_points(data, what, held, log, mesh);
     return true;
 }
 

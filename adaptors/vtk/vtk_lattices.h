@@ -22,7 +22,7 @@ bool cells_of_lattice(vtkDataSet *data, int64_t cells[3]);
 /* Fills in the lattice and the coordinates of mesh from data, with the same vertices and cells in the same order.
  * Conversions are stored in `held` and counted. mesh.lattice points to lattice. Returns false without changes if data
  * is of another class or has fewer than two axes with cells. */
-bool view_lattice(vtkDataSet *data, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
+bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, conversion_log &log, insitu_mesh &mesh,
                   insitu_lattice &lattice);
 
 /* Returns the ghost flags of data's cells, in which cells with a hidden point are hidden: VTK's own array if no point

@@ -46,14 +46,14 @@ extern "C" {
 typedef struct insitu_conduit {
     int64_t (*number_of_children)(const void *node);
     void *(*child)(const void *node, int64_t number);
-    char *(*name)(const void *node); /* the result is freed by free() */
+    char *(*name)(const void *node); /* returns a string that the caller frees with free() */
     int (*has_path)(const void *node, const char *path);
-    void *(*fetch_existing)(const void *node, const char *path); /* called only for existing paths */
+    void *(*fetch_existing)(const void *node, const char *path); /* is called only for paths that exist */
     void *(*element_ptr)(const void *node, int64_t number);
-    char *(*as_char8_str)(const void *node); /* called only for strings; the result is not freed */
+    char *(*as_char8_str)(const void *node); /* is called only for nodes that are strings; the result is not freed */
     int64_t (*id)(const void *node);
     int64_t (*number_of_elements)(const void *node);
-    int64_t (*stride)(const void *node); /* in bytes */
+    int64_t (*stride)(const void *node); /* returns the stride in bytes */
     int (*is_string)(const void *node);
 } insitu_conduit;
 

@@ -60,7 +60,7 @@ typedef struct insitu_vtk_report {
     int64_t cells_linear;    /* number of quadratic and higher-order cells drawn as linear ones */
     int64_t cells_flat;      /* number of points and lines, which are not drawn */
     int64_t cells_not_drawn; /* number of 3-D cells not drawn: unknown types, too few points or faces */
-    int64_t bytes_borrowed;  /* size of VTK's arrays that are borrowed */
+    int64_t bytes_borrowed;  /* size in bytes of VTK's arrays that are borrowed */
     int64_t bytes_copied;    /* size of converted arrays, which are held until the mesh is set again */
     const char *copied_why;  /* "", or lines of "what: why (bytes)"; valid until the next call on the adaptor */
     const char *cells_why;   /* "", or one line per kind of cells that are simplified or not drawn, with their number;
