@@ -9,9 +9,9 @@
 enum { WAVE_TAG_HALO = 1 };
 
 typedef struct wave_halo {
-    const wave_mesh *mesh; /* borrowed from the solver */
-    MPI_Comm comm;         /* borrowed from the solver */
-    int value_bytes;       /* size of a value: 4 or 8 */
+    const wave_mesh *mesh; /* mesh whose halo is exchanged, borrowed from the solver */
+    MPI_Comm comm;         /* communicator of the mesh's ranks, borrowed from the solver */
+    int value_bytes;       /* size of a value in bytes: 4 or 8 */
     char *send, *receive;
     MPI_Request *requests;
 } wave_halo;

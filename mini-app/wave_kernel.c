@@ -35,14 +35,14 @@ typedef WAVE_INDEX local_index;
 
 typedef struct layer_table {
     real modulus[WAVE_LAYERS_MAX], inverse_density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];
-    real inverse_sum[WAVE_LAYERS_MAX][WAVE_LAYERS_MAX]; /* 1 / (Za + Zb) of two layers */
+    real inverse_sum[WAVE_LAYERS_MAX][WAVE_LAYERS_MAX]; /* 1 / (Za + Zb) for each pair of layers */
 } layer_table;
 
 typedef struct cell_view {
     const wave_cell_shape *shape;
     const local_index *vertex;
-    const real *face;         /* normal and area of each face */
-    const int32_t *neighbour; /* neighbour across each face */
+    const real *face;         /* normal and area of each face of the cell */
+    const int32_t *neighbour; /* neighbour across each face of the cell */
 } cell_view;
 
 static layer_table make_layers(const wave_grid *grid)
@@ -73,16 +73,16 @@ INLINE cell_view view_cell(const wave_grid *grid, const wave_cell_shape *shape, 
     return view;
 }
 
-static void to_vertices(const wave_grid *grid)
+static void average_to_vertices(const wave_grid *grid)
 {
     const real *weights = grid->around_weights, *state = grid->state.values;
     real *out = grid->vertex_state.values;
-    int64_t stride = grid->state.stride, apart = grid->state.component_stride;
+    int64_t stride = grid->state.stride, is_soa = grid->state.component_stride;
     for (int32_t v = 0; v < grid->own_vertices; ++v) {
         real sum[4] = {0, 0, 0, 0};
         for (int64_t i = grid->around_offsets[v]; i < grid->around_offsets[v + 1]; ++i) {
             const real *q = state + grid->around[i] * stride;
-            for (int k = 0; k < 4; ++k) sum[k] += weights[i] * q[k * apart];
+            for (int k = 0; k < 4; ++k) sum[k] += weights[i] * q[k * is_soa];
         }
         for (int a = 0; a < 3 && grid->reflecting; ++a) {
             if (grid->walls[v] >> a & 1) sum[1 + a] = 0;
@@ -97,10 +97,10 @@ static void to_vertices(const wave_grid *grid)
 INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8][4])
 {
     const real *values = grid->vertex_state.values;
-    int64_t stride = grid->vertex_state.stride, apart = grid->vertex_state.component_stride;
+    int64_t stride = grid->vertex_state.stride, is_soa = grid->vertex_state.component_stride;
     for (int i = 0; i < view->shape->vertex_count; ++i) {
         const real *from = values + (int64_t)view->vertex[i] * stride;
-        for (int k = 0; k < 4; ++k) p[i][k] = from[k * apart];
+        for (int k = 0; k < 4; ++k) p[i][k] = from[k * is_soa];
     }
 }
 
@@ -246,4 +246,4 @@ static void move_vertices(const wave_grid *grid, double scale)
     }
 }
 
-const wave_kernel WAVE_TABLE = {to_vertices, find_jumps, apply_fluxes, move_vertices};
+const wave_kernel WAVE_TABLE = {average_to_vertices, find_jumps, apply_fluxes, move_vertices};

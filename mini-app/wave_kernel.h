@@ -21,29 +21,29 @@ typedef struct wave_grid {
     int32_t own_cells, own_vertices;
     uint8_t uniform_type;
     const uint8_t *types;
-    const void *connectivity, *offsets; /* index */
+    const void *connectivity, *offsets; /* arrays of type index */
     const int64_t *face_offsets;
     const int32_t *neighbours;
     const int64_t *around_offsets;
     const int32_t *around;
     const uint8_t *walls;
-    const uint8_t *layers;      /* for each cell: layer of the medium */
+    const uint8_t *layers;      /* layer of the medium for each cell */
     const void *around_weights; /* real; for each entry of around: weight of the cell in the value at the vertex */
-    const void *faces;          /* real; for each own face: outward unit normal, area */
+    const void *faces;          /* real; outward unit normal and area of each own face */
     const void *inverse_volume; /* real; 1 / volume of each own cell */
-    wave_values state;          /* for each cell: pressure, velocity */
+    wave_values state;          /* pressure and velocity of each cell */
     wave_values vertex_state;   /* for each vertex: pressure, velocity; values is NULL in the first-order scheme */
-    wave_values coordinates;    /* for each vertex: x, y, z, displaced if the drawing is */
+    wave_values coordinates;    /* x, y, z of each vertex, displaced if vertices move */
     void
         *jump; /* real, interleaved; for each cell: 4 components of its state minus its mean over the cell's vertices */
     double modulus[WAVE_LAYERS_MAX], density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];
-    bool second_order; /* vertex_state is used for the reconstruction */
-    bool reflecting;   /* walls reflect; otherwise they absorb */
+    bool second_order; /* true if vertex_state is used for a second-order reconstruction */
+    bool reflecting;   /* true if the walls reflect, false if they absorb */
 } wave_grid;
 
 typedef struct wave_kernel {
     /* Computes vertex_state from the states of the cells around each vertex. */
-    void (*to_vertices)(const wave_grid *grid);
+    void (*average_to_vertices)(const wave_grid *grid);
     /* Computes the jumps of own cells at the middle of the time step. */
     void (*find_jumps)(const wave_grid *grid, double time_step);
     /* Advances the state of own cells by a time step, from the jumps of all cells. */

@@ -21,7 +21,7 @@ static int read_options(int argc, char **argv, int rank, wave_options *options)
 static wave_setup make_setup(const wave_options *options, const wave_lattice *lattice)
 {
     wave_setup setup = {.real_bytes = options->real_bytes,
-                        .apart = options->apart,
+                        .is_soa = options->is_soa,
                         .reflecting = options->reflecting,
                         .order = options->order,
                         .vertices = options->at_vertices,

@@ -27,9 +27,9 @@ typedef struct wave_source {
     double frequency;
     double delay;
     double amplitude;
-    double strength; /* factor of the rate; 1 by default */
-    double period;   /* 0 for a single pulse; a complete pulse takes twice the delay */
-    double radius;   /* standard deviation of the ball */
+    double strength; /* factor of the injection rate; 1 by default */
+    double period;   /* period of the pulses; 0 for a single pulse. A complete pulse takes twice the delay */
+    double radius;   /* standard deviation of the Gaussian ball */
 } wave_source;
 
 /* Returns four layers, whose stiffness and density increase with depth. */

@@ -45,10 +45,11 @@ const char *wave_options_help(void)
 typedef struct option_row option_row;
 struct option_row {
     const char *name;
-    bool (*read)(const option_row *row, const char *value, void *field); /* NULL for a flag */
+    bool (*read)(const option_row *row, const char *value,
+                 void *field); /* function that reads the option's value; NULL for a flag */
     size_t offset;
-    const char *expected; /* for messages; the words of a choice are separated by '|' */
-    const int *choice;    /* value of each word; NULL means 0, 1, 2, ... */
+    const char *expected; /* expected value for messages; the words of a choice are separated by '|' */
+    const int *choice;    /* value of each word of a choice; NULL means 0, 1, 2, ... */
     double low, high;
 };
 
@@ -117,7 +118,7 @@ static const int of_order[] = {1, 2};
 
 /* The values as they are parsed. Choices are stored as int, and converted to enums and bools afterwards. */
 typedef struct raw_options {
-    int cells, partition, real_bytes, index_bytes, apart, reflecting, order, at_vertices, steps, size[3];
+    int cells, partition, real_bytes, index_bytes, is_soa, reflecting, order, at_vertices, steps, size[3];
     double jitter, swell;
     const char *scene;
     bool moving, ghosts, ids, no_insitu, help;
@@ -131,7 +132,7 @@ static const option_row rows[] = {
     {"steps", read_integer, AT(steps), "0 to 1000000000", NULL, 0, 1e9},
     {"precision", read_choice, AT(real_bytes), "float|double", of_bytes, 0, 0},
     {"index", read_choice, AT(index_bytes), "int32|int64", of_bytes, 0, 0},
-    {"layout", read_choice, AT(apart), "aos|soa", NULL, 0, 0},
+    {"layout", read_choice, AT(is_soa), "aos|soa", NULL, 0, 0},
     {"partition", read_choice, AT(partition), "block|morton|random|checkerboard", NULL, 0, 0},
     {"boundary", read_choice, AT(reflecting), "absorb|reflect", NULL, 0, 0},
     {"order", read_choice, AT(order), "1|2", of_order, 0, 0},
@@ -169,9 +170,9 @@ static bool read_option(const option_row *row, raw_options *raw, char *message, 
 }
 
 /* Writes a message about an option that getopt_long() rejects; optopt is the row plus 1 if the option is known. */
-static void tell_fault(int found, const char *argument, char *message, size_t size)
+static void describe_error(int found, const char *argument, char *message, size_t size)
 {
-    if (optopt > ROW_COUNT) /* an unknown letter, as in "-abc" */
+    if (optopt > ROW_COUNT) /* getopt_long() found an unknown letter, as in "-abc" */
         snprintf(message, size, "-%c: no such option; --help lists them", optopt);
     else if (optopt < 1)
         snprintf(message, size, "%s: no such option; --help lists them", argument);
@@ -191,7 +192,7 @@ static bool read_options(int argc, char **argv, raw_options *raw, char *message,
     int found;
     while ((found = getopt_long(argc, argv, ":", list, NULL)) != -1) {
         if (found == ':' || found == '?') {
-            tell_fault(found, argv[optind - 1], message, size);
+            describe_error(found, argv[optind - 1], message, size);
             return false;
         }
         if (!read_option(&rows[found - 1], raw, message, size)) return false;
@@ -217,7 +218,7 @@ bool wave_options_parse(int argc, char **argv, wave_options *options, char *mess
         .steps = raw.steps,
         .real_bytes = raw.real_bytes,
         .index_bytes = raw.index_bytes,
-        .apart = raw.apart != 0,
+        .is_soa = raw.is_soa != 0,
         .partition = (wave_partition_kind)raw.partition,
         .reflecting = raw.reflecting != 0,
         .order = raw.order,

@@ -9,7 +9,7 @@ typedef struct wave_options {
     int size[3];
     int steps;
     int real_bytes, index_bytes;
-    bool apart; /* separate arrays for components (SoA) */
+    bool is_soa; /* true if components are in separate arrays (SoA) */
     wave_partition_kind partition;
     bool reflecting;
     int order;
@@ -18,8 +18,8 @@ typedef struct wave_options {
     double swell;
     bool ghosts;
     bool ids;
-    bool at_vertices;  /* pressure and velocity are passed as fields at vertices */
-    const char *scene; /* NULL if no pictures are drawn */
+    bool at_vertices;  /* true if pressure and velocity are passed as fields at vertices */
+    const char *scene; /* path of the scene; NULL if no pictures are drawn */
     bool help;
 } wave_options;
 

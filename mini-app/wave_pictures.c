@@ -1,4 +1,4 @@
-/* Nothing is converted or copied: libinsitu reads the arrays on which the solver computes. */
+/* libinsitu reads the arrays on which the solver computes, so nothing is converted or copied. */
 #include "wave_pictures.h"
 
 #include <stdio.h>
@@ -8,7 +8,7 @@
 static const char mesh_name[] = "ground";
 
 /* Prints a message to stderr, unless it has been printed before. */
-static void show_once(wave_pictures *p, const char *what, const char *message)
+static void print_once(wave_pictures *p, const char *what, const char *message)
 {
     uint64_t hash = 0;
     if (!message || !*message) return;
@@ -53,7 +53,7 @@ static insitu_mesh describe_mesh(const wave_pictures *p)
     }
     if (p->options->ghosts) m.ghosts = make_array(p->ghosts, INSITU_UINT8, 0);
     m.changed = p->options->moving ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
-    if (!p->handed_over) m.changed = INSITU_CHANGED_ALL;
+    if (!p->is_mesh_set) m.changed = INSITU_CHANGED_ALL;
     return m;
 }
 
@@ -83,11 +83,11 @@ static insitu_field describe_speed(const wave_pictures *p, const insitu_mesh *m)
     f.centring = INSITU_CELL;
     f.count = m->cell_count;
     f.values = make_array(p->solver->speed, p->options->real_bytes == 8 ? INSITU_FLOAT64 : INSITU_FLOAT32, 0);
-    if (p->handed_over) f.changed = INSITU_CHANGED_NOTHING;
+    if (p->is_mesh_set) f.changed = INSITU_CHANGED_NOTHING;
     return f;
 }
 
-static insitu_status hand_over(wave_pictures *p)
+static insitu_status pass_arrays(wave_pictures *p)
 {
     insitu_mesh m = describe_mesh(p);
     insitu_field fields[3] = {describe_field(p, &m, "pressure", 0, 1), describe_field(p, &m, "velocity", 1, 3),
@@ -99,7 +99,7 @@ static insitu_status hand_over(wave_pictures *p)
             status = insitu_set_field(p->session, mesh_name, &fields[i]);
         }
     }
-    p->handed_over = status == INSITU_OK;
+    p->is_mesh_set = status == INSITU_OK;
     return status;
 }
 
@@ -116,12 +116,12 @@ void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, cons
     }
     MPI_Allreduce(MPI_IN_PLACE, &ok, 1, MPI_INT, MPI_MIN, comm);
     if (!ok) {
-        if (pictures->rank == 0) show_once(pictures, "no pictures", "out of memory for ghost flags");
+        if (pictures->rank == 0) print_once(pictures, "no pictures", "out of memory for ghost flags");
         return;
     }
     if (pictures->ghosts) memset(pictures->ghosts + mesh->own_cells, 1, (size_t)(mesh->cells - mesh->own_cells));
     insitu_status status = insitu_create(comm, options->scene, &pictures->session);
-    if (status != INSITU_OK && pictures->rank == 0) show_once(pictures, "no pictures", insitu_error(NULL));
+    if (status != INSITU_OK && pictures->rank == 0) print_once(pictures, "no pictures", insitu_error(NULL));
 }
 
 void wave_pictures_steer(wave_pictures *p, wave_source *source)
@@ -129,27 +129,28 @@ void wave_pictures_steer(wave_pictures *p, wave_source *source)
     source->strength = 1;
     source->period = 0;
     if (!p->session) return;
-    insitu_parameter(p->session, "strength", &source->strength); /* stays 1 if the scene has no such parameter */
+    insitu_parameter(p->session, "strength",
+                     &source->strength); /* the strength stays 1 if the scene has no such parameter */
     insitu_parameter(p->session, "period", &source->period);
 }
 
 insitu_report wave_pictures_step(wave_pictures *p, int64_t cycle, double time)
 {
     if (!p->session) return (insitu_report){0};
-    if (hand_over(p) != INSITU_OK) show_once(p, "handing over", insitu_error(p->session));
+    if (pass_arrays(p) != INSITU_OK) print_once(p, "handing over", insitu_error(p->session));
     insitu_status status = insitu_step(p->session, cycle, time);
     insitu_report report = *insitu_last_report(p->session);
     p->images += report.images;
     if (p->rank == 0) {
-        if (status != INSITU_OK) show_once(p, "in situ step", insitu_error(p->session));
-        show_once(p, "warning", report.warnings);
+        if (status != INSITU_OK) print_once(p, "in situ step", insitu_error(p->session));
+        print_once(p, "warning", report.warnings);
     }
     return report;
 }
 
 void wave_pictures_close(wave_pictures *p)
 {
-    if (insitu_destroy(&p->session) != INSITU_OK) show_once(p, "closing", insitu_error(NULL));
+    if (insitu_destroy(&p->session) != INSITU_OK) print_once(p, "closing", insitu_error(NULL));
     free(p->ghosts);
     p->ghosts = NULL;
 }

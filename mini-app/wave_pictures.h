@@ -16,8 +16,8 @@ typedef struct wave_pictures {
     const wave_mesh *mesh;
     const wave_solver *solver;
     int rank;
-    uint8_t *ghosts;   /* one flag per cell; NULL unless ghost cells are passed */
-    bool handed_over;  /* the mesh has been passed once */
+    uint8_t *ghosts;   /* one ghost flag per cell; NULL unless halo cells are passed */
+    bool is_mesh_set;  /* true if the mesh has been set on the session */
     int images;        /* number of images drawn so far */
     int message_count; /* number of errors and warnings printed so far, which are stored as hashes */
     uint64_t messages[WAVE_MESSAGES_MAX];

@@ -80,7 +80,7 @@ static void cut_scalar(char *text)
 
 /* Prints the output paths and databases as they are written in the scene, because libinsitu's public functions do not
  * return them. A camera's path is a list and is not printed. */
-static void show_paths(const char *scene)
+static void print_paths(const char *scene)
 {
     char line[1024];
     FILE *file = fopen(scene, "r");
@@ -113,7 +113,7 @@ void wave_report_end(const wave_report *report, const wave_options *options, con
         printf("no pictures: see the message above\n");
     } else {
         printf("%d pictures drawn, with these names in %s:\n", images, options->scene);
-        show_paths(options->scene);
+        print_paths(options->scene);
     }
     fflush(stdout);
 }

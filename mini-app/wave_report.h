@@ -11,8 +11,8 @@ typedef struct wave_report {
     MPI_Comm comm;
     int rank;
     double memory_before;            /* this rank's resident memory in bytes before libinsitu was opened */
-    double simulation_ms, insitu_ms; /* sums so far; each step counts the slowest rank */
-    double bytes_peak, bytes_grown;  /* maximum so far over all ranks */
+    double simulation_ms, insitu_ms; /* sum of the steps' times so far; each step counts its slowest rank */
+    double bytes_peak, bytes_grown;  /* maximum memory so far over all ranks */
 } wave_report;
 
 /* Prints what will run. Collective. */

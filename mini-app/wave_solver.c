@@ -32,8 +32,8 @@ static const wave_kernel *choose_kernel(int real_bytes, int index_bytes)
 static bool make_values(const wave_setup *setup, int64_t count, int components, wave_values *out)
 {
     out->values = calloc((size_t)(count * components) + 1, (size_t)setup->real_bytes);
-    out->stride = setup->apart ? 1 : components;
-    out->component_stride = setup->apart ? count : 1;
+    out->stride = setup->is_soa ? 1 : components;
+    out->component_stride = setup->is_soa ? count : 1;
     return out->values != NULL;
 }
 
@@ -118,21 +118,21 @@ static double measure_own(wave_solver *s, int32_t cell, const wave_cell_geometry
     return 2 * g->volume / (surface * s->setup.medium.speed[s->layers[cell]]);
 }
 
-static bool feed(wave_solver *s, int32_t cell, const double centroid[3])
+static bool add_source_cell(wave_solver *s, int32_t cell, const double centroid[3])
 {
     double density = s->setup.source.amplitude != 0 ? wave_source_density(&s->setup.source, centroid) : 0;
     if (density == 0) return true;
-    if ((s->fed_count & (s->fed_count - 1)) == 0) {
-        size_t capacity = s->fed_count ? 2 * (size_t)s->fed_count : 1;
-        int32_t *fed = realloc(s->fed, capacity * sizeof *fed);
-        if (!fed) return false;
-        s->fed = fed;
-        double *rate = realloc(s->fed_rate, capacity * sizeof *rate);
+    if ((s->source_cell_count & (s->source_cell_count - 1)) == 0) {
+        size_t capacity = s->source_cell_count ? 2 * (size_t)s->source_cell_count : 1;
+        int32_t *source_cells = realloc(s->source_cells, capacity * sizeof *source_cells);
+        if (!source_cells) return false;
+        s->source_cells = source_cells;
+        double *rate = realloc(s->source_rates, capacity * sizeof *rate);
         if (!rate) return false;
-        s->fed_rate = rate;
+        s->source_rates = rate;
     }
-    s->fed[s->fed_count] = cell;
-    s->fed_rate[s->fed_count++] = density * s->grid.modulus[s->layers[cell]];
+    s->source_cells[s->source_cell_count] = cell;
+    s->source_rates[s->source_cell_count++] = density * s->grid.modulus[s->layers[cell]];
     return true;
 }
 
@@ -146,7 +146,7 @@ static bool fill_cells(wave_solver *s, double (*centroid)[3])
         for (int a = 0; a < 3; ++a) centroid[c][a] = g.centroid[a];
         if (c >= s->mesh->own_cells) continue;
         s->time_step = fmin(s->time_step, measure_own(s, c, &g));
-        if (!feed(s, c, g.centroid)) return false;
+        if (!add_source_cell(s, c, g.centroid)) return false;
     }
     return true;
 }
@@ -193,8 +193,8 @@ void wave_solver_free(wave_solver *s)
     free(s->layers);
     free(s->speed);
     free(s->volume);
-    free(s->fed);
-    free(s->fed_rate);
+    free(s->source_cells);
+    free(s->source_rates);
     free(s->grid.jump);
     free(s->grid.state.values);
     free(s->grid.vertex_state.values);
@@ -226,26 +226,26 @@ void wave_solver_centroid(const wave_solver *s, int32_t cell, double xyz[3])
     for (int a = 0; a < 3; ++a) xyz[a] = g.centroid[a];
 }
 
-static void bring_up_to_date(wave_solver *s)
+static void update_halo_and_vertices(wave_solver *s)
 {
     wave_halo_exchange(&s->halo, s->grid.state.values, s->grid.state.stride, s->grid.state.component_stride);
-    if (s->grid.vertex_state.values) s->kernel->to_vertices(&s->grid);
+    if (s->grid.vertex_state.values) s->kernel->average_to_vertices(&s->grid);
 }
 
 void wave_solver_start(wave_solver *s)
 {
     MPI_Allreduce(MPI_IN_PLACE, &s->time_step, 1, MPI_DOUBLE, MPI_MIN, s->comm);
     s->time_step *= s->setup.courant > 0 ? s->setup.courant : 0.9;
-    bring_up_to_date(s);
+    update_halo_and_vertices(s);
 }
 
 static void apply_source(wave_solver *s)
 {
     double amount = s->time_step * wave_source_rate(&s->setup.source, s->time + 0.5 * s->time_step);
-    for (int32_t i = 0; i < s->fed_count; ++i) {
-        int64_t at = s->fed[i] * s->grid.state.stride;
+    for (int32_t i = 0; i < s->source_cell_count; ++i) {
+        int64_t at = s->source_cells[i] * s->grid.state.stride;
         double p = get_real(s->grid.state.values, s->setup.real_bytes, at);
-        put_real(s->grid.state.values, s->setup.real_bytes, at, p + amount * s->fed_rate[i]);
+        put_real(s->grid.state.values, s->setup.real_bytes, at, p + amount * s->source_rates[i]);
     }
 }
 
@@ -255,7 +255,7 @@ void wave_solver_step(wave_solver *s)
     wave_halo_exchange(&s->halo, s->grid.jump, 4, 1);
     s->kernel->apply_fluxes(&s->grid, s->time_step);
     apply_source(s);
-    bring_up_to_date(s);
+    update_halo_and_vertices(s);
     if (s->setup.swell != 0) s->kernel->move_vertices(&s->grid, s->setup.swell * s->time_step);
     s->time += s->time_step;
 }

@@ -6,31 +6,31 @@
 #include "wave_kernel.h"
 
 typedef struct wave_setup {
-    int real_bytes;  /* size of all values, both computed and drawn: 4 or 8 */
-    bool apart;      /* components are in separate arrays (SoA); otherwise interleaved (AoS) */
-    bool reflecting; /* walls are rigid; otherwise they absorb */
+    int real_bytes;  /* size in bytes of all values, both computed and drawn: 4 or 8 */
+    bool is_soa;     /* components are in separate arrays (SoA); otherwise interleaved (AoS) */
+    bool reflecting; /* true if walls are rigid, false if they absorb */
     int order;       /* order of the scheme: 1 or 2 */
-    bool vertices;   /* also compute the state at vertices in the first-order scheme */
+    bool vertices;   /* true if the state at vertices is computed even in the first-order scheme */
     double swell;    /* exaggeration of the displacement of drawn vertices; 0 if they do not move */
-    double courant;  /* fraction of the largest stable time step; 0 means 0.9 */
+    double courant;  /* time step as a fraction of the largest stable one; 0 means 0.9 */
     wave_medium medium;
-    wave_source source; /* no source if its amplitude is 0 */
+    wave_source source; /* source of the wave; none if its amplitude is 0 */
 } wave_setup;
 
 typedef struct wave_solver {
     wave_setup setup;
-    const wave_mesh *mesh; /* borrowed from the caller */
+    const wave_mesh *mesh; /* mesh, borrowed from the caller */
     const wave_kernel *kernel;
-    MPI_Comm comm; /* borrowed from the caller */
+    MPI_Comm comm; /* communicator, borrowed from the caller */
     wave_grid grid;
     wave_halo halo;
-    void *around_weights, *faces, *inverse_volume; /* owned arrays, to which grid points */
+    void *around_weights, *faces, *inverse_volume; /* arrays to which grid points, owned by the solver */
     uint8_t *layers;
-    void *speed;       /* real; for each cell: speed of sound */
-    double *volume;    /* volume of each own cell */
-    int32_t fed_count; /* number of own cells in the source */
-    int32_t *fed;
-    double *fed_rate; /* for each of these cells: change of pressure per unit time for a source rate of 1 */
+    void *speed;               /* real; speed of sound in each cell */
+    double *volume;            /* volume of each own cell */
+    int32_t source_cell_count; /* number of own cells within the source's ball */
+    int32_t *source_cells;
+    double *source_rates; /* for each of these cells: change of pressure per unit time for a source rate of 1 */
     double time_step, time;
 } wave_solver;
 
@@ -39,7 +39,7 @@ typedef struct wave_totals {
     double volume;
     double mass;   /* sum of V p / K, which is the injected volume */
     double energy; /* sum of V (p^2 / 2K + rho u^2 / 2) */
-    double peak;   /* maximum of |p| */
+    double peak;   /* maximum of the pressure |p| */
 } wave_totals;
 
 /* Creates the local arrays. Returns false if memory ran out; ranks must agree on this before the next collective call.

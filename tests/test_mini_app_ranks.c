@@ -99,7 +99,7 @@ static void other_arrays_and_walls_compute_the_same_bits(void **state)
     (void)state;
     for (int i = 0; i < 8; ++i) {
         const wave_setup setup = {
-            .real_bytes = (i & 1) ? 4 : 8, .apart = (i & 2) != 0, .order = 1 + (i >> 2), .swell = 0.05};
+            .real_bytes = (i & 1) ? 4 : 8, .is_soa = (i & 2) != 0, .order = 1 + (i >> 2), .swell = 0.05};
         compare(WAVE_MIXED, WAVE_RANDOM, &setup, (i & 2) ? 8 : 4);
     }
 }

@@ -392,7 +392,7 @@ static void float_stays_near_double(void **state)
         wave_setup setup = plain_setup(2);
         model m;
         setup.real_bytes = i ? 4 : 8;
-        setup.apart = i != 0;
+        setup.is_soa = i != 0;
         make_model(&m, size, WAVE_MIXED, 0, &setup);
         set_bump(&m, 20);
         for (int s = 0; s < 50; ++s) wave_solver_step(&m.solver);

@@ -8,8 +8,8 @@
 
 typedef struct face_entry {
     uint64_t hash;
-    int32_t cell; /* -1 if the entry is free */
-    int8_t face, met;
+    int32_t cell; /* cell that has the face; -1 if the entry is free */
+    int8_t face, is_matched;
 } face_entry;
 
 typedef struct face_table {
@@ -76,13 +76,13 @@ static bool on_a_wall(const wave_mesh *mesh, int32_t cell, int face)
     return (low | high) != 0;
 }
 
-static void join(wave_mesh *mesh, int32_t a, int face_a, int32_t b, int face_b)
+static void set_neighbours(wave_mesh *mesh, int32_t a, int face_a, int32_t b, int face_b)
 {
     if (a < mesh->own_cells) mesh->neighbours[wave_mesh_first_face(mesh, a) + face_a] = b;
     if (b < mesh->own_cells) mesh->neighbours[wave_mesh_first_face(mesh, b) + face_b] = a;
 }
 
-static void meet_faces(wave_mesh *mesh, face_table *table, int32_t cell)
+static void match_faces(wave_mesh *mesh, face_table *table, int32_t cell)
 {
     int64_t key[4];
     int faces = wave_cell_shape_of(wave_mesh_type(mesh, cell))->face_count;
@@ -93,10 +93,10 @@ static void meet_faces(wave_mesh *mesh, face_table *table, int32_t cell)
         if (e->cell < 0) {
             /* Only faces of own cells are stored; own cells precede halo cells. */
             if (cell < mesh->own_cells) *e = (face_entry){hash, cell, (int8_t)f, 0};
-        } else if (e->met++) {
+        } else if (e->is_matched++) {
             mesh->unmatched++;
         } else {
-            join(mesh, e->cell, e->face, cell, f);
+            set_neighbours(mesh, e->cell, e->face, cell, f);
         }
     }
 }
@@ -143,7 +143,7 @@ bool wave_faces_find_neighbours(wave_mesh *mesh)
     }
     for (int64_t i = 0; i < mesh->face_count; ++i) mesh->neighbours[i] = -1;
     for (int64_t i = 0; i < capacity; ++i) table.entries[i].cell = -1;
-    for (int32_t c = 0; c < mesh->cells; ++c) meet_faces(mesh, &table, c);
+    for (int32_t c = 0; c < mesh->cells; ++c) match_faces(mesh, &table, c);
     free(table.entries);
     count_unmatched(mesh);
     return true;

@@ -16,7 +16,7 @@ typedef struct wave_lattice {
     wave_cells cells; /* kind of cells into which cubes are split */
     double jitter;    /* maximum displacement of inner vertices along each axis, relative to the edge; 0 to 0.3 */
     double edge;      /* edge length of a cube; the longest side of the box is 2 */
-    double origin[3]; /* corner with the smallest x, y, z */
+    double origin[3]; /* corner of the box with the smallest x, y, z */
 } wave_lattice;
 
 enum {
@@ -24,7 +24,7 @@ enum {
 }; /* maximum number of cells per cube; a cell's id is cube id * 12 + index in the cube */
 
 typedef struct wave_cell {
-    uint8_t type;      /* one of WAVE_TYPE_* */
+    uint8_t type;      /* cell type, one of WAVE_TYPE_* */
     int64_t vertex[8]; /* ids; those of lattice vertices come before those of cube centres */
 } wave_cell;
 

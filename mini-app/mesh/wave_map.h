@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct wave_map {
-    int64_t *keys; /* -1 if the entry is free */
+    int64_t *keys; /* keys of the entries; -1 if the entry is free */
     int32_t *values;
     int64_t capacity, count;
 } wave_map;

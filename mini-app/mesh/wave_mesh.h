@@ -12,34 +12,34 @@
 /* The cells that are exchanged with one other rank. */
 typedef struct wave_link {
     int rank;
-    int32_t send_begin, send_end;       /* range in wave_mesh.sends */
-    int32_t receive_begin, receive_end; /* range of halo cells */
+    int32_t send_begin, send_end;       /* range of the link's cells in wave_mesh.sends */
+    int32_t receive_begin, receive_end; /* range of halo cells received over the link */
 } wave_link;
 
 typedef struct wave_mesh {
     wave_partition partition;
     int rank;
-    int32_t own_cells, cells;       /* own cells come first; cells includes the halo */
+    int32_t own_cells, cells;       /* number of own cells, which come first, and of all cells including the halo */
     int32_t own_vertices, vertices; /* vertices of own cells come first, then those that only halo cells use */
     int64_t *cell_ids;              /* global id of each cell */
     int64_t *vertex_ids;            /* global id of each vertex */
-    uint8_t *walls;                 /* for each vertex: wave_lattice_walls() */
-    uint8_t uniform_type;           /* type of all cells; 0 if they are mixed */
-    uint8_t *types;                 /* type of each cell; NULL if uniform */
-    int index_bytes;                /* size of the integers in connectivity and offsets: 4 or 8 */
-    void *connectivity;             /* vertices of all cells, cell by cell */
-    void *offsets;                  /* cells + 1 entries; NULL if uniform */
+    uint8_t *walls;       /* for each vertex the walls on which it lies, as wave_lattice_walls() returns them */
+    uint8_t uniform_type; /* type of all cells; 0 if they are mixed */
+    uint8_t *types;       /* type of each cell; NULL if all have uniform_type */
+    int index_bytes;      /* size of the integers in connectivity and offsets: 4 or 8 */
+    void *connectivity;   /* vertices of all cells, cell by cell */
+    void *offsets;        /* first entry in connectivity of each cell, and the total; NULL if all cells have one type */
     int64_t connectivity_count;
     int64_t
         *face_offsets;   /* own_cells + 1 entries; NULL if uniform. The faces of a cell are in the order of its shape */
     int32_t *neighbours; /* for each face of each own cell: the neighbour across it, or -1 at a wall */
     int64_t face_count;  /* number of faces of own cells; a face between two of them counts twice */
     int64_t unmatched;   /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
-    int64_t *around_offsets; /* own_vertices + 1 entries */
+    int64_t *around_offsets; /* first entry in around of each own vertex, and the total */
     int32_t *around;         /* cells around each vertex of an own cell, in ascending order of cell id */
     int link_count;
-    wave_link *links; /* in ascending order of rank */
-    int32_t *sends;   /* own cells to send, link by link */
+    wave_link *links; /* links to other ranks, in ascending order of rank */
+    int32_t *sends;   /* own cells to send to other ranks, link by link */
     int32_t send_count;
 } wave_mesh;
 

@@ -25,12 +25,12 @@ typedef struct pair_list {
     int64_t count, capacity;
 } pair_list;
 
-typedef struct maker {
+typedef struct mesh_builder {
     wave_mesh *mesh;
     wave_map vertex_map;
     pair_list own, foreign, sends;
     int64_t cell_capacity, connectivity_capacity, vertex_capacity;
-} maker;
+} mesh_builder;
 
 static bool list_add(pair_list *list, int32_t rank, int64_t value)
 {
@@ -63,7 +63,7 @@ static void list_sort_unique(pair_list *list)
     list->count = kept + 1;
 }
 
-static bool find_own_cubes(maker *m)
+static bool find_own_cubes(mesh_builder *m)
 {
     const wave_partition *p = &m->mesh->partition;
     int low[3], high[3], at[3];
@@ -96,7 +96,7 @@ static bool owners_around(const wave_mesh *mesh, int64_t cube, int owner[3][3][3
     return foreign;
 }
 
-static bool add_foreign_cubes(maker *m, int64_t cube, int owner[3][3][3])
+static bool add_foreign_cubes(mesh_builder *m, int64_t cube, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;
     int ijk[3];
@@ -112,7 +112,7 @@ static bool add_foreign_cubes(maker *m, int64_t cube, int owner[3][3][3])
 
 /* Adds a send of the cell to the rank, unless the list contains it. Earlier sends of the same cell are at the end of
  * the list. */
-static bool add_send(maker *m, int rank, int32_t cell)
+static bool add_send(mesh_builder *m, int rank, int32_t cell)
 {
     for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
         if (m->sends.items[i].rank == rank) return true;
@@ -121,7 +121,7 @@ static bool add_send(maker *m, int rank, int32_t cell)
 }
 
 /* Adds a send to every rank that has a cube at one of the cell's lattice vertices. */
-static bool add_sends(maker *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
+static bool add_sends(mesh_builder *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;
     int ijk[3], at[3];
@@ -145,7 +145,7 @@ static bool grow_array(void **array, size_t bytes, int64_t capacity)
     return true;
 }
 
-static bool reserve_cell(maker *m)
+static bool reserve_cell(mesh_builder *m)
 {
     wave_mesh *mesh = m->mesh;
     if (mesh->cells == INT32_MAX - 1) return false;
@@ -172,7 +172,7 @@ static void put_index(const wave_mesh *mesh, void *array, int64_t at, int64_t va
     }
 }
 
-static bool add_vertex(maker *m, int64_t id, int32_t *local)
+static bool add_vertex(mesh_builder *m, int64_t id, int32_t *local)
 {
     wave_mesh *mesh = m->mesh;
     *local = wave_map_insert(&m->vertex_map, id, mesh->vertices);
@@ -189,7 +189,7 @@ static bool add_vertex(maker *m, int64_t id, int32_t *local)
     return true;
 }
 
-static bool add_cell(maker *m, const wave_cell *c, int64_t id)
+static bool add_cell(mesh_builder *m, const wave_cell *c, int64_t id)
 {
     wave_mesh *mesh = m->mesh;
     if (!reserve_cell(m)) return false;
@@ -204,7 +204,7 @@ static bool add_cell(maker *m, const wave_cell *c, int64_t id)
     return true;
 }
 
-static bool make_own_cells(maker *m)
+static bool make_own_cells(mesh_builder *m)
 {
     wave_cell cells[WAVE_CELLS_PER_CUBE];
     int owner[3][3][3];
@@ -225,7 +225,7 @@ static bool make_own_cells(maker *m)
     return true;
 }
 
-static bool touches_own(const maker *m, const wave_cell *c)
+static bool touches_own(const mesh_builder *m, const wave_cell *c)
 {
     for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
         int32_t local = wave_map_find(&m->vertex_map, c->vertex[i]);
@@ -234,7 +234,7 @@ static bool touches_own(const maker *m, const wave_cell *c)
     return false;
 }
 
-static bool make_halo_cells(maker *m)
+static bool make_halo_cells(mesh_builder *m)
 {
     wave_mesh *mesh = m->mesh;
     wave_cell cells[WAVE_CELLS_PER_CUBE];
@@ -260,7 +260,7 @@ static bool make_halo_cells(maker *m)
     return true;
 }
 
-static bool make_sends(maker *m)
+static bool make_sends(mesh_builder *m)
 {
     wave_mesh *mesh = m->mesh;
     int64_t at = 0;
@@ -332,7 +332,7 @@ static void drop_what_a_uniform_mesh_needs_not(wave_mesh *mesh)
 bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes, wave_mesh *mesh)
 {
     *mesh = (wave_mesh){.partition = *partition, .rank = rank, .index_bytes = index_bytes};
-    maker m = {.mesh = mesh};
+    mesh_builder m = {.mesh = mesh};
     bool ok = find_own_cubes(&m) && reserve_cell(&m);
     if (ok) put_index(mesh, mesh->offsets, 0, 0);
     ok = ok && make_own_cells(&m) && make_halo_cells(&m) && make_sends(&m);
