@@ -28,7 +28,7 @@ extern "C" {
 #include <cmocka.h>
 }
 
-using render_tool::deal;
+using render_tool::distribute_cells;
 using render_tool::partition;
 
 namespace
@@ -107,7 +107,7 @@ void expect_each_cell_once(vtkDataObject *data)
     for (const partition how : {partition::block, partition::random, partition::checkerboard})
         for (const int ranks : {1, 2, 3, 7, 100}) {
             std::map<int, corners> found;
-            for (int rank = 0; rank < ranks; rank++) collect_all(deal(data, how, rank, ranks), found);
+            for (int rank = 0; rank < ranks; rank++) collect_all(distribute_cells(data, how, rank, ranks), found);
             assert_true(found == expected);
         }
 }
@@ -130,7 +130,7 @@ void more_ranks_than_cells_leaves_some_without(void **)
 {
     const auto grid = lattice(1, 0, 0);
     int with = 0;
-    for (int rank = 0; rank < 5; rank++) with += deal(grid, partition::block, rank, 5) != nullptr;
+    for (int rank = 0; rank < 5; rank++) with += distribute_cells(grid, partition::block, rank, 5) != nullptr;
     assert_int_equal(with, 1);
 }
 
@@ -141,7 +141,7 @@ void parts_are_balanced(void **)
     const auto grid = lattice(16, 0, 0);
     for (int rank = 0; rank < 4; rank++) {
         auto cells = [&](partition how) {
-            return vtkUnstructuredGrid::SafeDownCast(deal(grid, how, rank, 4))->GetNumberOfCells();
+            return vtkUnstructuredGrid::SafeDownCast(distribute_cells(grid, how, rank, 4))->GetNumberOfCells();
         };
         assert_int_equal(cells(partition::block), 1024);
         assert_in_range(cells(partition::random), 1024 - 139, 1024 + 139);
@@ -153,7 +153,7 @@ void leaves_keep_their_numbers(void **)
     vtkNew<vtkMultiBlockDataSet> blocks;
     blocks->SetBlock(0, lattice(2, 0, 0));
     blocks->SetBlock(1, lattice(2, 100, 5));
-    const auto dealt = deal(blocks, partition::block, 1, 2);
+    const auto dealt = distribute_cells(blocks, partition::block, 1, 2);
     auto *last = vtkMultiBlockDataSet::SafeDownCast(dealt);
     assert_int_equal(last->GetNumberOfBlocks(), 2);
     assert_null(last->GetBlock(0));

@@ -34,7 +34,7 @@ struct field_info {
     int components = 1;
     int leaves = 0;
     bool is_finite = true;
-    std::vector<std::pair<double, double>> ranges; // range of each component, then of the magnitude
+    std::vector<std::pair<double, double>> ranges; // range of each component, followed by that of the magnitude
 };
 
 struct data_summary {
@@ -44,7 +44,7 @@ struct data_summary {
     int leaves = 0;
     std::string point_type;
     vtkBoundingBox bounds;
-    std::map<std::string, field_info> fields[2]; // of points; of cells
+    std::map<std::string, field_info> fields[2]; // fields of the points and fields of the cells, by name
 };
 
 void add_value(std::pair<double, double> &range, double value, bool &is_finite)
@@ -67,7 +67,7 @@ bool has(const std::vector<bool> &selected, vtkIdType i)
     return selected.empty() || (i < static_cast<vtkIdType>(selected.size()) && selected[static_cast<size_t>(i)]);
 }
 
-selection select_shown(vtkUnstructuredGrid *grid)
+selection select_visible(vtkUnstructuredGrid *grid)
 {
     constexpr int hiding =
         vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
@@ -132,7 +132,7 @@ void add_leaf(vtkDataObject *object, data_summary &all)
 {
     auto *grid = vtkUnstructuredGrid::SafeDownCast(object);
     if (!grid) return;
-    const selection shown = select_shown(grid);
+    const selection shown = select_visible(grid);
     all.leaves++;
     all.points += grid->GetNumberOfPoints();
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++)

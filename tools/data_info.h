@@ -18,7 +18,7 @@ void print_info(const std::string &title, vtkDataObject *data, const std::vector
 /* The extent of a series: the bounds of its points, and the smallest and largest value of a field (the magnitude of a
  * vector). It is empty if low is greater than high. */
 struct data_extent {
-    double low[4], high[4]; // x, y, z, field value
+    double low[4], high[4]; // ranges of x, y, z and the field's value
 
     data_extent();
     bool has_bounds() const { return low[0] <= high[0]; }

@@ -36,8 +36,8 @@ namespace
 
 using vector = std::array<double, 3>;
 
-constexpr vector usual_direction = {1, 0.8, 1.2};
-constexpr double little = 0.35; // fraction of the field's range below which the interior is shown
+constexpr vector default_direction = {1, 0.8, 1.2};
+constexpr double interior_threshold = 0.35; // fraction of the field's range below which the interior is shown
 
 using grid_list = std::vector<vtkUnstructuredGrid *>;
 
@@ -114,12 +114,12 @@ int dimension_of(vtkUnstructuredGrid *grid)
     return most;
 }
 
-struct seen_value {
+struct visible_value {
     double value, area;
 };
 
 /* Returns twice the projected area of a face in the viewing direction; negative if it points away from the viewer. */
-double seen_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, const vector &towards)
+double projected_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, const vector &to_viewer)
 {
     vector first{}, last{};
     faces->GetPoint(points[0], first.data());
@@ -131,14 +131,15 @@ double seen_area(vtkPolyData *faces, vtkIdType count, const vtkIdType *points, c
         vtkMath::Subtract(last, first, to_last);
         vtkMath::Subtract(next, first, to_next);
         vtkMath::Cross(to_last.data(), to_next.data(), normal.data());
-        area += vtkMath::Dot(normal, towards);
+        area += vtkMath::Dot(normal, to_viewer);
         last = next;
     }
     return area;
 }
 
 /* Adds the faces of a grid's outer surface that point to the viewer. */
-void add_seen(vtkUnstructuredGrid *grid, const std::string &field, const vector &towards, std::vector<seen_value> &seen)
+void add_visible_faces(vtkUnstructuredGrid *grid, const std::string &field, const vector &to_viewer,
+                       std::vector<visible_value> &visible)
 {
     vtkNew<vtkDataSetSurfaceFilter> filter;
     filter->SetInputData(grid);
@@ -151,19 +152,19 @@ void add_seen(vtkUnstructuredGrid *grid, const std::string &field, const vector 
         vtkIdType count = 0;
         const vtkIdType *points = nullptr;
         faces->GetCellPoints(f, count, points);
-        const double area = count < 3 ? 0 : seen_area(faces, count, points, towards);
+        const double area = count < 3 ? 0 : projected_area(faces, count, points, to_viewer);
         double value = is_at_points ? 0 : value_of(values, f);
         for (vtkIdType k = 0; is_at_points && k < count; k++)
             value += value_of(values, points[k]) / static_cast<double>(count);
-        if (area > 0 && std::isfinite(value)) seen.push_back({value, area});
+        if (area > 0 && std::isfinite(value)) visible.push_back({value, area});
     }
 }
 
 /* Returns the fraction of the field's range that is visible on the outer surface; 1 if it cannot be computed. */
-double seen_share(const grid_list &grids, const std::string &field, const vector &towards)
+double visible_range_fraction(const grid_list &grids, const std::string &field, const vector &to_viewer)
 {
     double low = std::numeric_limits<double>::infinity(), high = -low, area = 0, below = 0;
-    std::vector<seen_value> seen;
+    std::vector<visible_value> visible;
     for (vtkUnstructuredGrid *grid : grids) {
         bool is_at_points = false;
         vtkDataArray *values = array_of(grid, field, is_at_points);
@@ -173,13 +174,13 @@ double seen_share(const grid_list &grids, const std::string &field, const vector
             low = std::min(low, value);
             high = std::max(high, value);
         }
-        if (values) add_seen(grid, field, towards, seen);
+        if (values) add_visible_faces(grid, field, to_viewer, visible);
     }
-    if (seen.empty() || !(high > low)) return 1;
-    std::sort(seen.begin(), seen.end(), [](auto &a, auto &b) { return a.value < b.value; });
-    for (const seen_value &s : seen) area += s.area;
-    double first = seen.front().value, last = first;
-    for (const seen_value &s : seen) {
+    if (visible.empty() || !(high > low)) return 1;
+    std::sort(visible.begin(), visible.end(), [](auto &a, auto &b) { return a.value < b.value; });
+    for (const visible_value &s : visible) area += s.area;
+    double first = visible.front().value, last = first;
+    for (const visible_value &s : visible) {
         if (below < 0.05 * area) first = s.value;
         if (below < 0.95 * area) last = s.value;
         below += s.area;
@@ -188,18 +189,18 @@ double seen_share(const grid_list &grids, const std::string &field, const vector
 }
 
 /* Returns the axis, with the sign towards the viewer, perpendicular to which a cut has the largest projected area. */
-std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &towards)
+std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &to_viewer)
 {
     std::array<int, 3> cut = {0, 0, 0};
     double most = 0;
     for (int axis = 0; axis < 3; axis++) {
         const auto a = static_cast<size_t>(axis);
         const double face = bounds.GetLength((axis + 1) % 3) * bounds.GetLength((axis + 2) % 3);
-        const double shown = face * std::fabs(towards[a]);
+        const double shown = face * std::fabs(to_viewer[a]);
         if (shown <= most) continue;
         most = shown;
         cut = {0, 0, 0};
-        cut[a] = towards[a] > 0 ? 1 : -1;
+        cut[a] = to_viewer[a] > 0 ? 1 : -1;
     }
     return cut;
 }
@@ -208,16 +209,17 @@ std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &towards)
 
 std::array<double, 3> eye_direction(const options &o)
 {
-    vector towards = usual_direction;
+    vector to_viewer = default_direction;
     if (!o.direction.empty())
-        (void)std::sscanf(o.direction.c_str(), "%lf, %lf, %lf", &towards[0], &towards[1], &towards[2]);
-    return towards;
+        (void)std::sscanf(o.direction.c_str(), "%lf, %lf, %lf", &to_viewer[0], &to_viewer[1], &to_viewer[2]);
+    return to_viewer;
 }
 
 std::array<double, 3> up_direction(const options &o)
 {
-    const vector towards = eye_direction(o);
-    const bool is_upright = std::hypot(towards[0], towards[2]) < 1e-6 * std::hypot(towards[0], towards[1], towards[2]);
+    const vector to_viewer = eye_direction(o);
+    const bool is_upright =
+        std::hypot(to_viewer[0], to_viewer[2]) < 1e-6 * std::hypot(to_viewer[0], to_viewer[1], to_viewer[2]);
     if (is_upright) return {0, 0, 1};
     return {0, 1, 0};
 }
@@ -239,9 +241,9 @@ default_look choose_look(const options &o)
     }
     for (int axis = 0; dimension == 2 && axis < 3; axis++)
         if (bounds.GetLength(axis) <= 1e-6 * bounds.GetMaxLength()) look.flat_axis = axis;
-    const vector towards = eye_direction(o);
-    if (dimension == 3 && !o.whole && seen_share(grids, look.field, towards) < little)
-        look.cut = best_cut(bounds, towards);
+    const vector to_viewer = eye_direction(o);
+    if (dimension == 3 && !o.whole && visible_range_fraction(grids, look.field, to_viewer) < interior_threshold)
+        look.cut = best_cut(bounds, to_viewer);
     return look;
 }
 

@@ -11,7 +11,7 @@ namespace render_tool
 {
 
 struct default_look {
-    std::string field;                  // "" if the file has no field
+    std::string field;                  // name of the field; "" if the file has no field
     int flat_axis = -1;                 // axis perpendicular to a flat mesh; -1 if the mesh is not flat
     std::array<int, 3> cut = {0, 0, 0}; // normal of a plane through the centre; the side to which it points is cut away
     bool is_cut() const { return cut[0] || cut[1] || cut[2]; }

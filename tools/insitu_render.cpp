@@ -35,11 +35,11 @@ using namespace render_tool;
 namespace
 {
 
-struct world {
+struct rank_info {
     MPI_Comm comm = MPI_COMM_WORLD;
     int rank = 0, ranks = 1;
 
-    world()
+    rank_info()
     {
         MPI_Comm_rank(comm, &rank);
         MPI_Comm_size(comm, &ranks);
@@ -48,7 +48,7 @@ struct world {
 };
 
 /* Throws the message of the lowest rank that has one, on all ranks. Collective. */
-void agree(const world &w, const std::string &message)
+void throw_if_any_failed(const rank_info &w, const std::string &message)
 {
     int failing = message.empty() ? INT_MAX : w.rank;
     MPI_Allreduce(MPI_IN_PLACE, &failing, 1, MPI_INT, MPI_MIN, w.comm);
@@ -62,7 +62,7 @@ void agree(const world &w, const std::string &message)
 }
 
 /* Runs a local function on every rank; if it throws on one rank, throws on all. Collective. */
-template <typename Body> void all_do(const world &w, Body body)
+template <typename Body> void run_on_all_ranks(const rank_info &w, Body body)
 {
     std::string message;
     try {
@@ -70,21 +70,21 @@ template <typename Body> void all_do(const world &w, Body body)
     } catch (const std::exception &e) {
         message = e.what()[0] ? e.what() : "unknown error";
     }
-    agree(w, message);
+    throw_if_any_failed(w, message);
 }
 
 /* A session and its adaptor. The destructor closes both in the right order. */
-class stage
+class render_session
 {
   public:
     /* scene is a file name, or the text of a scene if is_text; only rank 0 needs the text. */
-    stage(const world &w, const std::string &scene, bool is_text)
+    render_session(const rank_info &w, const std::string &scene, bool is_text)
     {
         const auto create = is_text ? insitu_create_from_text : insitu_create;
         if (create(w.comm, scene.c_str(), &session_) != INSITU_OK) throw std::runtime_error(insitu_error(nullptr));
         (void)insitu_vtk_create(session_, &adaptor_);
     }
-    ~stage()
+    ~render_session()
     {
         insitu_vtk_destroy(&adaptor_);
         (void)insitu_destroy(&session_);
@@ -96,8 +96,8 @@ class stage
         insitu_vtk_destroy(&adaptor_);
         if (insitu_destroy(&session_) != INSITU_OK) throw std::runtime_error(insitu_error(nullptr));
     }
-    stage(const stage &) = delete;
-    stage &operator=(const stage &) = delete;
+    render_session(const render_session &) = delete;
+    render_session &operator=(const render_session &) = delete;
 
     /* Sets this rank's part. A part without drawable cells is not an error, because the rest of the data may be on
      * other ranks. */
@@ -105,8 +105,8 @@ class stage
     {
         insitu_vtk_report report;
         const insitu_status status = insitu_vtk_set(adaptor_, "data", data, &report);
-        const bool has_nothing = status == INSITU_ERROR_MESH && report.cells == 0 && report.cells_not_drawn > 0;
-        if (status != INSITU_OK && !has_nothing) throw std::runtime_error(insitu_vtk_error(adaptor_));
+        const bool has_no_cells = status == INSITU_ERROR_MESH && report.cells == 0 && report.cells_not_drawn > 0;
+        if (status != INSITU_OK && !has_no_cells) throw std::runtime_error(insitu_vtk_error(adaptor_));
         return report;
     }
 
@@ -128,7 +128,7 @@ class stage
 };
 
 /* Returns, on rank 0, the lines in the texts of all ranks that are not in `seen` yet. Collective. */
-std::vector<std::string> new_lines(const world &w, const std::string &text, std::set<std::string> &seen)
+std::vector<std::string> new_lines(const rank_info &w, const std::string &text, std::set<std::string> &seen)
 {
     int length = static_cast<int>(text.size());
     std::vector<int> lengths(static_cast<size_t>(w.ranks)), starts(static_cast<size_t>(w.ranks));
@@ -150,17 +150,17 @@ std::vector<std::string> new_lines(const world &w, const std::string &text, std:
 /* The warnings printed so far, the number of images, and the number of steps that had all fields. */
 struct run_state {
     const options &given;
-    std::set<std::string> said;
+    std::set<std::string> shown_warnings;
     int images = 0;
-    int whole_steps = 0;
+    int complete_steps = 0;
     std::string missing; // reason why the last incomplete step was not drawn completely
 };
 
 constexpr size_t warnings_at_once = 8;
 
-void show_warnings(const world &w, const std::string &text, run_state &run, progress &bar)
+void show_warnings(const rank_info &w, const std::string &text, run_state &run, progress &bar)
 {
-    const std::vector<std::string> fresh = new_lines(w, text, run.said);
+    const std::vector<std::string> fresh = new_lines(w, text, run.shown_warnings);
     for (size_t i = 0; i < fresh.size() && i < warnings_at_once; i++) bar.note("warning: " + fresh[i]);
     if (fresh.size() > warnings_at_once)
         bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
@@ -179,7 +179,7 @@ std::string cell_warnings(const int64_t sums[4])
 }
 
 /* Throws if no rank has a cell to draw; otherwise returns warnings about cells. Collective. */
-std::string check_cells(const world &w, const insitu_vtk_report &report, const std::string &name)
+std::string check_cells(const rank_info &w, const insitu_vtk_report &report, const std::string &name)
 {
     int64_t sums[4] = {report.cells, report.cells_linear, report.cells_flat, report.cells_not_drawn};
     MPI_Allreduce(MPI_IN_PLACE, sums, 4, MPI_INT64_T, MPI_SUM, w.comm);
@@ -199,7 +199,7 @@ std::string milliseconds(double ms)
 
 /* Returns the line that describes the step: cells are summed over ranks, and times are the maximum over ranks.
  * Collective. */
-std::string step_line(const world &w, const insitu_report &r, const std::string &name, double time, double read_ms)
+std::string step_line(const rank_info &w, const insitu_report &r, const std::string &name, double time, double read_ms)
 {
     const char *const names[] = {"prepare", "build", "refit", "surface", "volume", "composite", "write"};
     double times[9] = {r.prepare_ms,   r.build_ms, r.refit_ms, r.surface_ms, r.volume_ms,
@@ -221,7 +221,7 @@ std::string step_line(const world &w, const insitu_report &r, const std::string 
 }
 
 /* If there is no scene file, replaces the message about a missing field by one that names the option --field. */
-std::string by_option(const options &o, const std::string &missing)
+std::string name_missing_option(const options &o, const std::string &missing)
 {
     const size_t reason = missing.find("no mesh has the field");
     if (!o.scene.empty() || reason == std::string::npos) return missing;
@@ -229,14 +229,14 @@ std::string by_option(const options &o, const std::string &missing)
     return "--field " + o.field + ": " + missing.substr(reason);
 }
 
-void draw_step(const world &w, step_source &source, stage &on, size_t index, run_state &run, progress &bar)
+void draw_step(const rank_info &w, step_source &source, render_session &on, size_t index, run_state &run, progress &bar)
 {
     const std::string name = source.name(index);
     bar.begin(index, name);
     step_source::result part;
     insitu_vtk_report report{};
     const auto start = std::chrono::steady_clock::now();
-    all_do(w, [&] {
+    run_on_all_ranks(w, [&] {
         part = source.read(index);
         report = on.set(part.data);
     });
@@ -246,9 +246,9 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
     std::string warnings = part.warnings + check_cells(w, report, name) + report.warnings + "\n", missing;
     const insitu_report &done = on.step(source.cycle(index), part.time, missing);
     if (missing.empty()) {
-        run.whole_steps++;
+        run.complete_steps++;
     } else {
-        run.missing = by_option(run.given, missing);
+        run.missing = name_missing_option(run.given, missing);
         if (source.count() > 1 && w.is_root()) warnings += name + ": not drawn: " + run.missing + "\n";
     }
     if (done.warnings) warnings += done.warnings;
@@ -264,10 +264,10 @@ std::string working_folder()
 }
 
 /* Returns the extent of all steps of the source, on every rank. Collective. */
-data_extent extent_of(const world &w, step_source &source, const std::string &field)
+data_extent extent_of(const rank_info &w, step_source &source, const std::string &field)
 {
     data_extent extent;
-    all_do(w, [&] {
+    run_on_all_ranks(w, [&] {
         for (size_t i = 0; i < source.count(); i++)
             if (const auto data = source.read(i).data) add_extent(data, field, extent);
     });
@@ -278,10 +278,10 @@ data_extent extent_of(const world &w, step_source &source, const std::string &fi
 
 /* Returns the text of the default scene, on rank 0. All steps are read in advance, so that the colour range and the
  * camera are the same for all of them. Collective. */
-std::string text_of_default(const world &w, const options &o, step_source &source)
+std::string text_of_default(const rank_info &w, const options &o, step_source &source)
 {
     default_look look;
-    all_do(w, [&] {
+    run_on_all_ranks(w, [&] {
         if (w.is_root()) look = choose_look(o);
     });
     int length = static_cast<int>(look.field.size());
@@ -294,17 +294,17 @@ std::string text_of_default(const world &w, const options &o, step_source &sourc
     return default_scene(o, look, &extent);
 }
 
-void draw(const world &w, const options &o)
+void draw(const rank_info &w, const options &o)
 {
     std::unique_ptr<step_source> source;
-    all_do(w, [&] { source = std::make_unique<step_source>(o, w.rank, w.ranks); });
+    run_on_all_ranks(w, [&] { source = std::make_unique<step_source>(o, w.rank, w.ranks); });
     const bool is_text = o.scene.empty();
-    stage on(w, is_text ? text_of_default(w, o, *source) : o.scene, is_text);
+    render_session on(w, is_text ? text_of_default(w, o, *source) : o.scene, is_text);
     run_state run{o, {}, 0, 0, ""};
     progress bar(w.is_root(), source->count());
     for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);
     on.close();
-    if (run.whole_steps == 0 && !run.missing.empty()) throw std::runtime_error(run.missing);
+    if (run.complete_steps == 0 && !run.missing.empty()) throw std::runtime_error(run.missing);
     bar.line(std::to_string(source->count()) + (source->count() == 1 ? " step, " : " steps, ") +
              std::to_string(run.images) + (run.images == 1 ? " picture" : " pictures") + " in " + working_folder());
 }
@@ -323,7 +323,7 @@ void show_info(const options &o)
     }
 }
 
-void run(const world &w, int argc, char **argv)
+void run(const rank_info &w, int argc, char **argv)
 {
     const options o = parse_options(argc, argv);
     if (o.help || o.version) {
@@ -336,7 +336,7 @@ void run(const world &w, int argc, char **argv)
     }
     catch_vtk_messages();
     if (o.info)
-        all_do(w, [&] {
+        run_on_all_ranks(w, [&] {
             if (w.is_root()) show_info(o);
         });
     else
@@ -351,7 +351,7 @@ int main(int argc, char **argv)
     MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
     int status = 0;
     {
-        const world w;
+        const rank_info w;
         try {
             run(w, argc, argv);
         } catch (const std::exception &e) {

@@ -69,7 +69,7 @@ void parse_camera(const std::string &text, options &o)
 /* A name in which each sequence of digits is replaced by '#', and these sequences. */
 struct numbered_name {
     std::string path, shape;
-    std::vector<std::string> numbers; // without leading zeros
+    std::vector<std::string> numbers; // the sequences of digits without leading zeros
 
     explicit numbered_name(const std::string &of) : path(of)
     {
@@ -108,7 +108,7 @@ void order_by_number(std::vector<std::string> &files)
 }
 
 /* Keeps one file of each parallel run's Exodus output, because any of its files represents all of them. */
-void leave_one_of_each_run(options &o)
+void keep_one_file_per_run(options &o)
 {
     std::set<std::string> runs;
     std::vector<std::string> left;
@@ -143,7 +143,10 @@ struct help_formatter : CLI::Formatter {
     {
         return option->get_type_size() ? " " + option->get_type_name() : "";
     }
-    std::string make_positionals(const CLI::App *) const override { return ""; } // the usage line lists them already
+    std::string make_positionals(const CLI::App *) const override
+    {
+        return "";
+    } // positional arguments are listed in the usage line already
 };
 
 /* Returns the edit distance of two words (insertions, deletions and replacements of letters). */
@@ -163,7 +166,7 @@ size_t count_edits(const std::string &a, const std::string &b)
 }
 
 /* Returns a hint for options of other programs that this program lacks; "" for other names. */
-std::string instead_of(const std::string &name)
+std::string option_hint(const std::string &name)
 {
     static const std::vector<std::pair<std::set<std::string>, const char *>> known = {
         {{"-o", "--out", "--output", "--outdir"},
@@ -180,7 +183,7 @@ std::string instead_of(const std::string &name)
 [[noreturn]] void refuse_unknown(const CLI::App &app, const std::string &given)
 {
     const std::string name = given.substr(0, given.find('='));
-    std::string nearest = instead_of(name);
+    std::string nearest = option_hint(name);
     size_t least = nearest.empty() ? name.size() / 3 + 1 : 0;
     for (const CLI::Option *option : app.get_options()) {
         const std::string known = option->get_positional() ? "" : option->get_name();
@@ -223,13 +226,13 @@ void declare(CLI::App &app, options &o, std::vector<std::string> &names)
     app.add_flag("--whole", o.whole, "without a scene: solids whose outside shows little are not cut open");
     app.add_flag("--version", o.version, "print the version");
     app.add_flag("--help", o.help, "print this");
-    app.add_flag("-h", o.help)->group(""); // not listed in the help
+    app.add_flag("-h", o.help)->group(""); // the short form -h is not listed in the help
     app.add_option("file", names);
 }
 
 /* Removes the scene, if there is one, from the names: the name with a scene's extension, or a first name that is not
  * data. */
-void take_scene(std::vector<std::string> &names, options &o)
+void extract_scene(std::vector<std::string> &names, options &o)
 {
     if (names.empty()) throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
     auto scene = std::find_if(names.begin(), names.end(), is_scene);
@@ -260,14 +263,14 @@ options parse_options(int argc, char **argv)
     }
     if (!app.remaining().empty()) refuse_unknown(app, app.remaining().front());
     if (o.help || o.version) return o;
-    if (!o.info) take_scene(names, o);
+    if (!o.info) extract_scene(names, o);
     for (const char *option : {"--field", "--size", "--camera", "--whole"})
         if (!o.scene.empty() && app.get_option(option)->count() > 0)
             throw std::runtime_error(std::string(option) + ": given with the scene file " + o.scene +
                                      ", which says that itself, expected one of the two");
     if (names.empty()) throw std::runtime_error("data files are missing; see insitu-render --help");
     o.files = names;
-    leave_one_of_each_run(o);
+    keep_one_file_per_run(o);
     if (!o.pieces) order_by_number(o.files);
     return o;
 }

@@ -16,15 +16,15 @@ struct options {
     bool help = false;
     bool version = false;
     bool info = false;
-    bool pieces = false; // the files are pieces of one step instead of steps
+    bool pieces = false; // true if the files are pieces of one step instead of steps
     int64_t first_step = 0;
     int64_t last_step = std::numeric_limits<int64_t>::max();
     partition how = partition::block;
     std::string scene; // "" for the default scene, to which the five options below apply
     int width = 1280, height = 720;
-    std::string field;     // "" for the first field
+    std::string field;     // name of the field; "" for the first field of the file
     std::string direction; // direction to the viewer; "" to choose it from the data
-    bool whole = false;    // solids are not cut open
+    bool whole = false;    // true if solids are not cut open
     std::vector<std::string> files;
 };
 

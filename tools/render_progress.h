@@ -17,8 +17,8 @@ class progress
     progress(const progress &) = delete;
     progress &operator=(const progress &) = delete;
 
-    void begin(size_t step, const std::string &name); /* shows the step in the bar */
-    void line(const std::string &text);               /* prints a permanent line */
+    void begin(size_t step, const std::string &name); /* shows the step's number and name in the progress bar */
+    void line(const std::string &text);               /* prints a permanent line to stdout */
     void note(const std::string &text);               /* prints a permanent line to stderr, for warnings */
 
   private:

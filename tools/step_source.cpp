@@ -26,7 +26,7 @@ std::string file_name(const std::string &path)
 
 /* Returns a warning if a run whose mesh changes continues in a file next to this one (run.e-s002) that was not given;
  * otherwise "". */
-std::string warn_of_next(const std::string &file, const std::vector<std::string> &given)
+std::string next_file_warning(const std::string &file, const std::vector<std::string> &given)
 {
     const std::string next = file + "-s002";
     if (!has_known_ending(next) || std::count(given.begin(), given.end(), next) > 0 || !why_not_data(next).empty())
@@ -41,7 +41,7 @@ step_source::step_source(const options &o, int rank, int ranks) : options_(o), r
     for (const std::string &file : o.files) {
         const std::string why_not = why_not_data(file);
         if (!why_not.empty()) throw std::runtime_error(why_not);
-        warnings_ += warn_of_next(file, o.files);
+        warnings_ += next_file_warning(file, o.files);
     }
     int64_t cycle = 0;
     const size_t file_count = o.pieces ? 1 : o.files.size();
@@ -90,7 +90,7 @@ vtkSmartPointer<vtkDataObject> step_source::read_pieces(std::string &warnings)
         warnings += open(file).take_warnings();
     }
     if (keeps_whole_files()) return all;
-    return deal(all, options_.how, rank_, ranks_);
+    return distribute_cells(all, options_.how, rank_, ranks_);
 }
 
 step_source::result step_source::read(size_t index)
@@ -110,7 +110,7 @@ step_source::result step_source::read(size_t index)
     r.warnings += file.take_warnings();
     r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(data, fallback);
     const auto grids = grids_of(data, file.step_path(s.inside));
-    r.data = is_by_pieces ? grids : deal(grids, options_.how, rank_, ranks_);
+    r.data = is_by_pieces ? grids : distribute_cells(grids, options_.how, rank_, ranks_);
     return r;
 }
 

@@ -22,14 +22,17 @@ class step_source
 
     size_t count() const { return steps_.size(); }
     int64_t cycle(size_t step) const { return steps_[step].cycle; }
-    const std::string &name(size_t step) const { return steps_[step].name; } /* file name without its folder */
+    const std::string &name(size_t step) const
+    {
+        return steps_[step].name;
+    } /* name of the step's file without its folder */
 
     struct result {
-        vtkSmartPointer<vtkDataObject> data; // this rank's part; null if it has none
+        vtkSmartPointer<vtkDataObject> data; // this rank's part of the step; null if it has none
         double time = 0;
-        std::string warnings; // one per line
+        std::string warnings; // warnings about the step, one per line
     };
-    result read(size_t step); /* throws std::runtime_error */
+    result read(size_t step); /* reads a step; throws std::runtime_error */
 
   private:
     struct step {
@@ -47,7 +50,7 @@ class step_source
     int rank_, ranks_;
     std::vector<step> steps_;
     std::string warnings_;            // warnings about the given files, returned with the first step
-    std::unique_ptr<data_file> open_; // the file that was read last
+    std::unique_ptr<data_file> open_; // the file that was read last, which stays open
     size_t open_index_ = 0;
 };
 

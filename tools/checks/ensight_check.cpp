@@ -44,7 +44,7 @@ struct part_sizes {
     }
 };
 
-using geometry = std::map<int64_t, part_sizes>; // by part number
+using geometry = std::map<int64_t, part_sizes>; // sizes of the parts, by part number
 
 bool starts_with(const std::string &text, const char *start)
 {
@@ -85,14 +85,14 @@ bool is_next(ensight_stream &in, std::string line, bool is_first)
     if (starts_with(line, "BEGIN TIME STEP"))
         in.line();
     else if (!is_first)
-        in.refuse("\"" + line + "\" is not understood");
+        in.fail("\"" + line + "\" is not understood");
     return true;
 }
 
-class geometry_walk
+class geometry_parser
 {
   public:
-    geometry_walk(const std::string &path, encoding how) : in_(path, how), how_(how) {}
+    geometry_parser(const std::string &path, encoding how) : in_(path, how), how_(how) {}
 
     /* Returns the geometry of each step in the file, or a single one if the file has no steps. */
     std::vector<geometry> steps()
@@ -104,7 +104,7 @@ class geometry_walk
     }
 
   private:
-    /* Reads the parts of a step, after the first of its two descriptions. */
+    /* Reads the parts of a step. The first of its two description lines has been read already. */
     geometry parts()
     {
         std::string line;
@@ -136,7 +136,7 @@ class geometry_walk
     {
         const int nodes = nodes_of_type(line);
         if (!part_ || (nodes < 0 && line != "coordinates" && !starts_with(line, "block")))
-            in_.refuse("\"" + line + "\" is not understood");
+            in_.fail("\"" + line + "\" is not understood");
         if (line == "coordinates")
             add_points();
         else if (nodes < 0)
@@ -155,7 +155,7 @@ class geometry_walk
     void add_block(const std::string &line)
     {
         if (line.find("range") != std::string::npos || line.find("ghost") != std::string::npos)
-            in_.refuse("\"" + line + "\" is not understood");
+            in_.fail("\"" + line + "\" is not understood");
         const auto [i, j, k] = dimensions();
         part_->points = i * j * k;
         part_->block_cells = std::max<int64_t>(i - 1, 1) * std::max<int64_t>(j - 1, 1) * std::max<int64_t>(k - 1, 1);
@@ -196,9 +196,9 @@ class geometry_walk
 };
 
 /* A file that a line of the case file names. */
-struct named_file {
-    std::string pattern; // '*' represents the digits of the step number
-    int components = 0;  // 0 for a geometry file
+struct case_file {
+    std::string pattern; // file name in which '*' represents the digits of the step number
+    int components = 0;  // number of components of the variable; 0 for a geometry file
     bool is_per_node = false;
 };
 
@@ -228,14 +228,14 @@ void skip_values(ensight_stream &in, const values_section &section, int64_t coun
         const int64_t all = count;
         count = in.integer();
         if (count > all)
-            in.refuse("has " + std::to_string(count) + " values for " + std::to_string(all) + " nodes or elements");
+            in.fail("has " + std::to_string(count) + " values for " + std::to_string(all) + " nodes or elements");
         in.skip_numbers(count);
     }
     for (int c = 0; c < components; c++) in.skip_numbers(count);
 }
 
 /* Reads through the values of one step. Returns the last section that is partial, or "". */
-std::string walk_values(ensight_stream &in, const geometry &parts, int components, bool is_per_node)
+std::string check_values(ensight_stream &in, const geometry &parts, int components, bool is_per_node)
 {
     std::string line, partial;
     const part_sizes *part = nullptr;
@@ -243,32 +243,32 @@ std::string walk_values(ensight_stream &in, const geometry &parts, int component
     while (in.next_line(line)) {
         if (starts_with(line, "END TIME STEP")) break;
         if (starts_with(line, "part")) {
-            if (part && !has_values) in.refuse("a part has no values");
+            if (part && !has_values) in.fail("a part has no values");
             has_values = false;
             const int64_t number = in.integer();
             const auto found = parts.find(number);
-            if (found == parts.end()) in.refuse("has a part " + std::to_string(number) + ", which the geometry lacks");
+            if (found == parts.end()) in.fail("has a part " + std::to_string(number) + ", which the geometry lacks");
             part = &found->second;
             continue;
         }
-        if (!part) in.refuse("\"" + line + "\" is not understood");
+        if (!part) in.fail("\"" + line + "\" is not understood");
         const values_section section = section_of(line);
         const auto element = part->elements.find(section.word);
         const bool is_block = section.word == "block",
                    is_points = is_per_node && (is_block || section.word == "coordinates");
         if (!is_points && !(!is_per_node && (is_block || element != part->elements.end())))
-            in.refuse("\"" + line + "\" is not understood");
+            in.fail("\"" + line + "\" is not understood");
         skip_values(in, section, is_points ? part->points : is_block ? part->block_cells : element->second, components);
         if (section.is_partial) partial = line;
         has_values = true;
     }
-    if (!has_values) in.refuse("is cut short: a part has no values");
+    if (!has_values) in.fail("is cut short: a part has no values");
     return partial;
 }
 
 /* Checks all steps of a variable. Steps beyond those of the geometry use its last step. VTK's reader skips earlier
  * steps by the sizes of the step that it reads, so all steps must have the same sizes. */
-void walk_variable(const std::string &path, encoding how, const std::vector<geometry> &steps, const named_file &file)
+void check_variable(const std::string &path, encoding how, const std::vector<geometry> &steps, const case_file &file)
 {
     ensight_stream in(path, how);
     size_t step = 0;
@@ -276,10 +276,10 @@ void walk_variable(const std::string &path, encoding how, const std::vector<geom
     for (std::string line = first_line(in, how); is_next(in, line, step == 0); line = "", step++) {
         const geometry &parts = steps[std::min(step, steps.size() - 1)];
         if (step > 0 && !(parts == steps[0]))
-            in.refuse("has steps of different sizes in one file, which are not read: a file for each step is");
+            in.fail("has steps of different sizes in one file, which are not read: a file for each step is");
         if (!partial.empty())
-            in.refuse("\"" + partial + "\" in a file of several steps is not read: a file for each step is");
-        partial = walk_values(in, parts, file.components, file.is_per_node);
+            in.fail("\"" + partial + "\" in a file of several steps is not read: a file for each step is");
+        partial = check_values(in, parts, file.components, file.is_per_node);
     }
 }
 
@@ -301,9 +301,9 @@ int components_of(const std::string &key)
     return starts_with(key, "tensor asym") ? 9 : 0;
 }
 
-std::vector<named_file> files_of(const std::string &case_path)
+std::vector<case_file> files_of(const std::string &case_path)
 {
-    std::vector<named_file> files;
+    std::vector<case_file> files;
     std::ifstream in(case_path);
     bool is_gold = false;
     int number = 0;
@@ -334,7 +334,7 @@ std::vector<named_file> files_of(const std::string &case_path)
 }
 
 /* Returns the files that match a pattern, by the digits that its stars represent. */
-std::map<std::string, std::string> matches(const std::string &folder, const std::string &pattern)
+std::map<std::string, std::string> matching_files(const std::string &folder, const std::string &pattern)
 {
     const size_t first = pattern.find('*'), last = pattern.find_last_of('*');
     if (first == std::string::npos) return {{"", folder + pattern}};
@@ -358,22 +358,23 @@ std::map<std::string, std::string> matches(const std::string &folder, const std:
 void check_ensight(const std::string &case_path)
 {
     const std::string folder = case_path.substr(0, case_path.find_last_of('/') + 1);
-    const std::vector<named_file> files = files_of(case_path);
-    std::map<std::string, std::vector<geometry>> geometries; // by the digits in the file's name
+    const std::vector<case_file> files = files_of(case_path);
+    std::map<std::string, std::vector<geometry>>
+        geometries; // geometries of the steps, by the digits in the file's name
     encoding how = encoding::text;
-    for (const named_file &file : files) {
+    for (const case_file &file : files) {
         if (file.components > 0) continue;
-        for (const auto &[number, path] : matches(folder, file.pattern)) {
+        for (const auto &[number, path] : matching_files(folder, file.pattern)) {
             how = ensight_stream::encoding_of(path);
-            geometries[number] = geometry_walk(path, how).steps();
+            geometries[number] = geometry_parser(path, how).steps();
         }
     }
     if (geometries.empty()) throw std::runtime_error(case_path + ": names no geometry");
-    for (const named_file &file : files) {
+    for (const case_file &file : files) {
         if (file.components == 0) continue;
-        for (const auto &[number, path] : matches(folder, file.pattern)) {
+        for (const auto &[number, path] : matching_files(folder, file.pattern)) {
             const auto same = geometries.find(number);
-            walk_variable(path, how, same == geometries.end() ? geometries.begin()->second : same->second, file);
+            check_variable(path, how, same == geometries.end() ? geometries.begin()->second : same->second, file);
         }
     }
 }

@@ -47,15 +47,15 @@ ensight_stream::encoding ensight_stream::encoding_of(const std::string &path)
 ensight_stream::ensight_stream(const std::string &path, encoding how)
     : path_(path), in_(path, std::ios::binary | std::ios::ate), how_(how)
 {
-    if (!in_) refuse("cannot be opened");
+    if (!in_) fail("cannot be opened");
     size_ = static_cast<int64_t>(in_.tellg());
     in_.seekg(-1, std::ios::end);
-    if (how == encoding::text && in_.get() != '\n') refuse("is cut short: its last line has no end");
+    if (how == encoding::text && in_.get() != '\n') fail("is cut short: its last line has no end");
     in_.clear();
     in_.seekg(0);
 }
 
-void ensight_stream::refuse(const std::string &why) const
+void ensight_stream::fail(const std::string &why) const
 {
     throw std::runtime_error(path_ + ": " + why);
 }
@@ -72,7 +72,7 @@ bool ensight_stream::next_line(std::string &line)
     if (in_.peek() == std::char_traits<char>::eof()) return false;
     begin_record();
     std::array<char, line_bytes + 1> bytes{};
-    if (!in_.read(bytes.data(), line_bytes)) refuse("is cut short: it ends within a line");
+    if (!in_.read(bytes.data(), line_bytes)) fail("is cut short: it ends within a line");
     line = without_blanks(bytes.data());
     end_record();
     return true;
@@ -81,7 +81,7 @@ bool ensight_stream::next_line(std::string &line)
 std::string ensight_stream::line()
 {
     std::string text;
-    if (!next_line(text)) refuse("is cut short");
+    if (!next_line(text)) fail("is cut short");
     return text;
 }
 
@@ -90,7 +90,7 @@ std::string ensight_stream::line()
 int32_t ensight_stream::binary_integer()
 {
     int32_t n = 0;
-    if (!in_.read(reinterpret_cast<char *>(&n), sizeof n)) refuse("is cut short");
+    if (!in_.read(reinterpret_cast<char *>(&n), sizeof n)) fail("is cut short");
     if (!knows_order_) is_swapped_ = static_cast<uint32_t>(swapped(n)) < static_cast<uint32_t>(n);
     knows_order_ = true;
     return is_swapped_ ? swapped(n) : n;
@@ -103,10 +103,10 @@ void ensight_stream::begin_record()
 
 void ensight_stream::check_count(int64_t count) const
 {
-    if (count < 0) refuse("has a negative number of values");
+    if (count < 0) fail("has a negative number of values");
     if (count > size_)
-        refuse("is cut short: it says it has " + std::to_string(count) + " values in " + std::to_string(size_) +
-               " bytes");
+        fail("is cut short: it says it has " + std::to_string(count) + " values in " + std::to_string(size_) +
+             " bytes");
 }
 
 void ensight_stream::integers(int64_t *values, int64_t count)
@@ -117,8 +117,8 @@ void ensight_stream::integers(int64_t *values, int64_t count)
         if (how_ != encoding::text)
             values[i] = binary_integer();
         else if (!(in_ >> values[i]))
-            refuse("is cut short: a whole number is missing");
-        if (values[i] < 0) refuse("has a negative number of values");
+            fail("is cut short: a whole number is missing");
+        if (values[i] < 0) fail("has a negative number of values");
     }
     end_record();
 }
@@ -143,14 +143,14 @@ void ensight_stream::skip_numbers(int64_t count)
     check_count(count);
     if (how_ != encoding::text) {
         begin_record();
-        if (count * 4 > size_ - static_cast<int64_t>(in_.tellg())) refuse("is cut short");
+        if (count * 4 > size_ - static_cast<int64_t>(in_.tellg())) fail("is cut short");
         in_.seekg(count * 4, std::ios::cur);
         end_record();
         return;
     }
     std::string value;
     for (int64_t i = 0; i < count; i++) {
-        if (!(in_ >> value)) refuse("is cut short: a number is missing");
+        if (!(in_ >> value)) fail("is cut short: a number is missing");
         if (!is_number(value))
             refuse_number(path_, value, in_.eof() ? size_ - 1 : static_cast<int64_t>(in_.tellg()) - 1);
     }

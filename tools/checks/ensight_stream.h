@@ -29,7 +29,7 @@ class ensight_stream
     int64_t sum_of_integers(int64_t count);        /* reads one record and returns the sum of its integers */
     void skip_numbers(int64_t count);              /* skips one record of 4-byte numbers */
 
-    [[noreturn]] void refuse(const std::string &why) const;
+    [[noreturn]] void fail(const std::string &why) const;
 
   private:
     int32_t binary_integer();

@@ -27,26 +27,26 @@ std::string lower(std::string text)
     return text;
 }
 
-class walker
+class legacy_parser
 {
   public:
-    explicit walker(const std::string &path) : path_(path), in_(path, std::ios::binary | std::ios::ate)
+    explicit legacy_parser(const std::string &path) : path_(path), in_(path, std::ios::binary | std::ios::ate)
     {
         size_ = in_ ? static_cast<int64_t>(in_.tellg()) : 0;
         in_.seekg(0);
     }
 
-    void walk()
+    void parse()
     {
         std::string line;
         for (int i = 0; i < 3; i++)
-            if (!std::getline(in_, line)) refuse("it has no heading");
+            if (!std::getline(in_, line)) fail("it has no heading");
         is_text_ = lower(line).compare(0, 5, "ascii") == 0;
         if (is_text_) check_last_byte();
         while (next_section()) {
             const std::string name = word(0), kind = word(1);
             if (!skip_section()) return;
-            seen_.insert(name == "aspect_ratio" ? "spacing" : name);
+            sections_seen_.insert(name == "aspect_ratio" ? "spacing" : name);
             if (name == "dataset") kind_ = kind;
             if (name == "points") is_empty_ = std::stoll(kind) == 0;
         }
@@ -54,16 +54,13 @@ class walker
     }
 
   private:
-    [[noreturn]] void refuse(const std::string &why) const
-    {
-        throw std::runtime_error(path_ + ": is cut short: " + why);
-    }
+    [[noreturn]] void fail(const std::string &why) const { throw std::runtime_error(path_ + ": is cut short: " + why); }
 
     void check_last_byte()
     {
         const auto here = in_.tellg();
         in_.seekg(-1, std::ios::end);
-        if (in_.get() != '\n') refuse("its last line has no end");
+        if (in_.get() != '\n') fail("its last line has no end");
         in_.seekg(here);
     }
 
@@ -77,10 +74,10 @@ class walker
             {"unstructured_grid", {"points", "cells", "cell_types"}},
             {"polydata", {"points"}}};
         const auto found = needed.find(kind_);
-        if (kind_.empty()) refuse("it has no data set");
+        if (kind_.empty()) fail("it has no data set");
         if (found == needed.end() || is_empty_) return;
         for (const std::string &name : found->second)
-            if (seen_.count(name) == 0) refuse("it has no " + name);
+            if (sections_seen_.count(name) == 0) fail("it has no " + name);
     }
 
     /* Reads the words of the next nonblank line; returns false at the end of the file. */
@@ -101,7 +98,7 @@ class walker
         const std::string text = word(i);
         const bool is_number = !text.empty() && text.size() < 18 &&
                                std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
-        if (!is_number || in_.eof()) refuse("\"" + words_[0] + "\" has no count");
+        if (!is_number || in_.eof()) fail("\"" + words_[0] + "\" has no count");
         return std::stoll(text);
     }
 
@@ -121,14 +118,14 @@ class walker
     /* Skips values; returns false if their size is not known. */
     bool skip_values(int64_t values, const std::string &type)
     {
-        if (values / 8 > size_) refuse("it says it has " + std::to_string(values) + " values");
+        if (values / 8 > size_) fail("it says it has " + std::to_string(values) + " values");
         const int64_t bytes = bytes_of(values, type);
         if (bytes < 0) return false;
         if (is_text_) {
             skip_words(values);
             return true;
         }
-        if (bytes > size_ - static_cast<int64_t>(in_.tellg())) refuse("values of \"" + words_[0] + "\" are missing");
+        if (bytes > size_ - static_cast<int64_t>(in_.tellg())) fail("values of \"" + words_[0] + "\" are missing");
         in_.seekg(bytes, std::ios::cur);
         return true;
     }
@@ -140,7 +137,7 @@ class walker
         for (int64_t i = 0; i < count; i++) {
             int c = bytes->sgetc();
             while (c != end && std::isspace(c)) c = bytes->snextc();
-            if (c == end) refuse("values of \"" + words_[0] + "\" are missing");
+            if (c == end) fail("values of \"" + words_[0] + "\" are missing");
             std::string value;
             for (; c != end && !std::isspace(c); c = bytes->snextc()) value += static_cast<char>(c);
             if (!is_number(value))
@@ -176,13 +173,13 @@ class walker
         for (const char *simple :
              {"structured_points", "structured_grid", "rectilinear_grid", "unstructured_grid", "polydata", "field"})
             if (kind == simple) return true;
-        if (in_.eof() || kind.empty()) refuse("it has no data set");
+        if (in_.eof() || kind.empty()) fail("it has no data set");
         return false;
     }
 
     bool has_words(size_t count) const
     {
-        if (words_.size() < count || in_.eof()) refuse("\"" + words_[0] + "\" is not whole");
+        if (words_.size() < count || in_.eof()) fail("\"" + words_[0] + "\" is not whole");
         return true;
     }
 
@@ -192,7 +189,7 @@ class walker
         const int64_t cells = count(1), size = count(2);
         const auto here = in_.tellg();
         const std::vector<std::string> section = words_;
-        if (!next_section()) refuse("values of \"" + section[0] + "\" are missing");
+        if (!next_section()) fail("values of \"" + section[0] + "\" are missing");
         if (word(0) != "offsets") {
             in_.clear();
             in_.seekg(here);
@@ -200,14 +197,14 @@ class walker
             return skip_values(size, "int");
         }
         if (!skip_values(cells, word(1))) return false;
-        if (!next_section()) refuse("values of \"" + section[0] + "\" are missing");
+        if (!next_section()) fail("values of \"" + section[0] + "\" are missing");
         return skip_values(size, word(1));
     }
 
     bool skip_fields(int64_t arrays)
     {
         for (int64_t i = 0; i < arrays;) {
-            if (!next_section()) refuse("a field is missing");
+            if (!next_section()) fail("a field is missing");
             if (word(0) == "metadata") {
                 skip_metadata();
                 continue;
@@ -237,7 +234,7 @@ class walker
         if (name == "color_scalars") return skip_values(tuples_ * count(2), "unsigned_char");
         if (name == "lookup_table") return skip_values(4 * count(2), "unsigned_char");
         if (name == "scalars") return skip_scalars();
-        if (in_.eof() || in_.peek() == std::char_traits<char>::eof()) refuse("\"" + words_[0] + "\" is not whole");
+        if (in_.eof() || in_.peek() == std::char_traits<char>::eof()) fail("\"" + words_[0] + "\" is not whole");
         return false;
     }
 
@@ -245,7 +242,7 @@ class walker
     {
         const std::string type = word(2);
         const int64_t values = tuples_ * (words_.size() > 3 ? count(3) : 1);
-        if (!next_section() || word(0) != "lookup_table") refuse("values of \"scalars\" are missing");
+        if (!next_section() || word(0) != "lookup_table") fail("values of \"scalars\" are missing");
         return skip_values(values, type);
     }
 
@@ -253,18 +250,18 @@ class walker
     std::ifstream in_;
     int64_t size_ = 0;
     bool is_text_ = false;
-    std::string kind_;           // kind of the data set
-    bool is_empty_ = false;      // there are no points, and VTK's writer omits the cells
-    std::set<std::string> seen_; // keywords of the sections read so far
+    std::string kind_;                    // kind of the data set
+    bool is_empty_ = false;               // true if there are no points; VTK's writer then omits the cells
+    std::set<std::string> sections_seen_; // keywords of the sections read so far
     int64_t tuples_ = 0;
-    std::vector<std::string> words_; // words of the section's first line
+    std::vector<std::string> words_; // words of the current section's first line
 };
 
 } // namespace
 
 void check_legacy(const std::string &path)
 {
-    walker(path).walk();
+    legacy_parser(path).parse();
 }
 
 } // namespace render_tool

@@ -91,7 +91,7 @@ class header
         }
         skip_attributes();
         const int64_t bytes = elements * bytes_of_type(number(4));
-        count(); // the stored size, which is wrong above 4 GB
+        count(); // skips the stored size, which is wrong above 4 GB
         const int64_t begin = number(version_ == 1 ? 4 : 8);
         int64_t &end = has_records ? record_end_ : fixed_end_;
         end = std::max(end, begin + bytes);
@@ -104,9 +104,9 @@ class header
     int version_ = 0;
     int64_t records_ = 0;
     std::vector<int64_t> dimensions_;
-    int64_t fixed_end_ = 0;    // end of the variables without records
-    int64_t record_end_ = 0;   // end of the first record; 0 if there are no records
-    int64_t record_bytes_ = 0; // size of one record of all variables
+    int64_t fixed_end_ = 0;    // end in the file of the variables without records
+    int64_t record_end_ = 0;   // end in the file of the first record; 0 if there are no records
+    int64_t record_bytes_ = 0; // size in bytes of one record of all variables
 };
 
 } // namespace

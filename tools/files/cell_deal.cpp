@@ -22,7 +22,7 @@ namespace
 {
 
 struct leaf {
-    vtkDataObject *data; // null if the leaf is empty
+    vtkDataObject *data; // data of the leaf; null if the leaf is empty
     int64_t first_cell;  // number of the leaf's first cell among all cells
 };
 
@@ -127,7 +127,7 @@ bool parse_partition(const std::string &text, partition &out)
     return true;
 }
 
-vtkSmartPointer<vtkDataObject> deal(vtkDataObject *data, partition how, int rank, int ranks)
+vtkSmartPointer<vtkDataObject> distribute_cells(vtkDataObject *data, partition how, int rank, int ranks)
 {
     if (!data || ranks == 1) return data;
     std::vector<leaf> leaves = leaves_of(data);

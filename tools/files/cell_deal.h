@@ -12,7 +12,7 @@ namespace render_tool
 {
 
 enum class partition {
-    block,       // contiguous ranges of cells, in the order of the file
+    block,       // each rank gets a contiguous range of cells, in the order of the file
     random,      // by a hash of the cell's number, which is the worst case for compositing
     checkerboard // by the position of the cell's centre in a lattice of 8 × 8 × 8 over the bounds
 };
@@ -22,7 +22,7 @@ bool parse_partition(const std::string &text, partition &out);
 /* Returns this rank's part of data, which must contain only unstructured grids (grids_of.h): the rank's cells, the
  * points they use, and all arrays. Every cell belongs to exactly one rank. Leaves of composites keep their numbers;
  * those without a cell for this rank are null. If all of data belongs to this rank, data itself is returned. */
-vtkSmartPointer<vtkDataObject> deal(vtkDataObject *data, partition how, int rank, int ranks);
+vtkSmartPointer<vtkDataObject> distribute_cells(vtkDataObject *data, partition how, int rank, int ranks);
 
 } // namespace render_tool
 

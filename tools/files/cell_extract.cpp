@@ -93,7 +93,7 @@ class face_streams
 };
 
 /* Copies the picked tuples of arrays with one tuple per element; other arrays are left out. */
-void pick_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
+void extract_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
 {
     for (int i = 0; i < from->GetNumberOfArrays(); i++) {
         vtkAbstractArray *array = from->GetAbstractArray(i);
@@ -107,7 +107,7 @@ void pick_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked,
     }
 }
 
-void pick_points(vtkUnstructuredGrid *grid, vtkIdList *picked, vtkUnstructuredGrid *part)
+void extract_points(vtkUnstructuredGrid *grid, vtkIdList *picked, vtkUnstructuredGrid *part)
 {
     vtkNew<vtkPoints> places;
     if (grid->GetPoints()) {
@@ -119,8 +119,8 @@ void pick_points(vtkUnstructuredGrid *grid, vtkIdList *picked, vtkUnstructuredGr
 }
 
 /* Copies the cells to `part`; returns the old numbers of the points they use. */
-vtkSmartPointer<vtkIdList> pick_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells,
-                                      vtkUnstructuredGrid *part)
+vtkSmartPointer<vtkIdList> extract_grid_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells,
+                                              vtkUnstructuredGrid *part)
 {
     renumbering points(grid->GetNumberOfPoints());
     face_streams faces;
@@ -150,13 +150,13 @@ vtkSmartPointer<vtkIdList> pick_cells(vtkUnstructuredGrid *grid, const std::vect
 vtkSmartPointer<vtkUnstructuredGrid> extract_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells)
 {
     auto part = vtkSmartPointer<vtkUnstructuredGrid>::New();
-    const auto points = pick_cells(grid, cells, part);
-    pick_points(grid, points, part);
-    pick_arrays(grid->GetPointData(), grid->GetNumberOfPoints(), points, part->GetPointData());
+    const auto points = extract_grid_cells(grid, cells, part);
+    extract_points(grid, points, part);
+    extract_arrays(grid->GetPointData(), grid->GetNumberOfPoints(), points, part->GetPointData());
     vtkNew<vtkIdList> picked;
     picked->SetNumberOfIds(static_cast<vtkIdType>(cells.size()));
     std::copy(cells.begin(), cells.end(), picked->begin());
-    pick_arrays(grid->GetCellData(), grid->GetNumberOfCells(), picked, part->GetCellData());
+    extract_arrays(grid->GetCellData(), grid->GetNumberOfCells(), picked, part->GetCellData());
     part->GetFieldData()->ShallowCopy(grid->GetFieldData());
     return part;
 }

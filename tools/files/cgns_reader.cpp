@@ -53,11 +53,11 @@ int dimension_of(element_type type)
 }
 
 struct section {
-    int number; // index in the file, counted from 1
+    int number; // index of the section in the file, counted from 1
     std::string name;
     element_type type;
     cgsize_t first, last;
-    int dimension; // for a mixed section, that of its first element
+    int dimension; // dimension of the elements; for a mixed section, that of its first element
 
     cgsize_t size() const { return last - first + 1; }
 };
@@ -123,7 +123,7 @@ class cgns_zone
     int file_, base_, zone_, dimension_ = 0;
     std::string name_;
     cgsize_t cell_count_ = 0;
-    std::vector<section> sections_; // in ascending order of element numbers
+    std::vector<section> sections_; // sections in ascending order of their element numbers
 
     void read_section(int number)
     {
@@ -275,11 +275,11 @@ class link_writer
         for (const double child : children) {
             const std::string name = from_.name(child), child_path = path + "/" + name;
             const auto below = numbers_.lower_bound(child_path + "/");
-            const bool is_on_way = numbers_.count(child_path) > 0 ||
-                                   (below != numbers_.end() && below->first.rfind(child_path + "/", 0) == 0);
+            const bool is_ancestor = numbers_.count(child_path) > 0 ||
+                                     (below != numbers_.end() && below->first.rfind(child_path + "/", 0) == 0);
             const auto number = numbers_.find(path);
             double made = 0;
-            if (is_on_way) {
+            if (is_ancestor) {
                 copy(child, name, into, made);
                 write_children(child, child_path, made);
             } else if (number != numbers_.end() && name == "ElementRange") {
@@ -338,7 +338,7 @@ class link_file
     const std::string &name() const { return name_; }
 
     /* Creates the file, calls read(), and deletes the file. Returns false if it cannot be written. */
-    template <typename Read> bool while_there(const Read &read) const
+    template <typename Read> bool with_temporary_file(const Read &read) const
     {
         const int file = open(name_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, S_IRUSR | S_IWUSR);
         if (file < 0) return false;
@@ -373,25 +373,25 @@ class reader : public vtkCGNSReader
   protected:
     int RequestInformation(vtkInformation *request, vtkInformationVector **in, vtkInformationVector *out) override
     {
-        return while_there([&] { return Superclass::RequestInformation(request, in, out); });
+        return with_temporary_file([&] { return Superclass::RequestInformation(request, in, out); });
     }
     int RequestData(vtkInformation *request, vtkInformationVector **in, vtkInformationVector *out) override
     {
-        return while_there([&] { return Superclass::RequestData(request, in, out); });
+        return with_temporary_file([&] { return Superclass::RequestData(request, in, out); });
     }
 
   private:
     std::unique_ptr<link_file> links_;
 
-    template <typename Read> int while_there(const Read &read)
+    template <typename Read> int with_temporary_file(const Read &read)
     {
         int status = 0;
         if (!links_) return read();
-        const bool was_there = links_->while_there([&] {
+        const bool was_written = links_->with_temporary_file([&] {
             status = read();
             return true;
         });
-        if (!was_there) vtkErrorMacro(<< links_->name() << " cannot be written");
+        if (!was_written) vtkErrorMacro(<< links_->name() << " cannot be written");
         return status;
     }
 };

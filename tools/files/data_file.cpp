@@ -64,7 +64,7 @@ class vtk_file : public data_file
         const quiet_stderr quiet;
         reader_ = kind.make(path);
         reader_->UpdateInformation();
-        throw_caught(path);
+        throw_pending_message(path);
         vtkInformation *info = reader_->GetOutputInformation(0);
         using pipeline = vtkStreamingDemandDrivenPipeline;
         if (kind.may_hold_steps && info && info->Has(pipeline::TIME_STEPS())) {
@@ -72,7 +72,7 @@ class vtk_file : public data_file
             times_.assign(first, first + info->Length(pipeline::TIME_STEPS()));
         }
 #ifdef INSITU_VTK_EXODUS
-        if (!times_.empty()) warnings() = warn_of_exodus(path, reader_);
+        if (!times_.empty()) warnings() = exodus_warnings(path, reader_);
 #endif
         if (kind.piece_tag) pieces_ = count_tags(path, kind.piece_tag);
     }
@@ -96,7 +96,7 @@ class vtk_file : public data_file
             reader_->UpdateTimeStep(times_[step], piece, pieces);
         else
             reader_->UpdatePiece(piece, pieces, 0);
-        throw_caught(path_);
+        throw_pending_message(path_);
         vtkDataObject *output = reader_->GetOutputDataObject(0);
         if (is_empty(output)) throw std::runtime_error(path_ + ": holds no data set");
         /* Returns a shallow copy, so that the reader can read the next step while this one is in use. */
@@ -129,7 +129,7 @@ class empty_file : public data_file
 
   private:
     std::string path_;
-    std::vector<double> times_; // always empty
+    std::vector<double> times_; // times of the steps, of which there are none
 };
 
 } // namespace

@@ -75,13 +75,13 @@ shape shape_of(const element_block &b)
 }
 
 /* Checks whether VTK has a cell type with this number of nodes. */
-bool is_usual(const element_block &b)
+bool has_vtk_type(const element_block &b)
 {
-    static const std::map<int, std::vector<int64_t>> usual = {
+    static const std::map<int, std::vector<int64_t>> node_counts = {
         {VTK_TRIANGLE, {3, 6}}, {VTK_QUAD, {4, 8}},           {VTK_TETRA, {4, 10, 15}},
         {VTK_PYRAMID, {5, 13}}, {VTK_WEDGE, {6, 15, 18, 21}}, {VTK_HEXAHEDRON, {8, 20, 27}}};
-    const auto found = usual.find(shape_of(b).cell_type);
-    return found == usual.end() || std::count(found->second.begin(), found->second.end(), b.nodes) > 0;
+    const auto found = node_counts.find(shape_of(b).cell_type);
+    return found == node_counts.end() || std::count(found->second.begin(), found->second.end(), b.nodes) > 0;
 }
 
 std::string describe(int64_t id, const element_block &b)
@@ -199,7 +199,7 @@ class reader : public vtkExodusIIReader
     int RequestData(vtkInformation *request, vtkInformationVector **in, vtkInformationVector *out) override
     {
         if (!Superclass::RequestData(request, in, out)) return 0;
-        const std::string wrong = set_right(element_blocks_of(vtkMultiBlockDataSet::GetData(out)));
+        const std::string wrong = correct_cells(element_blocks_of(vtkMultiBlockDataSet::GetData(out)));
         if (wrong.empty()) return 1;
         vtkErrorMacro(<< wrong);
         return 0;
@@ -226,7 +226,7 @@ class reader : public vtkExodusIIReader
 
     /* Replaces wrong cells, and reduces the points of each block to those that it uses. Returns an error message, or
      * "". */
-    std::string set_right(vtkMultiBlockDataSet *all)
+    std::string correct_cells(vtkMultiBlockDataSet *all)
     {
         for (unsigned i = 0; all && i < all->GetNumberOfBlocks(); i++) {
             auto *grid = vtkUnstructuredGrid::SafeDownCast(all->GetBlock(i));
@@ -234,7 +234,7 @@ class reader : public vtkExodusIIReader
             int64_t id = 0;
             const element_block *b = block_of(grid, id);
             if (b && has_other_cells(grid, *b)) {
-                const std::string wrong = set_cells_anew(grid, id, *b);
+                const std::string wrong = replace_cells(grid, id, *b);
                 if (!wrong.empty()) return describe(id, *b) + " " + wrong;
             }
             if (GetSqueezePoints()) continue;
@@ -247,7 +247,7 @@ class reader : public vtkExodusIIReader
         return "";
     }
 
-    std::string set_cells_anew(vtkUnstructuredGrid *grid, int64_t id, const element_block &b)
+    std::string replace_cells(vtkUnstructuredGrid *grid, int64_t id, const element_block &b)
     {
         if (GetSqueezePoints() || shape_of(b).cell_type == VTK_EMPTY_CELL) return "are of no type that is read";
         const exodus_file file(GetFileName());
@@ -266,7 +266,7 @@ vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path)
     if (file.is_open()) {
         const auto blocks = file.blocks();
         for (const auto &[id, b] : blocks) check_elements(path, id, b);
-        r->SetSqueezePoints(std::all_of(blocks.begin(), blocks.end(), [](auto &b) { return is_usual(b.second); }));
+        r->SetSqueezePoints(std::all_of(blocks.begin(), blocks.end(), [](auto &b) { return has_vtk_type(b.second); }));
         r->set_blocks(blocks);
     }
     r->SetFileName(path.c_str());
@@ -278,7 +278,7 @@ vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path)
 
 /* Warns of displaced points: VTK's reader displaces the points by the first vector field at nodes whose name begins
  * with "dis". */
-std::string warn_of_exodus(const std::string &path, vtkAlgorithm *algorithm)
+std::string exodus_warnings(const std::string &path, vtkAlgorithm *algorithm)
 {
     auto *r = vtkExodusIIReader::SafeDownCast(algorithm);
     for (int i = 0; r && r->GetApplyDisplacements() && i < r->GetNumberOfPointResultArrays(); i++) {

@@ -18,7 +18,7 @@ namespace render_tool
 vtkSmartPointer<vtkAlgorithm> make_exodus(const std::string &path);
 
 /* Returns a warning if the reader, which make_exodus() must have created, displaces points; otherwise "". */
-std::string warn_of_exodus(const std::string &path, vtkAlgorithm *reader);
+std::string exodus_warnings(const std::string &path, vtkAlgorithm *reader);
 
 } // namespace render_tool
 

@@ -65,7 +65,7 @@ reader make_amr(const std::string &path)
 {
     auto r = vtkSmartPointer<vtkXMLUniformGridAMRReader>::New();
     r->SetFileName(path.c_str());
-    r->SetMaximumLevelsToReadByDefault(0); // 0 means all levels
+    r->SetMaximumLevelsToReadByDefault(0); // 0 makes the reader read all levels
     return r;
 }
 
@@ -145,7 +145,7 @@ const std::vector<file_kind> &file_kinds()
 
 const file_kind *kind_of(const std::string &path)
 {
-    const std::string name = plain_name(path.substr(path.find_last_of('/') + 1));
+    const std::string name = logical_name(path.substr(path.find_last_of('/') + 1));
     const size_t dot = name.find_last_of('.');
     if (dot == std::string::npos) return nullptr;
     for (const file_kind &kind : file_kinds())

@@ -14,7 +14,7 @@ namespace render_tool
 
 struct file_kind {
     const char *ending;
-    vtkSmartPointer<vtkAlgorithm> (*make)(const std::string &path); // null if VTK has no such reader
+    vtkSmartPointer<vtkAlgorithm> (*make)(const std::string &path); // creates the reader; null if VTK has none
     bool may_hold_steps;
     bool names_files;      // the file references files in its folder, which the reader opens
     const char *piece_tag; // XML tag that occurs once for each piece that can be read separately

@@ -93,21 +93,21 @@ hid_t memory_type(int type)
     case VTK_UNSIGNED_INT: return H5T_NATIVE_UINT;
     case VTK_LONG_LONG: return H5T_NATIVE_LLONG;
     case VTK_UNSIGNED_LONG_LONG: return H5T_NATIVE_ULLONG;
-    default: return H5T_NATIVE_INT64; /* for vtkIdType */
+    default: return H5T_NATIVE_INT64; /* vtkIdType is a 64-bit integer */
     }
 }
 
-class hdf
+class hdf_reader
 {
   public:
-    explicit hdf(const std::string &path)
+    explicit hdf_reader(const std::string &path)
         : path_(path), file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose)
     {
-        if (!file_.is_open()) refuse("is no HDF file, or is cut short");
-        if (!has("/VTKHDF")) refuse("has no group VTKHDF");
+        if (!file_.is_open()) fail("is no HDF file, or is cut short");
+        if (!has("/VTKHDF")) fail("has no group VTKHDF");
     }
 
-    [[noreturn]] void refuse(const std::string &why) const
+    [[noreturn]] void fail(const std::string &why) const
     {
         throw std::runtime_error(path_ + ": cannot be read: " + why);
     }
@@ -124,19 +124,19 @@ class hdf
     /* Returns the file's attribute Type. */
     std::string type() const
     {
-        if (H5Aexists_by_name(file_, "/VTKHDF", "Type", H5P_DEFAULT) <= 0) refuse("its group VTKHDF has no Type");
+        if (H5Aexists_by_name(file_, "/VTKHDF", "Type", H5P_DEFAULT) <= 0) fail("its group VTKHDF has no Type");
         const handle attribute(H5Aopen_by_name(file_, "/VTKHDF", "Type", H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
         const handle kind(H5Aget_type(attribute), H5Tclose);
-        if (H5Tget_class(kind) != H5T_STRING) refuse("its Type is no text");
+        if (H5Tget_class(kind) != H5T_STRING) fail("its Type is no text");
         if (H5Tis_variable_str(kind) > 0) {
             char *text = nullptr;
-            if (H5Aread(attribute, kind, static_cast<void *>(&text)) < 0 || !text) refuse("its Type is unreadable");
+            if (H5Aread(attribute, kind, static_cast<void *>(&text)) < 0 || !text) fail("its Type is unreadable");
             std::string copy = text;
             H5free_memory(text);
             return copy;
         }
         std::string text(H5Tget_size(kind), '\0');
-        if (H5Aread(attribute, kind, text.data()) < 0) refuse("its Type is unreadable");
+        if (H5Aread(attribute, kind, text.data()) < 0) fail("its Type is unreadable");
         return text.substr(0, text.find('\0'));
     }
 
@@ -150,7 +150,7 @@ class hdf
             return 0;
         };
         if (H5Literate_by_name(file_, group.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &all, H5P_DEFAULT) < 0)
-            refuse(group + " is unreadable");
+            fail(group + " is unreadable");
         return all;
     }
 
@@ -158,9 +158,9 @@ class hdf
      * `as`, or keep the file's type for VTK_VOID. Returns null if the data set is not numeric. */
     array_pointer rows(const std::string &name, int64_t first, int64_t count, int as = VTK_VOID) const
     {
-        if (!has(name)) refuse(name + " is missing");
+        if (!has(name)) fail(name + " is missing");
         const handle set(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose);
-        if (!set.is_open()) refuse(name + " is no data set");
+        if (!set.is_open()) fail(name + " is no data set");
         const handle kind(H5Dget_type(set), H5Tclose), space(H5Dget_space(set), H5Sclose);
         const int type = vtk_type(kind) == VTK_VOID ? VTK_VOID : as != VTK_VOID ? as : vtk_type(kind);
         std::array<hsize_t, H5S_MAX_RANK> sizes{}, start{};
@@ -169,8 +169,8 @@ class hdf
         const auto length = static_cast<int64_t>(sizes[0]);
         if (count < 0) count = length;
         if (first < 0 || first > length || count > length - first)
-            refuse(name + " has " + std::to_string(length) + " entries, expected " + std::to_string(count) + " from " +
-                   std::to_string(first) + " on");
+            fail(name + " has " + std::to_string(length) + " entries, expected " + std::to_string(count) + " from " +
+                 std::to_string(first) + " on");
         const auto components =
             std::accumulate(sizes.begin() + 1, sizes.begin() + rank, hsize_t{1}, std::multiplies<>());
         if (components < 1 || components > std::numeric_limits<int>::max()) return nullptr;
@@ -183,7 +183,7 @@ class hdf
         H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, sizes.data(), nullptr);
         const handle memory(H5Screate_simple(rank, sizes.data(), nullptr), H5Sclose);
         if (H5Dread(set, memory_type(type), memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
-            refuse(name + " is unreadable");
+            fail(name + " is unreadable");
         return array;
     }
 
@@ -201,7 +201,7 @@ class hdf
     int64_t number(const std::string &name, int64_t row) const
     {
         const array_pointer one = rows(name, row, 1, VTK_ID_TYPE);
-        if (!one) refuse(name + " has no numbers");
+        if (!one) fail(name + " has no numbers");
         return static_cast<int64_t>(one->GetComponent(0, 0));
     }
 
@@ -211,7 +211,7 @@ class hdf
 };
 
 /* The first index of a part in each array, and its counts. */
-struct part_place {
+struct part_position {
     int64_t part = 0;
     int64_t point = 0, cell = 0, id = 0, offset = 0;
     int64_t points = 0, cells = 0, ids = 0;
@@ -226,7 +226,7 @@ class hdf_grids : public data_file
         const array_pointer values = in_.rows("/VTKHDF/Steps/Values", 0, -1, VTK_DOUBLE);
         for (vtkIdType i = 0; values && i < values->GetNumberOfTuples(); i++)
             times_.push_back(values->GetComponent(i, 0));
-        if (times_.empty()) in_.refuse("it has no steps");
+        if (times_.empty()) in_.fail("it has no steps");
     }
 
     const std::vector<double> &times() const override { return times_; }
@@ -239,12 +239,12 @@ class hdf_grids : public data_file
         auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
         all->SetNumberOfBlocks(static_cast<unsigned>(count));
         if (count == 0) return all;
-        part_place at = first_part(step);
-        const part_place first = at;
+        part_position at = first_part(step);
+        const part_position first = at;
         for (int64_t i = 0; i < count; i++) {
             set_counts(at);
-            const bool is_mine = i * pieces / count == piece;
-            if (is_mine) {
+            const bool belongs_to_piece = i * pieces / count == piece;
+            if (belongs_to_piece) {
                 auto grid = read_part(at, first, step);
                 if (count == 1) return grid;
                 all->SetBlock(static_cast<unsigned>(i), grid);
@@ -263,12 +263,12 @@ class hdf_grids : public data_file
 
   private:
     std::string path_;
-    hdf in_;
+    hdf_reader in_;
     bool has_steps_;
     std::vector<double> times_;
 
     /* Returns an entry of Steps, or `missing` if there are no steps or there is no such list. */
-    int64_t of_step(const std::string &name, size_t step, int64_t missing) const
+    int64_t step_entry(const std::string &name, size_t step, int64_t missing) const
     {
         const std::string list = "/VTKHDF/Steps/" + name;
         return has_steps_ && in_.has(list) ? in_.number(list, static_cast<int64_t>(step)) : missing;
@@ -278,27 +278,27 @@ class hdf_grids : public data_file
     {
         const array_pointer parts = in_.rows("/VTKHDF/NumberOfPoints", 0, -1, VTK_ID_TYPE);
         const int64_t all = parts ? parts->GetNumberOfTuples() : 0;
-        const int64_t count = of_step("NumberOfParts", step, in_.has("/VTKHDF/Steps/PartOffsets") ? 1 : all);
+        const int64_t count = step_entry("NumberOfParts", step, in_.has("/VTKHDF/Steps/PartOffsets") ? 1 : all);
         if (count < 0 || count > all)
-            in_.refuse("step " + std::to_string(step) + " has " + std::to_string(count) + " parts, of " +
-                       std::to_string(all));
+            in_.fail("step " + std::to_string(step) + " has " + std::to_string(count) + " parts, of " +
+                     std::to_string(all));
         return count;
     }
 
-    part_place first_part(size_t step) const
+    part_position first_part(size_t step) const
     {
-        part_place at;
-        at.part = of_step("PartOffsets", step, 0);
-        at.point = of_step("PointOffsets", step, 0);
-        at.cell = of_step("CellOffsets", step, 0);
-        at.id = of_step("ConnectivityIdOffsets", step, 0);
+        part_position at;
+        at.part = step_entry("PartOffsets", step, 0);
+        at.point = step_entry("PointOffsets", step, 0);
+        at.cell = step_entry("CellOffsets", step, 0);
+        at.id = step_entry("ConnectivityIdOffsets", step, 0);
         set_counts(at);
         at.offset = at.cell + at.part;
-        if (!offsets_fit(at)) at.offset = at.cell + offsets_beside_cells(at);
+        if (!offsets_fit(at)) at.offset = at.cell + offset_lead(at);
         return at;
     }
 
-    bool offsets_fit(const part_place &at) const
+    bool offsets_fit(const part_position &at) const
     {
         const std::string offsets = "/VTKHDF/Offsets";
         return at.offset >= 0 && in_.has(offsets) && at.offset + at.cells < in_.length(offsets) &&
@@ -307,7 +307,7 @@ class hdf_grids : public data_file
 
     /* Returns by how many entries the list of offsets is ahead of that of cells: one for each earlier part. Parts that
      * reuse the cells of an earlier step have no entries of their own. */
-    int64_t offsets_beside_cells(const part_place &at) const
+    int64_t offset_lead(const part_position &at) const
     {
         int64_t parts = 0;
         for (int64_t cells = 0; parts < at.part && cells < at.cell; parts++)
@@ -315,19 +315,19 @@ class hdf_grids : public data_file
         return parts;
     }
 
-    void set_counts(part_place &at) const
+    void set_counts(part_position &at) const
     {
         at.points = in_.number("/VTKHDF/NumberOfPoints", at.part);
         at.cells = in_.number("/VTKHDF/NumberOfCells", at.part);
         at.ids = in_.number("/VTKHDF/NumberOfConnectivityIds", at.part);
-        if (at.points < 0 || at.cells < 0 || at.ids < 0) in_.refuse("a part has a negative number of points or cells");
+        if (at.points < 0 || at.cells < 0 || at.ids < 0) in_.fail("a part has a negative number of points or cells");
     }
 
-    vtkSmartPointer<vtkDataObject> read_part(const part_place &at, const part_place &first, size_t step) const
+    vtkSmartPointer<vtkDataObject> read_part(const part_position &at, const part_position &first, size_t step) const
     {
         auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
         const array_pointer coordinates = in_.rows("/VTKHDF/Points", at.point, at.points);
-        if (!coordinates || coordinates->GetNumberOfComponents() != 3) in_.refuse("Points are no three numbers each");
+        if (!coordinates || coordinates->GetNumberOfComponents() != 3) in_.fail("Points are no three numbers each");
         vtkNew<vtkPoints> points;
         points->SetData(coordinates);
         grid->SetPoints(points);
@@ -337,28 +337,28 @@ class hdf_grids : public data_file
         return grid;
     }
 
-    void set_cells(const part_place &at, vtkUnstructuredGrid *grid) const
+    void set_cells(const part_position &at, vtkUnstructuredGrid *grid) const
     {
         const auto list = [&](const char *name, int64_t first, int64_t count, int type) {
             array_pointer array = in_.rows(std::string("/VTKHDF/") + name, first, count, type);
-            if (!array || array->GetNumberOfComponents() != 1) in_.refuse(std::string(name) + " is no list of numbers");
+            if (!array || array->GetNumberOfComponents() != 1) in_.fail(std::string(name) + " is no list of numbers");
             return array;
         };
         const array_pointer types = list("Types", at.cell, at.cells, VTK_UNSIGNED_CHAR);
         const array_pointer offsets = list("Offsets", at.offset, at.cells + 1, VTK_ID_TYPE);
         const array_pointer ids = list("Connectivity", at.id, at.ids, VTK_ID_TYPE);
         if (offsets->GetComponent(0, 0) != 0 || offsets->GetComponent(at.cells, 0) != static_cast<double>(at.ids))
-            in_.refuse("the Offsets of part " + std::to_string(at.part) + " do not fit its Connectivity");
+            in_.fail("the Offsets of part " + std::to_string(at.part) + " do not fit its Connectivity");
         for (int64_t i = 0; i < at.cells; i++)
             if (types->GetComponent(i, 0) == static_cast<double>(VTK_POLYHEDRON))
-                in_.refuse("polyhedra of this format are not read");
+                in_.fail("polyhedra of this format are not read");
         vtkNew<vtkCellArray> cells;
         cells->SetData(vtkIdTypeArray::SafeDownCast(offsets), vtkIdTypeArray::SafeDownCast(ids));
         grid->SetCells(vtkUnsignedCharArray::SafeDownCast(types), cells);
     }
 
     struct field_place {
-        int64_t in_step, count; // counted from the first part
+        int64_t in_step, count; // range of points or cells, counted from the step's first part
         int64_t first;          // first index of the first part, for fields without an entry of their own
         size_t step;
     };
@@ -370,7 +370,7 @@ class hdf_grids : public data_file
             path.append(group).append("/").append(name);
             std::string place = group;
             place.append("Offsets/").append(name);
-            const array_pointer values = in_.rows(path, of_step(place, at.step, at.first) + at.in_step, at.count);
+            const array_pointer values = in_.rows(path, step_entry(place, at.step, at.first) + at.in_step, at.count);
             if (!values) continue;
             values->SetName(name.c_str());
             to->AddArray(values);
@@ -383,12 +383,11 @@ class hdf_grids : public data_file
 std::unique_ptr<data_file> open_hdf(const std::string &path)
 {
     const quiet_stderr quiet;
-    const hdf in(path);
+    const hdf_reader in(path);
     const std::string type = in.type();
     if (type == "UnstructuredGrid") return std::make_unique<hdf_grids>(path);
-    if (type != "ImageData") in.refuse("a VTKHDF file of Type " + type + ", expected UnstructuredGrid or ImageData");
-    if (in.has("/VTKHDF/Steps"))
-        in.refuse("images with steps are not read in a VTKHDF file, expected UnstructuredGrid");
+    if (type != "ImageData") in.fail("a VTKHDF file of Type " + type + ", expected UnstructuredGrid or ImageData");
+    if (in.has("/VTKHDF/Steps")) in.fail("images with steps are not read in a VTKHDF file, expected UnstructuredGrid");
     return nullptr;
 }
 

@@ -69,7 +69,7 @@ std::string time_text(double time)
     return text;
 }
 
-std::string plain_name(const std::string &path)
+std::string logical_name(const std::string &path)
 {
     static const std::regex series("(.*\\.(?:e|exo|ex2|exii|g))-s\\d+"), pieces("(.*)\\.(?:nem|par)");
     nemesis_name name;

@@ -28,7 +28,7 @@ class parts_file : public data_file
   private:
     std::string path_;
     std::vector<std::string> parts_;
-    std::vector<std::unique_ptr<data_file>> files_; // one per part; null until it is read
+    std::vector<std::unique_ptr<data_file>> files_; // files of the parts; a file is null until it is read
     std::vector<double> times_;
 
     vtkSmartPointer<vtkDataObject> read_part(size_t part, size_t step);
@@ -37,9 +37,9 @@ class parts_file : public data_file
 /* The parsed name of a file of a parallel run's Exodus output (Nemesis), for example run.e.4.0 of run.e.4.0 to
  * run.e.4.3. */
 struct nemesis_name {
-    std::string start; // for example "run.e.4."
-    int count = 1;     // number of files, for example 4
-    size_t digits = 1; // number of digits of the last number
+    std::string start; // beginning of the file name, for example "run.e.4."
+    int count = 1;     // number of files of the output, for example 4
+    size_t digits = 1; // number of digits of the file number
 };
 
 /* Parses path; returns false if it is not such a name. */
@@ -47,7 +47,7 @@ bool parse_nemesis(const std::string &path, nemesis_name &name);
 
 /* Returns the name with the extension that determines the kind of file. It differs from the file's name for Nemesis
  * files and for files of runs whose mesh changes: it is run.e for run.e.4.0, run.e-s002 and run.e-s002.4.0. */
-std::string plain_name(const std::string &path);
+std::string logical_name(const std::string &path);
 
 /* Formats a time for messages. */
 std::string time_text(double time);

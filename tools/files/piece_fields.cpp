@@ -42,7 +42,7 @@ std::string type_name(vtkDataArray *array)
     return (array->GetDataTypeMin() < 0 ? "Int" : "UInt") + std::to_string(bits);
 }
 
-vtkSmartPointer<vtkDoubleArray> doubles(const std::string &name, int components, vtkIdType count)
+vtkSmartPointer<vtkDoubleArray> convert_to_doubles(const std::string &name, int components, vtkIdType count)
 {
     auto array = vtkSmartPointer<vtkDoubleArray>::New();
     array->SetName(name.c_str());
@@ -52,8 +52,8 @@ vtkSmartPointer<vtkDoubleArray> doubles(const std::string &name, int components,
     return array;
 }
 
-void leave_out_others(vtkDataSetAttributes *data, bool is_at_points, const std::vector<declared_field> &fields,
-                      const std::string &piece, std::string &warnings)
+void remove_undeclared(vtkDataSetAttributes *data, bool is_at_points, const std::vector<declared_field> &fields,
+                       const std::string &piece, std::string &warnings)
 {
     for (int i = data->GetNumberOfArrays() - 1; i >= 0; i--) {
         const char *const text = data->GetAbstractArray(i)->GetName();
@@ -94,15 +94,15 @@ void make_fields_as_declared(vtkUnstructuredGrid *grid, const std::vector<declar
 {
     if (fields.empty()) return;
     for (const bool is_at_points : {true, false})
-        leave_out_others(data_of(grid, is_at_points), is_at_points, fields, piece, warnings);
+        remove_undeclared(data_of(grid, is_at_points), is_at_points, fields, piece, warnings);
     for (const declared_field &f : fields) {
         vtkDataSetAttributes *data = data_of(grid, f.is_at_points);
         vtkDataArray *array = data->GetArray(f.name.c_str());
         const std::string field = piece + ": its field \"" + f.name + "\"";
         if (!array) {
             warnings += piece + ": has no field \"" + f.name + "\", which other pieces may have: drawn as NaN\n";
-            data->AddArray(
-                doubles(f.name, f.components, f.is_at_points ? grid->GetNumberOfPoints() : grid->GetNumberOfCells()));
+            data->AddArray(convert_to_doubles(f.name, f.components,
+                                              f.is_at_points ? grid->GetNumberOfPoints() : grid->GetNumberOfCells()));
         } else if (array->GetNumberOfComponents() != f.components) {
             throw std::runtime_error(field + " has " + std::to_string(array->GetNumberOfComponents()) +
                                      " components, the file that names the piece declares " +
@@ -113,7 +113,7 @@ void make_fields_as_declared(vtkUnstructuredGrid *grid, const std::vector<declar
     }
 }
 
-void even_out_types(const std::vector<vtkUnstructuredGrid *> &pieces)
+void unify_types(const std::vector<vtkUnstructuredGrid *> &pieces)
 {
     std::map<std::pair<bool, std::string>, std::set<int>> types;
     for (const bool is_at_points : {true, false})
@@ -129,9 +129,10 @@ void even_out_types(const std::vector<vtkUnstructuredGrid *> &pieces)
             vtkDataSetAttributes *data = data_of(grid, field.first);
             vtkDataArray *array = data->GetArray(field.second.c_str());
             if (!array || array->GetDataType() == VTK_DOUBLE) continue;
-            const auto wide = doubles(field.second, array->GetNumberOfComponents(), array->GetNumberOfTuples());
+            const auto wide =
+                convert_to_doubles(field.second, array->GetNumberOfComponents(), array->GetNumberOfTuples());
             wide->DeepCopy(array);
-            data->AddArray(wide); /* replaces the array of the same name */
+            data->AddArray(wide); /* replaces the array of the same name by the converted one */
         }
     }
 }

@@ -16,7 +16,7 @@ struct declared_field {
     std::string name;
     bool is_at_points = false;
     int components = 1;
-    std::string type; // for example "Float64"
+    std::string type; // type of the values, for example "Float64"
 };
 
 /* Returns the PDataArrays in PPointData and PCellData of a parallel file. */
@@ -30,7 +30,7 @@ void make_fields_as_declared(vtkUnstructuredGrid *grid, const std::vector<declar
 
 /* Converts fields that have different types in these pieces to double in all of them, because appending would drop such
  * fields. */
-void even_out_types(const std::vector<vtkUnstructuredGrid *> &pieces);
+void unify_types(const std::vector<vtkUnstructuredGrid *> &pieces);
 
 } // namespace render_tool
 

@@ -50,7 +50,7 @@ vtkSmartPointer<vtkXMLDataElement> read_xml(const std::string &path)
 {
     check_length(path);
     auto root = vtkSmartPointer<vtkXMLDataElement>::Take(vtkXMLUtilities::ReadElementFromFile(path.c_str()));
-    throw_caught(path);
+    throw_pending_message(path);
     if (!root) refuse(path, "cannot be read: is no XML");
     return root;
 }
@@ -108,7 +108,7 @@ bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
 using grid_list = std::vector<vtkSmartPointer<vtkUnstructuredGrid>>;
 
 /* Adds ghost flags to pieces without them, because appending keeps only arrays that all pieces have. */
-void even_out_ghosts(const grid_list &grids)
+void unify_ghosts(const grid_list &grids)
 {
     const bool has_ghosts = std::any_of(grids.begin(), grids.end(), [](auto &g) { return g->GetCellGhostArray(); });
     for (const auto &grid : grids)
@@ -119,8 +119,8 @@ vtkSmartPointer<vtkUnstructuredGrid> append(const grid_list &grids)
 {
     if (grids.empty()) return vtkSmartPointer<vtkUnstructuredGrid>::New();
     if (grids.size() == 1) return grids[0];
-    even_out_ghosts(grids);
-    even_out_types({grids.begin(), grids.end()});
+    unify_ghosts(grids);
+    unify_types({grids.begin(), grids.end()});
     vtkNew<vtkAppendFilter> filter;
     for (const auto &grid : grids) filter->AddInputData(grid);
     filter->Update();
@@ -153,7 +153,7 @@ class pvtu_file : public data_file
             grids.emplace_back(grid);
         }
         vtkSmartPointer<vtkDataObject> all = append(grids);
-        throw_caught(path_);
+        throw_pending_message(path_);
         return all;
     }
 
@@ -161,12 +161,12 @@ class pvtu_file : public data_file
     std::string path_;
     std::vector<std::string> pieces_;
     std::vector<declared_field> fields_;
-    std::vector<double> times_; // always empty
+    std::vector<double> times_; // times of the steps, of which there are none
 };
 
 struct series_step {
     double time;
-    std::vector<std::string> parts; // paths of the step's files
+    std::vector<std::string> parts; // paths of the files of one step
 };
 
 class series_file : public data_file
@@ -228,7 +228,7 @@ class series_file : public data_file
     std::string path_;
     std::vector<series_step> steps_;
     std::vector<double> times_;
-    std::unique_ptr<data_file> open_; // the file that was read last
+    std::unique_ptr<data_file> open_; // the file that was read last, which stays open
     std::string open_path_;
 };
 

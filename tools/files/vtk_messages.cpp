@@ -59,13 +59,13 @@ class message_catcher : public vtkOutputWindow
 
 vtkStandardNewMacro(message_catcher)
 
-    message_catcher *catcher = nullptr; // owned by VTK after catch_vtk_messages()
+    message_catcher *catcher = nullptr; // the output window, which VTK owns after catch_vtk_messages()
 
 /* Extracts the part that is useful to the user from VTK's messages, which have the form "ERROR: In file, line n
  * class (0x...): what
  *
  * "; the class may be missing. */
-std::string plain_words(std::string text)
+std::string message_text(std::string text)
 {
     if (text.find("returned failure for request") != std::string::npos) return "VTK's reader failed";
     const size_t address = text.find("): "), first_line = text.find('\n');
@@ -90,10 +90,10 @@ void catch_vtk_messages()
     catcher->UnRegister(nullptr);
 }
 
-void throw_caught(const std::string &path)
+void throw_pending_message(const std::string &path)
 {
     if (!catcher || catcher->first_error.empty()) return;
-    const std::string text = plain_words(catcher->first_error);
+    const std::string text = message_text(catcher->first_error);
     catcher->first_error.clear();
     throw std::runtime_error(path + ": cannot be read: " + text);
 }

@@ -12,7 +12,7 @@ namespace render_tool
 void catch_vtk_messages();
 
 /* Throws std::runtime_error with path and VTK's message since the last call, if there is one. */
-void throw_caught(const std::string &path);
+void throw_pending_message(const std::string &path);
 
 /* Suppresses all output to stderr during its lifetime, because the libraries used by VTK's readers (Exodus, NetCDF,
  * HDF5) print errors that VTK reports as well. */
