@@ -4,7 +4,7 @@
  *           TOP - lower   index    upper      index           lower, upper: 0 .. TOP, in steps of an item_grid
  *                         (low)               (high)
  *
- * The union of two boxes is therefore the maximum of each lane. The vector minus the vector with exchanged halves is
+ * The union of two boxes is therefore the maximum of each lane. Subtracting the vector with its halves exchanged gives
  * twice the centroid minus TOP in the upper half, and the negative of that in the lower half; bounds of centroids are
  * therefore maxima too. These boxes determine only the choice of planes, not the bounds of the nodes. */
 #ifndef MMBVH_ITEM_H
