@@ -298,6 +298,8 @@ static void drop_made(session_mesh *mesh)
     session_drop_tree(mesh);
     session_drop_topology(&mesh->topology);
     session_drop_torn(&mesh->torn);
+    base_free(mesh->flat);
+    mesh->flat = NULL;
 }
 
 void session_renew_cells(session_meshes *meshes, session_mesh *mesh)
@@ -314,9 +316,7 @@ static void drop_cells(session_mesh *mesh)
     drop_made(mesh);
     session_drop_axes(&mesh->lattice);
     session_drop_conformed(&mesh->conformed);
-    base_free(mesh->flat);
     base_free(mesh->covered);
-    mesh->flat = NULL;
     mesh->covered = NULL;
 }
 
