@@ -115,6 +115,17 @@ foreach(name indexed cell_order vertex_order corners filled writer)
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 
+# Cells of higher order.
+add_executable(test_order_pieces test_order_pieces.c test_mesh_order.c)
+target_link_libraries(test_order_pieces PRIVATE insitu_quick_flags test_meshes insitu_internal PkgConfig::CMOCKA)
+add_test(NAME order_pieces COMMAND test_order_pieces)
+set_tests_properties(order_pieces PROPERTIES TIMEOUT 60)
+foreach(name order order_faults)
+  insitu_session_program(test_session_${name})
+  target_sources(test_session_${name} PRIVATE test_mesh_order.c)
+  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endforeach()
+
 # Faces by owner and neighbour.
 foreach(name owner owner_faults patches patch_faults)
   insitu_session_program(test_session_${name})

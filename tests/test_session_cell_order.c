@@ -291,7 +291,7 @@ static void in_rows(session_input *in)
 }
 static void unknown_order(session_input *in)
 {
-    in->mesh.vertex_order = (insitu_vertex_order)3;
+    in->mesh.vertex_order = (insitu_vertex_order)6;
 }
 static void negative_row(session_input *in)
 {
@@ -364,7 +364,7 @@ static void type_in_order(session_input *in)
 }
 
 static const spoilt_case cases[] = {
-    {"order", unknown_order, INSITU_ERROR_ARGUMENT, true, {"vertex_order is 3, expected 0 (VTK's), 1 (lexicographic)"}},
+    {"order", unknown_order, INSITU_ERROR_ARGUMENT, true, {"vertex_order is 6, expected 0 (VTK's), 1 (lexicographic)"}},
     {"row -8", negative_row, INSITU_ERROR_MESH, true, {"connectivity_row is -8, a cell has 8 vertices"}},
     {"row 7", short_row, INSITU_ERROR_MESH, true, {"connectivity_row is 7, a cell has 8 vertices"}},
     {"huge row", huge_row, INSITU_ERROR_MESH, true, {"too few for ", "in rows of 9223372036854775807"}},

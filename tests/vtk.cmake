@@ -17,6 +17,12 @@ target_link_libraries(test_vtk_deal PRIVATE insitu_render_files insitu_quick_fla
 add_test(NAME vtk_deal COMMAND test_vtk_deal)
 set_tests_properties(vtk_deal PROPERTIES TIMEOUT 60)
 
+# Places of nodes of higher order, by VTK's own cells.
+add_executable(test_order_nodes test_order_nodes.cpp)
+target_link_libraries(test_order_nodes PRIVATE insitu_quick_flags insitu_internal VTK::CommonDataModel PkgConfig::CMOCKA)
+add_test(NAME order_nodes COMMAND test_order_nodes)
+set_tests_properties(order_nodes PROPERTIES TIMEOUT 60)
+
 add_library(test_vtk_run STATIC test_vtk_run.cpp)
 target_link_libraries(test_vtk_run PRIVATE insitu_quick_flags)
 

@@ -23,10 +23,16 @@ module insitu
         INSITU_ERROR_MPI = 7, INSITU_ERROR_INTERNAL = 8
     integer, parameter, public :: INSITU_TET = 10, INSITU_HEX = 12, INSITU_WEDGE = 13, INSITU_PYRAMID = 14, &
         INSITU_POLYHEDRON = 42, INSITU_TRIANGLE = 5, INSITU_POLYGON = 7, INSITU_QUAD = 9
+    integer, parameter, public :: INSITU_QUADRATIC_TRIANGLE = 22, INSITU_QUADRATIC_QUAD = 23, INSITU_QUADRATIC_TET = 24, &
+        INSITU_QUADRATIC_HEX = 25, INSITU_QUADRATIC_WEDGE = 26, INSITU_QUADRATIC_PYRAMID = 27, &
+        INSITU_BIQUADRATIC_QUAD = 28, INSITU_TRIQUADRATIC_HEX = 29, INSITU_BIQUADRATIC_WEDGE = 32
+    integer, parameter, public :: INSITU_LAGRANGE_TRIANGLE = 69, INSITU_LAGRANGE_QUAD = 70, INSITU_LAGRANGE_TET = 71, &
+        INSITU_LAGRANGE_HEX = 72, INSITU_LAGRANGE_WEDGE = 73, INSITU_LAGRANGE_PYRAMID = 74
     integer, parameter, public :: INSITU_CHANGED_NOTHING = 0, INSITU_CHANGED_TOPOLOGY = 1, &
         INSITU_CHANGED_GEOMETRY = 2, INSITU_CHANGED_VALUES = 4, INSITU_CHANGED_ALL = 7
     integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2
-    integer, parameter, public :: INSITU_ORDER_VTK = 0, INSITU_ORDER_LEXICOGRAPHIC = 1, INSITU_ORDER_DMPLEX = 2
+    integer, parameter, public :: INSITU_ORDER_VTK = 0, INSITU_ORDER_LEXICOGRAPHIC = 1, INSITU_ORDER_DMPLEX = 2, &
+        INSITU_ORDER_VTK_BEFORE_9_1 = 3, INSITU_ORDER_GMSH = 4, INSITU_ORDER_EXODUS = 5
 
     integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 6, &
         integer16 = 7
@@ -98,6 +104,7 @@ module insitu
         integer(c_int64_t) :: halo_cell_count
         integer(c_int) :: open_offsets, cell_type_map_count
         type(c_ptr) :: cell_type_map
+        integer(c_int) :: order
     end type c_mesh
 
     type, bind(C) :: c_patch
@@ -961,7 +968,8 @@ contains
     end subroutine take_lists
 
     ! Hand over this rank's part of a mesh. connectivity is a list, or a matrix (corners, cells), for cells of one type
-    ! also its first rows; vertices are in VTK's order, or in vertex_order. The connectivity of polyhedra lists faces:
+    ! also its first rows; vertices are in VTK's order, or in vertex_order. That of Lagrange cells is a matrix, whose
+    ! first extent tells their order, unless there are offsets. The connectivity of polyhedra lists faces:
     ! then faces and face_offsets are the faces' vertices and where each face begins, or face_lists replaces them. All
     ! indices and offsets count from 1, or from index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
@@ -1016,6 +1024,8 @@ contains
         mesh%face_connectivity_count = given(6)%rows * given(6)%columns
         if (present(face_lists)) call take_lists(mesh, face_lists, nothing)
         corners = corners_of(mesh%cell_type)
+        if (mesh%cell_type >= INSITU_LAGRANGE_TRIANGLE .and. mesh%cell_type <= INSITU_LAGRANGE_PYRAMID) &
+            corners = int(connectivity%rows)
         if (present(cell_types)) then
             mesh%cell_count = cell_types%columns
         else if (present(offsets)) then
@@ -1214,6 +1224,15 @@ contains
         case (INSITU_PYRAMID); corners_of = 5
         case (INSITU_TRIANGLE); corners_of = 3
         case (INSITU_QUAD); corners_of = 4
+        case (INSITU_QUADRATIC_TRIANGLE); corners_of = 6
+        case (INSITU_QUADRATIC_QUAD); corners_of = 8
+        case (INSITU_QUADRATIC_TET); corners_of = 10
+        case (INSITU_QUADRATIC_HEX); corners_of = 20
+        case (INSITU_QUADRATIC_WEDGE); corners_of = 15
+        case (INSITU_QUADRATIC_PYRAMID); corners_of = 13
+        case (INSITU_BIQUADRATIC_QUAD); corners_of = 9
+        case (INSITU_TRIQUADRATIC_HEX); corners_of = 27
+        case (INSITU_BIQUADRATIC_WEDGE); corners_of = 18
         case default; corners_of = 0
         end select
     end function corners_of

@@ -22,13 +22,18 @@ from mpi4py import MPI
 
 TET, HEX, WEDGE, PYRAMID, POLYHEDRON = 10, 12, 13, 14, 42
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
+QUADRATIC_TRIANGLE, QUADRATIC_QUAD, QUADRATIC_TET, QUADRATIC_HEX, QUADRATIC_WEDGE, QUADRATIC_PYRAMID = range(22, 28)
+BIQUADRATIC_QUAD, TRIQUADRATIC_HEX, BIQUADRATIC_WEDGE = 28, 29, 32
+LAGRANGE_TRIANGLE, LAGRANGE_QUAD, LAGRANGE_TET, LAGRANGE_HEX, LAGRANGE_WEDGE, LAGRANGE_PYRAMID = range(69, 75)
 CHANGED_NOTHING, CHANGED_TOPOLOGY, CHANGED_GEOMETRY, CHANGED_VALUES, CHANGED_ALL = 0, 1, 2, 4, 7
 VERTEX, CELL, CORNER = 0, 1, 2
-ORDER_VTK, ORDER_LEXICOGRAPHIC, ORDER_DMPLEX = 0, 1, 2
+ORDER_VTK, ORDER_LEXICOGRAPHIC, ORDER_DMPLEX, ORDER_VTK_BEFORE_9_1, ORDER_GMSH, ORDER_EXODUS = range(6)
 
 _TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5, "int8": 6,
           "int16": 7, "uint16": 8, "uint32": 9, "uint64": 10}
-_CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5, TRIANGLE: 3, QUAD: 4}
+_CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5, TRIANGLE: 3, QUAD: 4, QUADRATIC_TRIANGLE: 6, QUADRATIC_QUAD: 8,
+            QUADRATIC_TET: 10, QUADRATIC_HEX: 20, QUADRATIC_WEDGE: 15, QUADRATIC_PYRAMID: 13, BIQUADRATIC_QUAD: 9,
+            TRIQUADRATIC_HEX: 27, BIQUADRATIC_WEDGE: 18}
 _MPI_Comm = ctypes.c_void_p if MPI._sizeof(MPI.Comm) == ctypes.sizeof(ctypes.c_void_p) else ctypes.c_int
 
 
@@ -95,6 +100,7 @@ class _Mesh(ctypes.Structure):
         ("open_offsets", ctypes.c_int),
         ("cell_type_map_count", ctypes.c_int),
         ("cell_type_map", ctypes.POINTER(ctypes.c_int)),
+        ("order", ctypes.c_int),
     ]
 
 
@@ -306,14 +312,25 @@ def _row(array):
     return row if row > array.shape[1] else 0
 
 
-def _connectivity(given, cell_type, may_have_gaps):
+def _nodes(cell_type, order, columns):
+    """How many nodes a cell of the type has; of Lagrange cells without an order, the table's columns. None: any."""
+    if not LAGRANGE_TRIANGLE <= cell_type <= LAGRANGE_PYRAMID:
+        return _CORNERS.get(cell_type)
+    if not order:
+        return columns
+    n = order + 1
+    return [n * (n + 1) // 2, n * n, n * (n + 1) * (n + 2) // 6, n ** 3, n * n * (n + 1) // 2,
+            n * (n + 1) * (2 * n + 1) // 6][cell_type - LAGRANGE_TRIANGLE]
+
+
+def _connectivity(given, nodes, may_have_gaps):
     """A list, or rows; of cells of one type also some first columns of a table. Returns the row and the cells too."""
     array = _view("connectivity", given, (1, 2))
-    if may_have_gaps and array.ndim == 2 and _CORNERS.get(cell_type) not in (None, array.shape[1]):
-        raise ValueError(f"connectivity: has {array.shape[1]} columns, expected {_CORNERS[cell_type]} for this cell_type")
+    if may_have_gaps and array.ndim == 2 and nodes not in (None, array.shape[1]):
+        raise ValueError(f"connectivity: has {array.shape[1]} columns, expected {nodes} for this cell_type")
     row = _row(array) if may_have_gaps else 0
     if not row:
-        return *_rows("connectivity", given)[:2], row, array.size // _CORNERS.get(cell_type, 1), array
+        return *_rows("connectivity", given)[:2], row, array.size // (nodes or 1), array
     count = (array.shape[0] - 1) * row + array.shape[1]
     return _strided("connectivity", array, array.strides[1]), count, row, array.shape[0], array
 
@@ -584,30 +601,37 @@ class Session:
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
                  keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL, boundary_faces=None,
                  boundary_face_offsets=None, boundary_owner=None, halo_cell_count=0, open_offsets=False,
-                 cell_type_map=None, number=None):
+                 cell_type_map=None, number=None, order=0):
         """Hand over this rank's part of a mesh, or, with a number from 0 on, one of the blocks that it consists of. Local. faces: the faces' vertices (face_connectivity of insitu.h),
         or a list of arrays, one a face, without face_offsets. For cells of one type, connectivity may be the first
         columns of a table: nodes[:, :8]. Finite-volume codes may give owner, neighbour and cell_count instead of
         connectivity, cell_type, cell_types and offsets; boundary_faces, boundary_face_offsets and boundary_owner, if
         the boundary's faces are in a list of their own, and halo_cell_count, if owner and neighbour name cells of a
         halo. open_offsets: offsets and face_offsets have no last entry. cell_type_map: the types of the numbers in
-        cell_types, where these are the code's own: a list, 0 for numbers that are no type."""
+        cell_types, where these are the code's own: a list, 0 for numbers that are no type. Lagrange cells have the order
+        that the table's columns tell, or order; with order, and without connectivity, coordinates are the cells' nodes,
+        one cell after the other."""
         _constant("cell_type", cell_type, "insitu.TET, insitu.HEX and so on")
-        _constant("vertex_order", vertex_order, "insitu.ORDER_VTK, insitu.ORDER_LEXICOGRAPHIC or insitu.ORDER_DMPLEX")
+        _constant("vertex_order", vertex_order, "insitu.ORDER_VTK, insitu.ORDER_LEXICOGRAPHIC and so on")
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
         axes, mesh.vertex_count, held = _axes(coordinates)
         mesh.coordinates[:] = axes
-        if (connectivity is None) == (owner is None):
+        if (connectivity is None) == (owner is None) and not (order and owner is None):
             raise TypeError("connectivity, owner: expected one of them")
+        is_uniform = cell_types is None and offsets is None
+        columns = numpy.shape(connectivity)[1] if numpy.ndim(connectivity) == 2 else None
+        size = _nodes(cell_type, order, columns) if is_uniform and owner is None else None
+        cells = mesh.vertex_count // (size or 1) if connectivity is None else 0
         if (cell_count is None) != (owner is None):
             raise TypeError("owner, cell_count: one is given, expected both or none")
         if connectivity is not None:
             mesh.connectivity, mesh.connectivity_count, mesh.connectivity_row, cells, array = _connectivity(
-                connectivity, cell_type, cell_types is None and offsets is None)
+                connectivity, size, is_uniform)
             held.append(array)
         mesh.cell_type, mesh.changed = cell_type if owner is None else POLYHEDRON, changed
         mesh.index_base, mesh.keep_polyhedra, mesh.vertex_order = index_base, keep_polyhedra, vertex_order
+        mesh.order = order
         counts = {}
         for key, given in [("cell_types", cell_types), ("offsets", offsets), ("face_offsets", face_offsets),
                            ("owner", owner), ("neighbour", neighbour), ("ghosts", ghosts), ("vertex_ids", vertex_ids),
@@ -641,7 +665,7 @@ class Session:
         mesh.cell_count = self._cell_count(counts, cells) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
         self._hand_over(_MESH_CALLS, name, number, mesh, None, held)
-        size = _CORNERS.get(mesh.cell_type, 0) if cell_types is None and offsets is None else 0
+        size = size or 0
         corners = mesh.cell_count * size if size else mesh.connectivity_count
         self._take_place(name, number)
         self._counts[name, number] = mesh.vertex_count, mesh.cell_count, corners, size

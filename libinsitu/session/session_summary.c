@@ -156,6 +156,8 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
         add_copied(copied, t->cell_bytes,
                    "%lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that their faces make",
                    (long long)t->recognised_count, (long long)t->polyhedron_count);
+    else if (t->is_split)
+        add_copied(copied, t->cell_bytes, "%lld linear pieces of its cells of higher order", (long long)t->cell_count);
     else if (t->has_own_order)
         add_copied(copied, t->cell_bytes, "its cells' vertices, one after the other in VTK's order");
     else
@@ -176,10 +178,10 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     report->bytes_borrowed += mesh_bytes(&mesh->original);
     report_topology(out, copied, mesh);
     if (!mesh->is_check_stale) {
-        report->cells_ghost += mesh->ghost_count;
-        report->cells_inverted += mesh->inverted_count;
-        report->cells_flat += mesh->flat_count - mesh->shell_count;
-        report->cells_shell += mesh->shell_count;
+        report->cells_ghost += mesh->given_counts.ghosts;
+        report->cells_inverted += mesh->given_counts.inverted;
+        report->cells_flat += mesh->given_counts.flat - mesh->given_counts.shells;
+        report->cells_shell += mesh->given_counts.shells;
     }
     if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
     for (int i = 0; i < mesh->field_count; i++) report_field(out, copied, mesh, i);

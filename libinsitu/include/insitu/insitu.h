@@ -85,20 +85,47 @@ typedef enum insitu_cell_type {
     /* at least 3 vertices around it, whose number is given by offsets. It is drawn as triangles that cover it exactly
      * once, whether it is convex or not; it should be flat. */
     INSITU_POLYGON = 7,
-    INSITU_QUAD = 9 /* 4 vertices around it; it may be warped; a concave quad is drawn as two triangles */
+    INSITU_QUAD = 9, /* 4 vertices around it; it may be warped; a concave quad is drawn as two triangles */
+    /* Cells of higher order. Their vertices, at corners and between them, are called nodes here. Each cell is drawn as
+     * linear pieces between its own nodes, wherever the nodes are: the error falls with the square of the distance
+     * between nodes (docs/high_order.md). Nodes and values at nodes are not copied; the list of pieces is made once per
+     * topology. Numbers of cells, ghost flags, cell values and thresholds refer to the caller's cells. */
+    INSITU_QUADRATIC_TRIANGLE = 22, /* 6 nodes */
+    INSITU_QUADRATIC_QUAD = 23,     /* 8 nodes */
+    INSITU_QUADRATIC_TET = 24,      /* 10 nodes */
+    INSITU_QUADRATIC_HEX = 25,      /* 20 nodes */
+    INSITU_QUADRATIC_WEDGE = 26,    /* 15 nodes */
+    INSITU_QUADRATIC_PYRAMID = 27,  /* 13 nodes */
+    INSITU_BIQUADRATIC_QUAD = 28,   /* 9 nodes */
+    INSITU_TRIQUADRATIC_HEX = 29,   /* 27 nodes */
+    INSITU_BIQUADRATIC_WEDGE = 32,  /* 18 nodes */
+    /* Cells with all nodes of an order p from 1 to 32 (insitu_mesh.order): equispaced, Gauss-Lobatto or any other
+     * nodes, some of which must lie on all faces and edges */
+    INSITU_LAGRANGE_TRIANGLE = 69, /* (p + 1)(p + 2) / 2 nodes */
+    INSITU_LAGRANGE_QUAD = 70,     /* (p + 1)^2 */
+    INSITU_LAGRANGE_TET = 71,      /* (p + 1)(p + 2)(p + 3) / 6 */
+    INSITU_LAGRANGE_HEX = 72,      /* (p + 1)^3 */
+    INSITU_LAGRANGE_WEDGE = 73,    /* (p + 1)^2 (p + 2) / 2 */
+    INSITU_LAGRANGE_PYRAMID = 74   /* (p + 1)(p + 2)(2 p + 3) / 6; more than 14 only in lexicographic order */
 } insitu_cell_type;
 
 /* The order of a cell's vertices in connectivity. Cell types that an order does not mention are in VTK's order.
  * Mirrored cells are drawn correctly in any order. */
 typedef enum insitu_vertex_order {
-    /* the order described at insitu_cell_type; also used by CGNS, Exodus II, Gmsh, libMesh, MFEM */
+    /* the order described at insitu_cell_type; also used by CGNS, Exodus II, Gmsh, libMesh, MFEM for linear cells.
+     * Nodes of higher order are in the order of VTK 9.1 and later. */
     INSITU_ORDER_VTK = 0,
     /* vertices of quads, hexes and bases of pyramids are sorted by x first, then y, then z: a quad is VTK's 0 1 3 2.
-     * deal.II, dolfinx, DUNE and p4est use this order. */
+     * deal.II, dolfinx, DUNE and p4est use this order. Nodes of higher order are in rows along the first edge, starting
+     * at the first corner, and the rows in layers, as spectral element codes store them. */
     INSITU_ORDER_LEXICOGRAPHIC = 1,
     /* hexes are VTK's 0 3 2 1 4 5 6 7 and wedges VTK's 0 2 1 3 4 5: their two ends have opposite orientations. PETSc's
-     * DMPlex uses it. */
-    INSITU_ORDER_DMPLEX = 2
+     * DMPlex uses it. It is defined for linear cells only. */
+    INSITU_ORDER_DMPLEX = 2,
+    /* The next orders differ from INSITU_ORDER_VTK only in the nodes of cells of higher order. */
+    INSITU_ORDER_VTK_BEFORE_9_1 = 3, /* the vertical edges at corners 2 and 3 of Lagrange hexes are swapped */
+    INSITU_ORDER_GMSH = 4,           /* up to order 2 */
+    INSITU_ORDER_EXODUS = 5          /* up to order 2; vertical edges come before those of the top */
 } insitu_vertex_order;
 
 /* The parts of a mesh or a field that have changed since it was last set. The safe default is everything. Changes that
@@ -262,6 +289,12 @@ typedef struct insitu_mesh {
      * is 0 if n is not a type. The table is copied by the call. The types are also copied, with 1 byte per cell. */
     int cell_type_map_count;
     const int *cell_type_map;
+    /* The order of all cells if cell_type is one of INSITU_LAGRANGE_*. 0, the default: the order follows from the
+     * number of nodes per cell, given by offsets, connectivity_row or connectivity_count / cell_count. If order is
+     * given, connectivity may be absent: then the vertices are the nodes of one cell after the other, and vertex_count
+     * is cell_count times the nodes of a cell, as in spectral element codes that store shared nodes once per cell.
+     * Vertices that are the same node must have bitwise equal coordinates. */
+    int order;
 } insitu_mesh;
 
 /* A field has one value at each vertex, one in each cell, or one at each corner of each cell. Volumes and colours show

@@ -15,7 +15,9 @@
 #include "session_agree.h"
 #include "session_conform.h"
 #include "session_lattice.h"
+#include "session_nodes.h"
 #include "session_region.h"
+#include "session_split.h"
 #include "session_tally.h"
 #include "session_topology.h"
 
@@ -300,6 +302,15 @@ static const char *type_name(int type)
     case GRID_TRIANGLE: return "triangle";
     case GRID_QUAD: return "quad";
     case GRID_POLYGON: return "polygon";
+    default: break;
+    }
+    switch (session_corner_type(type)) {
+    case GRID_TET: return "tet of higher order";
+    case GRID_HEX: return "hex of higher order";
+    case GRID_WEDGE: return "wedge of higher order";
+    case GRID_PYRAMID: return "pyramid of higher order";
+    case GRID_TRIANGLE: return "triangle of higher order";
+    case GRID_QUAD: return "quad of higher order";
     default: return "unknown";
     }
 }
@@ -347,7 +358,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     face_room room = {0};
     const cell_fault fault = check_cell(mesh, cell, &room, &place);
     free_room(&room);
-    const long long base = mesh->given.index_base, at = cell, vertex = place.vertex + base;
+    const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = place.vertex + base;
     const char *type = given_name(mesh, cell);
     switch (fault) {
     case BAD_FACES: return describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
@@ -446,8 +457,8 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
                     error, INSITU_ERROR_MESH,
                     "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
                     "are supported",
-                    mesh->label, (long long)cell, given_name(mesh, cell), (long long)vertex + mesh->given.index_base,
-                    p[0], p[1], p[2], largest_coordinate);
+                    mesh->label, (long long)session_given_cell(mesh, cell), given_name(mesh, cell),
+                    (long long)vertex + mesh->given.index_base, p[0], p[1], p[2], largest_coordinate);
         }
     }
     return INSITU_OK;
@@ -465,7 +476,7 @@ static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tal
         error, INSITU_ERROR_MESH,
         "mesh \"%s\": z coordinates are not given, but cell %lld (%s) needs them: only triangles, quads and "
         "polygons go without",
-        mesh->label, (long long)cell, given_name(mesh, cell));
+        mesh->label, (long long)session_given_cell(mesh, cell), given_name(mesh, cell));
 }
 
 static bool is_far(const mesh_tally *tally)
@@ -523,9 +534,10 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
         mesh->upper[axis] = tally.upper[axis];
     }
     mesh->drawn_count = tally.drawn;
-    /* cells of the padding are not counted */
-    mesh->ghost_count = tally.ghosts - (mesh->cells.cell_count - session_cell_count(mesh));
-    mesh->inverted_count = tally.inverted;
+    mesh->given_counts = (session_counts){tally.drawn, tally.ghosts, tally.inverted, tally.flat, tally.shells};
+    if (mesh->topology.is_split) mesh->given_counts = session_count_parents(mesh, tally.inverted > 0);
+    if (mesh->cells.lattice)
+        mesh->given_counts.ghosts -= mesh->cells.cell_count - session_cell_count(mesh); /* without padding */
     mesh->flat_count = tally.flat;
     mesh->shell_count = tally.shells;
     mesh->size_sum = tally.sizes;

@@ -135,11 +135,37 @@ void session_drop_tree(session_mesh *mesh)
     }
 }
 
+grid session_given_grid(const insitu_mesh *mesh)
+{
+    grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
+    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_coordinates(mesh, axis);
+    g.connectivity = session_index_array(mesh, &mesh->connectivity);
+    g.offsets = session_offset_array(mesh, &mesh->offsets, mesh->cell_count, mesh->connectivity_count);
+    g.face_count = mesh->face_count;
+    g.face_offsets = session_offset_array(mesh, &mesh->face_offsets, mesh->face_count, mesh->face_connectivity_count);
+    g.face_connectivity = session_index_array(mesh, &mesh->face_connectivity);
+    if (mesh->cell_types.data) {
+        const grid_array types = session_grid_array(&mesh->cell_types);
+        g.cell_types = types.data;
+        g.cell_types_stride = types.stride;
+        g.cell_types_bytes = (int)session_type_size(mesh->cell_types.type);
+    }
+    if (mesh->ghosts.data) {
+        const grid_array ghosts = session_grid_array(&mesh->ghosts);
+        g.ghosts = ghosts.data;
+        g.ghosts_stride = ghosts.stride;
+        g.ghosts_bytes = (int)session_type_size(mesh->ghosts.type);
+    }
+    return g;
+}
+
 void session_drop_topology(session_topology *topology)
 {
     session_drop_array(&topology->offsets);
     session_drop_array(&topology->connectivity);
     base_free(topology->cell_types);
+    base_free(topology->parents);
+    base_free(topology->ghosts);
     session_drop_array(&topology->face_offsets);
     session_drop_array(&topology->face_connectivity);
     *topology = (session_topology){0};

@@ -150,6 +150,12 @@ typedef struct session_topology {
     int64_t cell_bytes, face_bytes;
     int64_t polyhedron_count; /* number of polyhedra that the caller gave */
     int64_t recognised_count; /* number of these polyhedra that are read as tets, hexes, wedges or pyramids */
+    /* Cells of higher order are read as linear pieces (session_split.h); the pieces of a cell are consecutive. */
+    bool is_split;         /* if not set, the next members are empty */
+    bool follows_places;   /* set if the pieces depend on the coordinates */
+    int64_t cell_count;    /* number of pieces */
+    uint32_t *parents;     /* for each piece, the caller's cell */
+    unsigned char *ghosts; /* for each piece, whether its cell is a ghost; NULL: no cell is */
 } session_topology;
 
 /* Separate vertices for each corner of each cell, which are read in place of the vertices that cells share
@@ -158,6 +164,8 @@ typedef struct session_topology {
 typedef struct session_torn {
     bool is_torn; /* if not set, all other members are empty */
     bool is_made; /* set if the coordinates are up to date */
+    /* set if cells are split into pieces: then `shared` is the caller's connectivity, whose entries are the corners */
+    bool is_of_entries;
     int64_t corner_count;
     grid_array shared;  /* the connectivity whose corners get separate vertices */
     grid_array corners; /* the corner of each entry of `shared`; the permutation is its own inverse */
@@ -199,6 +207,11 @@ typedef struct session_misfit {
     int rank;
 } session_misfit;
 
+/* Numbers of the caller's cells by kind. Shells are cells that are drawn and flat. */
+typedef struct session_counts {
+    int64_t drawn, ghosts, inverted, flat, shells;
+} session_counts;
+
 /* Block number of a mesh that is not given as blocks; blocks have numbers from 0 on. */
 #define SESSION_WHOLE INT64_MIN
 
@@ -230,11 +243,12 @@ typedef struct session_mesh {
     bool is_topology_stale;    /* set if the tree was built for other cells */
     bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
-    /* shells are cells that are drawn and flat */
-    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
-    bool has_shells_alone; /* same as session_catalogue_mesh.has_shells_alone, that is, over all ranks */
-    double size_sum;       /* sum of the cube roots of the volumes of the drawn cells */
-    uint64_t *flat;        /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
+    /* numbers of `cells`, which may be pieces of the caller's cells; shells are cells that are drawn and flat */
+    int64_t drawn_count, flat_count, shell_count;
+    session_counts given_counts; /* numbers of the caller's cells */
+    bool has_shells_alone;       /* same as session_catalogue_mesh.has_shells_alone, that is, over all ranks */
+    double size_sum;             /* sum of the cube roots of the volumes of the drawn cells */
+    uint64_t *flat;              /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
     uint64_t apart;  /* same as session_catalogue_mesh.apart */
     bool is_refined; /* same as session_catalogue_mesh.is_refined */
@@ -318,6 +332,9 @@ grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *arra
 /* Returns an array of offsets in the form that the mesh processing reads. There are `count` cells or faces with a total
  * of `entries` entries; the last offset may be missing. */
 grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
+
+/* Returns the cells as the caller's arrays describe them. */
+grid session_given_grid(const insitu_mesh *mesh);
 
 /* Allocates count + 1 indices, all 0, of 4 bytes if `largest` fits into them, and otherwise of 8 bytes. Returns false
  * if memory runs out; the error then names the mesh and `what`, the purpose of the indices. */
@@ -411,6 +428,12 @@ bool session_next_part(session_part_walk *walk);
 static inline int64_t session_cell_count(const session_mesh *mesh)
 {
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
+}
+
+/* Returns the caller's cell that contains a cell of `cells`: that cell itself, unless cells are split into pieces. */
+static inline int64_t session_given_cell(const session_mesh *mesh, int64_t cell)
+{
+    return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
 }
 
 /* Returns the number of vertices at which scalars have values. */

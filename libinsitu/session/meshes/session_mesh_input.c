@@ -10,6 +10,7 @@
 #include "session_agree.h"
 #include "session_conform.h"
 #include "session_lattice.h"
+#include "session_nodes.h"
 #include "session_topology.h"
 
 void insitu_mesh_defaults(insitu_mesh *mesh)
@@ -70,7 +71,9 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
 static bool may_be_plane(const insitu_mesh *mesh)
 {
     if (mesh->lattice) return session_is_plane(mesh->lattice);
-    return mesh->cell_types.data || mesh->cell_count == 0 || grid_is_shell_type((int)mesh->cell_type);
+    const int type = (int)mesh->cell_type;
+    return mesh->cell_types.data || mesh->cell_count == 0 || grid_is_shell_type(type) ||
+           grid_is_shell_type(session_corner_type(type));
 }
 
 static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
@@ -186,10 +189,10 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
                          mesh->cell_type_map ? "" : ", and cell_type_map is not given");
     if (mesh->keep_polyhedra != 0 && mesh->keep_polyhedra != 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "keep_polyhedra is %d, expected 0 or 1", mesh->keep_polyhedra);
-    if (mesh->vertex_order != INSITU_ORDER_VTK && mesh->vertex_order != INSITU_ORDER_LEXICOGRAPHIC &&
-        mesh->vertex_order != INSITU_ORDER_DMPLEX)
+    if ((int)mesh->vertex_order < INSITU_ORDER_VTK || mesh->vertex_order > INSITU_ORDER_EXODUS)
         return base_fail(error, INSITU_ERROR_ARGUMENT,
-                         "vertex_order is %d, expected 0 (VTK's), 1 (lexicographic) or 2 (DMPlex's)",
+                         "vertex_order is %d, expected 0 (VTK's), 1 (lexicographic), 2 (DMPlex's), 3 (VTK's before "
+                         "9.1), 4 (Gmsh's) or 5 (Exodus's)",
                          (int)mesh->vertex_order);
     return INSITU_OK;
 }
@@ -197,7 +200,7 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
 /* Checks that cells given in rows are not described in another way as well. */
 static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 {
-    const long long row = mesh->connectivity_row, vertices = grid_type_vertices((int)mesh->cell_type);
+    const long long row = mesh->connectivity_row, vertices = session_cell_nodes(mesh);
     if (row == 0 || mesh->cell_count == 0) return INSITU_OK;
     const char *other = session_has_owners(mesh) ? "owners of faces"
                         : mesh->offsets.data     ? "offsets"
@@ -217,6 +220,59 @@ static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
+/* order is for cells of one Lagrange type that no other array describes. */
+static insitu_status check_order(const insitu_mesh *mesh, base_error *error)
+{
+    const int type = (int)mesh->cell_type;
+    if (mesh->order == 0) return INSITU_OK;
+    if (mesh->order < 0 || mesh->order > NODES_MOST_ORDER)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "order is %d, expected 1..%d, or 0: as the nodes tell",
+                         mesh->order, NODES_MOST_ORDER);
+    if (mesh->cell_count == 0) return INSITU_OK;
+    const char *other = mesh->lattice              ? "a lattice"
+                        : session_has_owners(mesh) ? "owners of faces"
+                        : mesh->cell_types.data    ? "cell types"
+                        : mesh->offsets.data       ? "offsets"
+                                                   : NULL;
+    if (other)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "order is %d and %s are given: order is of cells of one Lagrange type without offsets",
+                         mesh->order, other);
+    if (type >= INSITU_LAGRANGE_TRIANGLE && type <= INSITU_LAGRANGE_PYRAMID) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MESH, "order is %d, and cell_type is %d: order is for types 69 to 74",
+                     mesh->order, type);
+}
+
+/* Cells of one type of higher order. With offsets, a step looks at each cell's nodes. */
+static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *error)
+{
+    const long long cells = mesh->cell_count, nodes = session_cell_nodes(mesh), count = mesh->connectivity_count;
+    const int type = (int)mesh->cell_type;
+    session_nodes of;
+    if (mesh->offsets.data) return INSITU_OK;
+    const bool is_implied = !mesh->connectivity.data && count == 0;
+    if (is_implied && !mesh->order)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "connectivity indices are not given, nor is order, without which they are needed");
+    if (is_implied && mesh->connectivity_row)
+        return base_fail(error, INSITU_ERROR_MESH, "connectivity_row is %lld, and connectivity indices are not given",
+                         (long long)mesh->connectivity_row);
+    if (is_implied && mesh->vertex_count != cells * nodes)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "vertex_count is %lld, %lld cells of %lld nodes without connectivity need %lld",
+                         (long long)mesh->vertex_count, cells, nodes, cells * nodes);
+    if (!is_implied && !mesh->connectivity_row && (nodes == 0 || count != cells * nodes))
+        return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %lld nodes need %lld",
+                         count, cells, nodes, cells * nodes);
+    if (!session_nodes_of(type, nodes, &of))
+        return base_fail(error, INSITU_ERROR_MESH, "cells of type %d have %lld nodes, which no order from 1 to %d has",
+                         type, nodes, NODES_MOST_ORDER);
+    const char *why = session_order_refused(&of, mesh->vertex_order);
+    if (!why) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MESH, "cells of type %d and order %d: vertex_order is %d: %s", type, of.order,
+                     (int)mesh->vertex_order, why);
+}
+
 static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
 {
     if (mesh->cell_count == 0 || session_has_owners(mesh) || mesh->lattice) return INSITU_OK;
@@ -230,11 +286,12 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
     if (mesh->cell_type == INSITU_POLYGON && !mesh->offsets.data)
         return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polygons need them");
     if (mesh->cell_type == INSITU_POLYHEDRON || mesh->cell_type == INSITU_POLYGON) return INSITU_OK;
+    if (session_corner_type((int)mesh->cell_type) != GRID_NO_TYPE) return check_higher_order(mesh, error);
     const int vertices = grid_type_vertices((int)mesh->cell_type);
     if (vertices == 0)
         return base_fail(error, INSITU_ERROR_MESH,
                          "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 triangle, 9 "
-                         "quad, 7 polygon)",
+                         "quad, 7 polygon; 22 to 29, 32 and 69 to 74 of higher order)",
                          (int)mesh->cell_type);
     if (!mesh->offsets.data && !mesh->connectivity_row && mesh->connectivity_count != mesh->cell_count * vertices)
         return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %d vertices need %lld",
@@ -251,6 +308,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_choices(mesh, error);
     if (!status) status = check_face_lists(mesh, error);
     if (!status) status = check_owner(mesh, error);
+    if (!status) status = check_order(mesh, error);
     if (!status) status = check_shape(mesh, error);
     if (!status) status = check_rows(mesh, error);
     return status;
@@ -264,7 +322,7 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->index_base != b->index_base || !a->cell_types.data != !b->cell_types.data ||
            !a->offsets.data != !b->offsets.data || !a->ghosts.data != !b->ghosts.data ||
            a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count ||
-           a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra ||
+           a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra || a->order != b->order ||
            a->open_offsets != b->open_offsets || a->vertex_order != b->vertex_order ||
            a->connectivity_row != b->connectivity_row || !a->owner.data != !b->owner.data ||
            !a->face_lists.data != !b->face_lists.data ||
@@ -307,6 +365,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
     const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
     const bool had_ids = mesh->given.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
     changed |= seen_changes(mesh, given);
+    if (changed & INSITU_CHANGED_GEOMETRY && mesh->topology.follows_places) changed |= INSITU_CHANGED_TOPOLOGY;
     if (session_conform_mesh(mesh, given, changed, error)) return;
     if (drops_fields) {
         session_drop_fields(mesh);

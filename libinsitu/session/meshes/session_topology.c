@@ -27,44 +27,26 @@
 #include "region.h"
 #include "session_cell_order.h"
 #include "session_lattice.h"
+#include "session_split.h"
 #include "session_tally.h"
 
 /* ---- the grid --------------------------------------------------------------------------------------------------- */
 
-static grid as_grid(const insitu_mesh *mesh)
-{
-    grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
-    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_coordinates(mesh, axis);
-    g.connectivity = session_index_array(mesh, &mesh->connectivity);
-    g.offsets = session_offset_array(mesh, &mesh->offsets, mesh->cell_count, mesh->connectivity_count);
-    g.face_count = mesh->face_count;
-    g.face_offsets = session_offset_array(mesh, &mesh->face_offsets, mesh->face_count, mesh->face_connectivity_count);
-    g.face_connectivity = session_index_array(mesh, &mesh->face_connectivity);
-    if (mesh->cell_types.data) {
-        const grid_array types = session_grid_array(&mesh->cell_types);
-        g.cell_types = types.data;
-        g.cell_types_stride = types.stride;
-        g.cell_types_bytes = (int)session_type_size(mesh->cell_types.type);
-    }
-    if (mesh->ghosts.data) {
-        const grid_array ghosts = session_grid_array(&mesh->ghosts);
-        g.ghosts = ghosts.data;
-        g.ghosts_stride = ghosts.stride;
-        g.ghosts_bytes = (int)session_type_size(mesh->ghosts.type);
-    }
-    return g;
-}
-
 void session_read_topology(session_mesh *mesh)
 {
     session_topology *t = &mesh->topology;
-    grid g = as_grid(&mesh->given);
+    grid g = session_given_grid(&mesh->given);
     if (t->has_own_cells) {
         g.offsets = t->offsets;
         g.connectivity = t->connectivity;
         g.cell_types = (const char *)t->cell_types;
         g.cell_types_stride = g.cell_types_bytes = 1;
         g.cell_type = t->cell_type;
+        if (t->is_split) {
+            g.cell_count = t->cell_count;
+            g.ghosts = (const char *)t->ghosts;
+            g.ghosts_stride = g.ghosts_bytes = 1;
+        }
     } else if (t->has_own_order) {
         g.connectivity = t->connectivity;
     } else {
@@ -94,8 +76,8 @@ void session_read_topology(session_mesh *mesh)
 int session_given_type(const session_mesh *mesh, int64_t cell)
 {
     if (mesh->cells.lattice) return mesh->cells.cell_type;
-    const grid given = as_grid(&mesh->given);
-    return grid_cell_type(&given, cell);
+    const grid given = session_given_grid(&mesh->given);
+    return grid_cell_type(&given, session_given_cell(mesh, cell));
 }
 
 /* ---- faces' vertices from several lists ------------------------------------------------------------------------ */
@@ -590,20 +572,32 @@ static bool may_have_polyhedra(const grid *g)
     return g->cell_count && g->offsets.data && grid_has_faces(g) && (g->cell_types || g->cell_type == GRID_POLYHEDRON);
 }
 
+/* Copies of cells' values have one for each piece. */
+static void forget_pieces(session_mesh *mesh)
+{
+    for (int i = 0; i < mesh->field_count; i++)
+        if (mesh->fields[i].given.centring == INSITU_CELL) session_drop_copy(&mesh->fields[i]);
+}
+
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error)
 {
     insitu_status status = INSITU_OK;
+    if (mesh->topology.is_split) forget_pieces(mesh);
     session_drop_topology(&mesh->topology);
     session_read_topology(mesh);
     if ((mesh->given.face_lists.data && mesh->given.face_sizes.data) || mesh->given.boundary_face_count)
         status = copy_lists(mesh, error);
     if (!status && session_has_owners(&mesh->given)) status = list_faces(mesh, error);
-    if (!status && session_is_reordered(&mesh->given)) status = session_order_cells(mesh, threads, error);
+    if (!status && session_has_higher_order(&mesh->given))
+        status = session_split_cells(mesh, threads, error);
+    else if (!status && session_is_reordered(&mesh->given))
+        status = session_order_cells(mesh, threads, error);
     session_read_topology(mesh);
     if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))
         status = recognise_mesh(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
     session_read_topology(mesh);
     mesh->topology.is_made = !status;
+    if (mesh->topology.is_split) forget_pieces(mesh);
     return status;
 }

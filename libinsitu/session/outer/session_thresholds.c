@@ -1,5 +1,7 @@
 #include "session_thresholds.h"
 
+#include <string.h>
+
 #include "memory.h"
 #include "mmbvh_fetch.h"
 #include "session_region.h"
@@ -89,6 +91,19 @@ void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer)
     outer->version = scalar ? scalar->version : 0;
 }
 
+/* Hides all pieces of each cell of which a piece is hidden, because one of the cell's values is outside the threshold.
+ */
+static void hide_whole_cells(const session_mesh *mesh, unsigned char *is_hidden)
+{
+    const uint32_t *parents = mesh->topology.parents;
+    for (int64_t first = 0, next = 0; first < mesh->cells.cell_count; first = next) {
+        unsigned char is_any = 0;
+        for (next = first; next < mesh->cells.cell_count && parents[next] == parents[first]; next++)
+            is_any |= is_hidden[next];
+        memset(is_hidden + first, is_any, (size_t)(next - first));
+    }
+}
+
 unsigned char *session_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads)
 {
     const int64_t count = mesh->cells.cell_count;
@@ -108,5 +123,6 @@ unsigned char *session_hidden_cells(const session_mesh *mesh, const session_thre
         }
         region_leave();
     }
+    if (mesh->topology.is_split) hide_whole_cells(mesh, is_hidden);
     return is_hidden;
 }

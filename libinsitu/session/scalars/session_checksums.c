@@ -63,7 +63,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
 
 static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_field *field, int threads)
 {
-    const int64_t count = field->is_cell_centred ? mesh->given.cell_count : session_vertex_count(mesh);
+    const int64_t count = field->is_cell_centred ? mesh->cells.cell_count : session_vertex_count(mesh);
     const int first = field->component < 0 ? 0 : field->component;
     const int end = field->component < 0 ? field->component_count : first + 1;
     for (int component = first; component < end && field->values.data; component++) {
@@ -85,7 +85,7 @@ static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scal
 static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_field *field)
 {
     enum { SAMPLES = 64 };
-    const int64_t count = field->is_cell_centred ? mesh->given.cell_count : session_vertex_count(mesh);
+    const int64_t count = field->is_cell_centred ? mesh->cells.cell_count : session_vertex_count(mesh);
     const int64_t step = count / SAMPLES + 1;
     for (int64_t i = 0; i < count && field->values.data; i += step) {
         const double value = grid_field_value(field, i);

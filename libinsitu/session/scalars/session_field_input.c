@@ -8,6 +8,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_mesh_input.h"
+#include "session_nodes.h"
 
 static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
 {
@@ -21,7 +22,7 @@ int64_t session_corner_count(const insitu_mesh *mesh)
 {
     if (mesh->cell_count == 0) return 0;
     if (mesh->offsets.data) return mesh->connectivity_count;
-    return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
+    return mesh->cell_count * session_cell_nodes(mesh);
 }
 
 /* Returns the number of the mesh's vertices, cells or corners, depending on the field's centring. For corners in rows,
@@ -31,7 +32,7 @@ int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
     if (field->centring == INSITU_CELL) return mesh->cell_count;
     if (field->corner_row == 0 || mesh->cell_count == 0) return session_corner_count(mesh);
-    return (mesh->cell_count - 1) * field->corner_row + grid_type_vertices((int)mesh->cell_type);
+    return (mesh->cell_count - 1) * field->corner_row + session_cell_nodes(mesh);
 }
 
 static const char *place_words(insitu_centring centring)
@@ -82,13 +83,17 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
  * later, when the mesh is torn. */
 static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const long long row = field->corner_row, vertices = grid_type_vertices((int)mesh->cell_type);
+    const long long row = field->corner_row, vertices = session_cell_nodes(mesh);
     if (field->centring != INSITU_CORNER) {
         if (row == 0) return INSITU_OK;
         return base_fail(error, INSITU_ERROR_ARGUMENT, "corner_row is %lld, and its centring %d is not corners (%d)",
                          row, (int)field->centring, (int)INSITU_CORNER);
     }
     if (mesh->cell_count == 0) return INSITU_OK;
+    if (!mesh->connectivity.data && mesh->order)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "has values at corners, and the mesh has no connectivity: its vertices are the cells' own, so "
+                         "give the field at vertices");
     if (mesh->lattice)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has values at corners, and the mesh is a lattice: corners need cells by connectivity");
@@ -165,6 +170,8 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     if (field->patch_count && field->centring != INSITU_CELL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "has patches, and its centring %d is not cells (%d)",
                          (int)field->centring, (int)INSITU_CELL);
+    if (field->patch_count && session_corner_type((int)mesh->given.cell_type) != GRID_NO_TYPE)
+        return base_fail(error, INSITU_ERROR_FIELD, "has patches, and the mesh has cells of higher order");
     for (int i = 0; i < field->patch_count; i++) {
         base_error what = {0};
         if (check_patch(mesh, &field->patches[i], field->component_count, &what))

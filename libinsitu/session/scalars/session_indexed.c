@@ -9,6 +9,7 @@
 #include "region.h"
 #include "session_agree.h"
 #include "session_field_input.h"
+#include "session_nodes.h"
 #include "session_scalars.h"
 #include "session_torn.h"
 
@@ -22,10 +23,9 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 }
 
 typedef struct indexed_values {
-    /* set if the positions are the corners of a torn mesh, and the values are at vertices; otherwise NULL */
-    const session_torn *torn;
-    /* without data if there is no index; each position then has the tuple with its own number */
-    grid_array index;
+    const session_mesh *mesh; /* a torn one, if the places are its corners, and values are at vertices */
+    const uint32_t *parents;  /* NULL, or the cells that the places are pieces of */
+    grid_array index;         /* no index: places have the tuples of their numbers */
     grid_field values;
     int64_t row, used;     /* number of positions in a row, and how many of them are read */
     int64_t count, places; /* number of tuples, and number of positions that have a tuple */
@@ -45,12 +45,13 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
                           .used = 1,
                           .count = given->count,
                           .places =
-                              given->centring == INSITU_CELL ? mesh->given.cell_count : session_vertex_count(mesh)};
+                              given->centring == INSITU_CELL ? mesh->cells.cell_count : session_vertex_count(mesh)};
     out.index.base = mesh->given.index_base;
-    if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.torn = &mesh->torn;
+    if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.mesh = mesh;
+    if (given->centring == INSITU_CELL) out.parents = mesh->topology.parents;
     if (given->corner_row) {
         out.row = given->corner_row;
-        out.used = grid_type_vertices((int)mesh->given.cell_type);
+        out.used = session_cell_nodes(&mesh->given);
     }
     return out;
 }
@@ -59,7 +60,8 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
  * corner. */
 static int64_t entry_of(const indexed_values *v, int64_t place)
 {
-    if (v->torn) return session_torn_origin(v->torn, place);
+    if (v->mesh) return session_torn_origin(v->mesh, place);
+    if (v->parents) return v->parents[place];
     return v->row == v->used ? place : place / v->used * v->row + place % v->used;
 }
 

@@ -22,7 +22,7 @@ static session_key key_of_position(const grid_array coordinates[3], int64_t vert
 
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
 {
-    if (by_id) return key_of_id(mesh, mesh->torn.is_made ? session_torn_origin(&mesh->torn, vertex) : vertex);
+    if (by_id) return key_of_id(mesh, mesh->torn.is_made ? session_torn_origin(mesh, vertex) : vertex);
     return key_of_position(mesh->cells.coordinates, vertex);
 }
 

@@ -4,6 +4,7 @@
 
 #include "memory.h"
 #include "mmbvh_fetch.h"
+#include "session_nodes.h"
 #include "session_region.h"
 
 int session_resolve_component(const scene_field *field, int component_count)
@@ -66,7 +67,8 @@ bool session_is_copied(const session_mesh *mesh, const session_field *field)
 {
     if (field->has_index || field->is_derived) return true;
     if (field->given.centring == INSITU_VERTEX) return mesh->torn.is_torn;
-    return field->given.corner_row && field->given.corner_row != grid_type_vertices((int)mesh->given.cell_type);
+    if (field->given.centring == INSITU_CELL) return mesh->topology.is_split;
+    return field->given.corner_row && field->given.corner_row != session_cell_nodes(&mesh->given);
 }
 
 bool session_is_plain_copy(const session_field *field)

@@ -7,6 +7,7 @@
 #include "session_agree.h"
 #include "session_cell_order.h"
 #include "session_field_input.h"
+#include "session_split.h"
 #include "session_topology.h"
 
 /* ---- meshes with fields at corners --------------------------------------------------------------------------- */
@@ -40,14 +41,21 @@ static bool is_named(const session_mesh *mesh, const scene *scene)
 
 /* ---- one mesh ------------------------------------------------------------------------------------------------- */
 
-int64_t session_torn_origin(const session_torn *torn, int64_t corner)
+static int64_t origin_of(const session_torn *torn, const insitu_mesh *given, int64_t corner)
 {
+    if (torn->is_of_entries) return grid_array_index(&torn->shared, session_entry_place(given, corner));
     return grid_array_index(&torn->shared, grid_array_index(&torn->corners, corner));
+}
+
+int64_t session_torn_origin(const session_mesh *mesh, int64_t corner)
+{
+    return origin_of(&mesh->torn, &mesh->given, corner);
 }
 
 static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *error)
 {
-    for (int64_t cell = 0; mesh->given.cell_types.data && cell < mesh->given.cell_count; cell++)
+    const bool is_mixed = mesh->given.cell_types.data && !mesh->topology.is_split;
+    for (int64_t cell = 0; is_mixed && cell < mesh->given.cell_count; cell++)
         if (session_given_type(mesh, cell) == GRID_POLYHEDRON)
             return base_fail(error, INSITU_ERROR_FIELD,
                              "mesh \"%s\": a field has values at corners, and cell %lld is a polyhedron, whose corners "
@@ -56,10 +64,11 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-/* Copies the coordinates of the corners without gaps, in their own type. Entries of the connectivity that no cell uses
- * may not be valid vertices; they get the position of the first entry. */
-static bool copy_coordinates(const grid *shared, int threads, session_torn *torn)
+/* Copies coordinates, packed, in their own type. Entries of connectivity that no cell uses may not be vertices; they
+ * get the first one's position. */
+static bool copy_coordinates(const session_mesh *mesh, int threads, session_torn *torn)
 {
+    const grid *shared = &mesh->cells;
     for (int axis = 0; axis < 3; axis++) {
         const grid_array from = shared->coordinates[axis];
         const size_t size = from.is_wide ? 8 : 4;
@@ -72,7 +81,7 @@ static bool copy_coordinates(const grid *shared, int threads, session_torn *torn
             region_enter();
 #pragma omp for schedule(static) nowait
             for (int64_t corner = 0; corner < torn->corner_count; corner++) {
-                const int64_t vertex = session_torn_origin(torn, corner);
+                const int64_t vertex = origin_of(torn, &mesh->given, corner);
                 const bool is_vertex = vertex >= 0 && vertex < shared->vertex_count;
                 memcpy(to + corner * (int64_t)size, from.data + (is_vertex ? vertex : 0) * from.stride, size);
             }
@@ -82,18 +91,32 @@ static bool copy_coordinates(const grid *shared, int threads, session_torn *torn
     return true;
 }
 
+/* Makes the connectivity that has corners for vertices. */
+static insitu_status number_corners(const session_mesh *mesh, int threads, session_torn *torn, base_error *error)
+{
+    torn->is_of_entries = mesh->topology.is_split;
+    torn->shared =
+        torn->is_of_entries ? session_index_array(&mesh->given, &mesh->given.connectivity) : mesh->cells.connectivity;
+    if (torn->is_of_entries) {
+        torn->bytes = mesh->topology.connectivity_count * mesh->topology.connectivity.stride;
+        return session_split_entries(mesh, threads, &torn->corners, error);
+    }
+    if (!session_make_indices(mesh, "cells' corners", torn->corner_count, torn->corner_count, &torn->corners, error))
+        return error->status;
+    for (int64_t i = 0; i < torn->corner_count; i++) session_put_index(&torn->corners, i, i);
+    session_turn_cells(mesh, torn->corner_count, threads, &torn->corners);
+    torn->bytes = torn->corner_count * torn->corners.stride;
+    return INSITU_OK;
+}
+
 static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
 {
     session_torn torn = {.is_torn = true, .corner_count = session_corner_count(&mesh->given)};
     insitu_status status = refuse_polyhedra(mesh, error);
     if (status) return status;
-    torn.shared = mesh->cells.connectivity;
-    if (!session_make_indices(mesh, "cells' corners", torn.corner_count, torn.corner_count, &torn.corners, error))
-        return error->status;
-    for (int64_t i = 0; i < torn.corner_count; i++) session_put_index(&torn.corners, i, i);
-    session_turn_cells(mesh, torn.corner_count, threads, &torn.corners);
-    torn.bytes = torn.corner_count * torn.corners.stride;
-    torn.is_made = copy_coordinates(&mesh->cells, threads, &torn);
+    status = number_corners(mesh, threads, &torn, error);
+    if (status) return status;
+    torn.is_made = copy_coordinates(mesh, threads, &torn);
     if (!torn.is_made) {
         session_drop_torn(&torn);
         return session_no_memory(error, session_corner_count(&mesh->given) * 24, "corners' coordinates");

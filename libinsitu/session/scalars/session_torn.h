@@ -20,6 +20,6 @@ insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogu
                                   const session_team *team, base_error *error);
 
 /* Returns the caller's number of the vertex at a corner of a torn mesh. */
-int64_t session_torn_origin(const session_torn *torn, int64_t corner);
+int64_t session_torn_origin(const session_mesh *mesh, int64_t corner);
 
 #endif

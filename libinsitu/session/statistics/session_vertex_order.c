@@ -71,12 +71,12 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     for (int i = 0; i < parts.count; i++) {
         const session_mesh *part = parts.items[i];
         if (!part->is_given) continue;
-        sums[DRAWN] += part->drawn_count - part->shell_count;
-        sums[FLAT] += part->flat_count - part->shell_count;
+        sums[DRAWN] += part->given_counts.drawn - part->given_counts.shells;
+        sums[FLAT] += part->given_counts.flat - part->given_counts.shells;
         /* the axes of a lattice may have either direction, so that left-handed cells are not counted */
-        sums[INVERTED] += part->cells.lattice ? 0 : part->inverted_count;
-        sums[SHELLS] += part->shell_count;
-        sum_orders(part, parts.count, sums);
+        sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted;
+        sums[SHELLS] += part->given_counts.shells;
+        if (!part->topology.is_split) sum_orders(part, parts.count, sums); /* pieces are in VTK's order */
     }
 }
 

@@ -1,0 +1,43 @@
+/* The types of cells of higher order, and the positions of their nodes in the cell's row of connectivity. */
+#ifndef SESSION_NODES_H
+#define SESSION_NODES_H
+
+#include "grid.h"
+#include "insitu/insitu.h"
+
+enum { NODES_MOST_ORDER = 32 };
+
+/* A type of cell and its order. A complete cell has all nodes of the lattice of its order; a serendipity cell (8, 13,
+ * 15 or 20 nodes) has only its corners and the midpoints of its edges. */
+typedef struct session_nodes {
+    int type;  /* GRID_* type of the linear cell with the same corners */
+    int order; /* 1: the cell is linear */
+    int count; /* number of nodes */
+    bool is_complete;
+    bool is_lagrange; /* set if the caller's type is INSITU_LAGRANGE_* */
+} session_nodes;
+
+/* Returns the linear type with the same corners, or GRID_NO_TYPE if the caller's type is not of higher order. */
+int session_corner_type(int type);
+
+/* Returns whether cells of the type, which must not be linear, can have `count` nodes, and stores their description. */
+bool session_nodes_of(int type, int64_t count, session_nodes *out);
+
+/* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
+ * order of a type that has only one. */
+int64_t session_node_count(int type, int order);
+
+/* Returns NULL, or the reason why this vertex order is not defined for the cell. */
+const char *session_order_refused(const session_nodes *of, insitu_vertex_order order);
+
+/* Returns the position in the row of a complete cell's node i, j, k of its lattice, whose axes are the edges at the
+ * first corner. Each layer k of a pyramid has one node less along i and j than the layer below. */
+int session_node_place(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
+
+/* Returns the position in the row of the node with number n in VTK's order, for cells of order 2. */
+int session_quadratic_place(const session_nodes *of, insitu_vertex_order order, int n);
+
+/* Returns the number of nodes of each cell of a mesh of one type, or 0 if the mesh does not say. */
+int64_t session_cell_nodes(const insitu_mesh *mesh);
+
+#endif

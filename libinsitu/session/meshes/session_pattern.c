@@ -1,0 +1,318 @@
+/* Cells with all nodes of their order are split along the lattice of the nodes: hexes into hexes, wedges into wedges,
+ * and so on. The split of a face depends only on the nodes of the face: quads become quads and triangles triangles. So
+ * the pieces of neighbouring cells share their faces.
+ *
+ *   A tet of order p is split by the planes of its lattice into tets and octahedra, and each octahedron into four tets
+ *   around the same one of its diagonals. A pyramid is split into pyramids, upright and inverted, and tets.
+ *
+ * Serendipity cells have no nodes inside faces. They are split by their corners and the midpoints of their edges:
+ *
+ *      +-----m-----+      Each corner is cut off by the midpoints next to it. The remainder of a quad is the quad of
+ *      |   /   \   |      its four midpoints. It is split into two triangles by the diagonal from its first node in
+ *      | /       \ |      the order of coordinates; the neighbour does the same. The remainder of a straight cell is a
+ *      m           m      convex polyhedron with these polygons as faces. It is filled by the tets between its first
+ *      | \       / |      node, in the same order, and all triangles that do not contain this node; they split each
+ *      |   \   /   |      quad by the diagonal from the quad's first node.
+ *      +-----m-----+  */
+#include "session_pattern.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_cell_order.h"
+
+/* ---- listed pieces --------------------------------------------------------------------------------------------- */
+
+/* A list of pieces in the making. The pieces are counted while `places` and `types` are NULL, and then stored. */
+typedef struct pattern_list {
+    session_pattern *out;
+    insitu_vertex_order order;
+} pattern_list;
+
+static void add_piece(const pattern_list *list, int type, const int nodes[][3])
+{
+    session_pattern *out = list->out;
+    const int count = grid_type_vertices(type);
+    for (int n = 0; n < count && out->places; n++)
+        out->places[out->piece_size + n] =
+            session_node_place(&out->nodes, list->order, nodes[n][0], nodes[n][1], nodes[n][2]);
+    if (out->types) out->types[out->piece_count] = (unsigned char)type;
+    out->piece_count++;
+    out->piece_size += count;
+}
+
+/* Adds a piece whose nodes are at `at` plus 0 or 1 along each axis; bit n of a step is the offset along axis n. */
+static void add_steps(const pattern_list *list, int type, const int at[3], const signed char *steps)
+{
+    int nodes[GRID_MAX_CELL_VERTICES][3];
+    for (int n = 0; n < grid_type_vertices(type); n++)
+        for (int axis = 0; axis < 3; axis++) nodes[n][axis] = at[axis] + (steps[n] >> axis & 1);
+    add_piece(list, type, (const int(*)[3])nodes);
+}
+
+static void list_boxes(const pattern_list *list, int p)
+{
+    static const signed char box[] = {0, 1, 3, 2, 4, 5, 7, 6};
+    const bool is_hex = list->out->nodes.type == GRID_HEX;
+    for (int k = 0; k < (is_hex ? p : 1); k++)
+        for (int j = 0; j < p; j++)
+            for (int i = 0; i < p; i++) add_steps(list, is_hex ? GRID_HEX : GRID_QUAD, (const int[]){i, j, k}, box);
+}
+
+static void list_prisms(const pattern_list *list, int p)
+{
+    static const signed char up[] = {0, 1, 2, 4, 5, 6}, down[] = {1, 3, 2, 5, 7, 6};
+    const int type = list->out->nodes.type;
+    for (int k = 0; k < (type == GRID_WEDGE ? p : 1); k++)
+        for (int j = 0; j < p; j++)
+            for (int i = 0; i + j < p; i++) {
+                add_steps(list, type, (const int[]){i, j, k}, up);
+                if (i + j + 1 < p) add_steps(list, type, (const int[]){i, j, k}, down);
+            }
+}
+
+static void list_tets(const pattern_list *list, int p)
+{
+    static const signed char up[] = {0, 1, 2, 4}, down[] = {3, 6, 5, 7};
+    static const signed char octahedron[4][4] = {{1, 3, 2, 6}, {1, 5, 3, 6}, {1, 4, 5, 6}, {1, 2, 4, 6}};
+    for (int k = 0; k < p; k++)
+        for (int j = 0; j + k < p; j++)
+            for (int i = 0; i + j + k < p; i++) {
+                const int at[3] = {i, j, k}, left = p - 1 - i - j - k;
+                add_steps(list, GRID_TET, at, up);
+                for (int n = 0; n < 4 && left > 0; n++) add_steps(list, GRID_TET, at, octahedron[n]);
+                if (left > 1) add_steps(list, GRID_TET, at, down);
+            }
+}
+
+/* Node i, j of layer k + 1 is above the centre of the quad i .. i + 1, j .. j + 1 of layer k. */
+static void list_pyramids(const pattern_list *list, int p)
+{
+    for (int k = 0; k < p; k++)
+        for (int j = 0; j < p - k; j++)
+            for (int i = 0; i < p - k; i++) {
+                const int up[5][3] = {{i, j, k}, {i + 1, j, k}, {i + 1, j + 1, k}, {i, j + 1, k}, {i, j, k + 1}};
+                const int down[5][3] = {
+                    {i, j, k + 1}, {i, j + 1, k + 1}, {i + 1, j + 1, k + 1}, {i + 1, j, k + 1}, {i + 1, j + 1, k}};
+                const int along_i[4][3] = {{i + 1, j, k}, {i + 1, j + 1, k}, {i, j, k + 1}, {i + 1, j, k + 1}};
+                const int along_j[4][3] = {{i + 1, j + 1, k}, {i, j + 1, k}, {i, j, k + 1}, {i, j + 1, k + 1}};
+                const bool has_next_i = i + 1 < p - k, has_next_j = j + 1 < p - k;
+                add_piece(list, GRID_PYRAMID, up);
+                if (has_next_i && has_next_j) add_piece(list, GRID_PYRAMID, down);
+                if (has_next_i) add_piece(list, GRID_TET, along_i);
+                if (has_next_j) add_piece(list, GRID_TET, along_j);
+            }
+}
+
+static void list_pieces(const pattern_list *list)
+{
+    const int p = list->out->nodes.order;
+    list->out->piece_count = list->out->piece_size = 0;
+    switch (list->out->nodes.type) {
+    case GRID_HEX:
+    case GRID_QUAD: list_boxes(list, p); break;
+    case GRID_WEDGE:
+    case GRID_TRIANGLE: list_prisms(list, p); break;
+    case GRID_TET: list_tets(list, p); break;
+    default: list_pyramids(list, p); break;
+    }
+}
+
+/* ---- serendipity cells ----------------------------------------------------------------------------------------- */
+
+/* Edges in VTK's order of their midpoints, and faces; -1 marks the end. */
+typedef struct corner_shape {
+    int type;
+    signed char edges[12][2], faces[6][4];
+} corner_shape;
+
+static const corner_shape shapes[] = {
+    {GRID_HEX,
+     {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
+     {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}},
+    {GRID_WEDGE,
+     {{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}, {-1, -1}},
+     {{0, 2, 1, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}, {-1}}},
+    {GRID_PYRAMID,
+     {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 4}, {1, 4}, {2, 4}, {3, 4}, {-1, -1}},
+     {{0, 3, 2, 1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}, {-1}}},
+    {GRID_QUAD, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {-1, -1}}, {{0, 1, 2, 3}, {-1}}},
+};
+
+static int edge_count(const corner_shape *shape)
+{
+    int count = 0;
+    while (count < 12 && shape->edges[count][0] >= 0) count++;
+    return count;
+}
+
+static int middle_of(const corner_shape *shape, int a, int b)
+{
+    for (int e = 0; e < 12; e++)
+        if ((shape->edges[e][0] == a && shape->edges[e][1] == b) ||
+            (shape->edges[e][0] == b && shape->edges[e][1] == a))
+            return grid_type_vertices(shape->type) + e;
+    return -1;
+}
+
+/* Adds the polygon that cuts off a corner: the midpoints of the edges at the corner. */
+static void add_cut(session_pattern *out, const corner_shape *shape, int corner)
+{
+    pattern_polygon *cut = &out->polygons[out->polygon_count++];
+    *cut = (pattern_polygon){.corner = corner};
+    for (int e = 0; e < edge_count(shape); e++)
+        if (shape->edges[e][0] == corner || shape->edges[e][1] == corner)
+            cut->nodes[cut->count++] = grid_type_vertices(shape->type) + e;
+}
+
+/* Returns the coordinates of a node in the straight reference cell of edge 2. */
+static void reference_place(const corner_shape *shape, int node, double out[3])
+{
+    static const signed char hex[8][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0},
+                                          {0, 0, 2}, {2, 0, 2}, {2, 2, 2}, {0, 2, 2}};
+    static const signed char wedge[6][3] = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {2, 0, 2}, {0, 2, 2}};
+    static const signed char pyramid[5][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 1, 2}};
+    const signed char(*of)[3] = shape->type == GRID_WEDGE ? wedge : shape->type == GRID_PYRAMID ? pyramid : hex;
+    const int corners = grid_type_vertices(shape->type);
+    const int a = node < corners ? node : shape->edges[node - corners][0];
+    const int b = node < corners ? node : shape->edges[node - corners][1];
+    for (int axis = 0; axis < 3; axis++) out[axis] = 0.5 * (of[a][axis] + of[b][axis]);
+}
+
+/* Orients the polygon counterclockwise as seen from outside the polyhedron that the polygons bound. */
+static void face_outwards(const corner_shape *shape, pattern_polygon *p)
+{
+    double a[3], b[3], c[3], middle[3] = {0, 0, 0}, volume = 0;
+    const int corners = grid_type_vertices(shape->type);
+    for (int n = 0; n < corners; n++) {
+        reference_place(shape, n, a);
+        for (int axis = 0; axis < 3; axis++) middle[axis] += a[axis] / corners;
+    }
+    reference_place(shape, p->nodes[0], a);
+    reference_place(shape, p->nodes[1], b);
+    reference_place(shape, p->nodes[2], c);
+    for (int axis = 0; axis < 3; axis++) {
+        const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+        const double normal = (b[next] - a[next]) * (c[last] - a[last]) - (b[last] - a[last]) * (c[next] - a[next]);
+        volume += normal * (a[axis] - middle[axis]);
+    }
+    if (volume >= 0) return;
+    for (int n = 0, m = p->count - 1; n < m; n++, m--) {
+        const int node = p->nodes[n];
+        p->nodes[n] = p->nodes[m];
+        p->nodes[m] = node;
+    }
+}
+
+static void find_polygons(session_pattern *out, insitu_vertex_order order)
+{
+    const corner_shape *shape = shapes;
+    while (shape->type != out->nodes.type) shape++;
+    const int corners = grid_type_vertices(shape->type);
+    for (int c = 0; c < corners; c++) add_cut(out, shape, c);
+    for (int f = 0; f < 6 && shape->faces[f][0] >= 0; f++) {
+        pattern_polygon *face = &out->polygons[out->polygon_count++];
+        *face = (pattern_polygon){.corner = -1, .count = shape->faces[f][3] < 0 ? 3 : 4};
+        for (int n = 0; n < face->count; n++)
+            face->nodes[n] = middle_of(shape, shape->faces[f][n], shape->faces[f][(n + 1) % face->count]);
+    }
+    for (int i = 0; i < out->polygon_count; i++) {
+        pattern_polygon *p = &out->polygons[i];
+        if (p->count > 2 && shape->type != GRID_QUAD) face_outwards(shape, p);
+        for (int n = 0; n < p->count; n++) p->nodes[n] = session_quadratic_place(&out->nodes, order, p->nodes[n]);
+    }
+    out->middle_count = edge_count(shape);
+    for (int e = 0; e < out->middle_count; e++)
+        out->middles[e] = session_quadratic_place(&out->nodes, order, corners + e);
+}
+
+/* Splits a polygon into triangles of the same orientation by the diagonals from the node of the lowest rank. */
+static int fan(const pattern_polygon *p, const int *ranks, int triangles[2][3])
+{
+    int first = 0;
+    for (int n = 1; n < p->count; n++)
+        if (ranks[p->nodes[n]] < ranks[p->nodes[first]]) first = n;
+    for (int t = 0; t + 2 < p->count; t++) {
+        triangles[t][0] = p->nodes[first];
+        triangles[t][1] = p->nodes[(first + t + 1) % p->count];
+        triangles[t][2] = p->nodes[(first + t + 2) % p->count];
+    }
+    return p->count - 2;
+}
+
+static bool has_node(const pattern_polygon *p, int node)
+{
+    bool has = false;
+    for (int n = 0; n < p->count; n++) has = has || p->nodes[n] == node;
+    return has;
+}
+
+static int cut_quad(const session_pattern *of, const int *ranks, int places[][4])
+{
+    int count = 0, triangles[2][3];
+    for (int i = 0; i < of->polygon_count; i++) {
+        const pattern_polygon *p = &of->polygons[i];
+        for (int n = 0; n < p->count && p->corner >= 0; n++) places[count][n] = p->nodes[n];
+        if (p->corner >= 0) places[count++][2] = p->corner;
+        const int cut = p->corner < 0 ? fan(p, ranks, triangles) : 0;
+        for (int t = 0; t < cut; t++) memcpy(places[count++], triangles[t], sizeof triangles[t]);
+    }
+    return count;
+}
+
+int session_cut(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4])
+{
+    int count = 0, apex = pattern->middles[0], triangles[2][3];
+    if (pattern->nodes.type == GRID_QUAD) return cut_quad(pattern, ranks, places);
+    for (int n = 1; n < pattern->middle_count; n++)
+        if (ranks[pattern->middles[n]] < ranks[apex]) apex = pattern->middles[n];
+    for (int i = 0; i < pattern->polygon_count; i++) {
+        const pattern_polygon *p = &pattern->polygons[i];
+        const int cut = fan(p, ranks, triangles);
+        for (int t = 0; t < cut; t++) {
+            const int *of = triangles[t];
+            if (p->corner >= 0) memcpy(places[count++], (const int[]){of[0], of[1], of[2], p->corner}, 4 * sizeof *of);
+            if (!has_node(p, apex)) memcpy(places[count++], (const int[]){of[0], of[2], of[1], apex}, 4 * sizeof *of);
+        }
+    }
+    return count;
+}
+
+/* ---- patterns --------------------------------------------------------------------------------------------------- */
+
+static bool make_linear(int type, insitu_vertex_order order, session_pattern *out)
+{
+    const signed char *turn = session_vertex_turn(order, type);
+    out->piece_count = 1;
+    out->piece_size = grid_type_vertices(type);
+    out->types = base_alloc(1);
+    out->places = base_alloc((size_t)out->piece_size * sizeof *out->places);
+    if (!out->types || !out->places) return false;
+    out->types[0] = (unsigned char)type;
+    for (int n = 0; n < out->piece_size; n++) out->places[n] = turn ? turn[n] : n;
+    return true;
+}
+
+bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out)
+{
+    *out = (session_pattern){.type = type, .nodes = *nodes};
+    if (type == nodes->type) return make_linear(type, order, out);
+    if (!nodes->is_complete) {
+        find_polygons(out, order);
+        return true;
+    }
+    const pattern_list list = {out, order};
+    list_pieces(&list);
+    out->types = base_alloc((size_t)out->piece_count);
+    out->places = base_alloc((size_t)out->piece_size * sizeof *out->places);
+    if (!out->types || !out->places) return false;
+    list_pieces(&list);
+    return true;
+}
+
+void session_drop_pattern(session_pattern *pattern)
+{
+    base_free(pattern->types);
+    base_free(pattern->places);
+    *pattern = (session_pattern){0};
+}

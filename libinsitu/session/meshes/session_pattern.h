@@ -1,0 +1,39 @@
+/* The linear pieces of a type of cell of higher order, as positions of nodes in the cell's row of connectivity. */
+#ifndef SESSION_PATTERN_H
+#define SESSION_PATTERN_H
+
+#include "session_nodes.h"
+
+enum { PATTERN_MOST_LOOSE = 24, PATTERN_MOST_POLYGONS = 16 };
+
+/* A triangle or quad whose vertices are midpoints of edges. */
+typedef struct pattern_polygon {
+    int count;
+    int corner;   /* the corner that it cuts off, or -1 if it lies on a face of the cell */
+    int nodes[4]; /* positions in the row */
+} pattern_polygon;
+
+/* The pieces of one type and order of cell. For complete cells they are listed here; those of serendipity cells depend
+ * on the coordinates of the nodes (session_cut()). */
+typedef struct session_pattern {
+    int type; /* the caller's type */
+    session_nodes nodes;
+    int piece_count, piece_size; /* number of listed pieces, and of entries of `places` */
+    unsigned char *types;
+    int *places;       /* positions of the pieces' vertices, one piece after the other */
+    int polygon_count; /* 0 unless it is a serendipity cell */
+    pattern_polygon polygons[PATTERN_MOST_POLYGONS];
+    int middle_count;
+    int middles[12]; /* positions of the midpoints of edges */
+} session_pattern;
+
+/* Returns false if there is no memory. Of a linear cell (order 1) the only piece is the cell. */
+bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out);
+void session_drop_pattern(session_pattern *pattern);
+
+/* Stores the positions of the vertices of a serendipity cell's pieces: 4 for each tet, or 3 for each triangle of a
+ * quad. ranks: indexed by position, the rank of each midpoint in the order of coordinates. Returns the number of
+ * pieces. */
+int session_cut(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4]);
+
+#endif

@@ -1,0 +1,423 @@
+/* Trees and kernels support linear cells only. Cells of higher order are therefore split into linear pieces between
+ * their own nodes, once per topology. The pieces of a cell are consecutive, and the number of the cell is stored with
+ * each piece, so that ghost flags, cell values, thresholds and counts refer to the caller's cells.
+ *
+ * The split of serendipity cells depends on the order of their nodes' coordinates (session_pattern.c), so the pieces
+ * are computed again when nodes move. The split of other cells depends only on the cell's type and order. */
+#include "session_split.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_pattern.h"
+#include "session_region.h"
+#include "session_tally.h"
+
+enum { MOST_PATTERNS = 64, LINEAR_TYPES = GRID_POLYHEDRON + 1 };
+
+/* The caller's cells while they are split. */
+typedef struct split_work {
+    const session_mesh *mesh;
+    grid given;         /* the caller's cells; without connectivity, entry i is vertex i */
+    int64_t nodes, row; /* without offsets: nodes per cell, and distance in entries from cell to cell */
+    int pattern_count;
+    session_pattern patterns[MOST_PATTERNS];
+    bool is_of_type[LINEAR_TYPES]; /* set for the types that pieces have */
+    int only_type;                 /* the type of all pieces; 0 if they differ */
+    int64_t *firsts,
+        *entries; /* the first piece and entry of each cell, and the ends; entries is NULL if pieces have one type */
+    bool gives_entries; /* set if entries of the caller's connectivity are stored instead of vertices */
+    grid_array out;
+} split_work;
+
+/* ---- the caller's cells ---------------------------------------------------------------------------------------- */
+
+bool session_has_higher_order(const insitu_mesh *given)
+{
+    if (given->cell_count == 0 || given->lattice || session_has_owners(given)) return false;
+    if (!given->cell_types.data) return session_corner_type((int)given->cell_type) != GRID_NO_TYPE;
+    const grid g = session_given_grid(given);
+    int64_t cell = 0;
+    while (cell < given->cell_count && session_corner_type(grid_cell_type(&g, cell)) == GRID_NO_TYPE) cell++;
+    return cell < given->cell_count;
+}
+
+int64_t session_entry_place(const insitu_mesh *given, int64_t entry)
+{
+    const int64_t used = session_cell_nodes(given), row = given->connectivity_row;
+    return !row || given->offsets.data || row == used ? entry : entry / used * row + entry % used;
+}
+
+static int64_t first_of(const split_work *w, int64_t cell)
+{
+    return w->given.offsets.data ? grid_array_index(&w->given.offsets, cell) : cell * w->row;
+}
+
+static int64_t size_of(const split_work *w, int64_t cell)
+{
+    if (!w->given.offsets.data) return w->nodes;
+    return (int64_t)((uint64_t)grid_offset_end(&w->given.offsets, cell) -
+                     (uint64_t)grid_array_index(&w->given.offsets, cell));
+}
+
+static int64_t vertex_of(const split_work *w, int64_t entry)
+{
+    return w->given.connectivity.data ? grid_array_index(&w->given.connectivity, entry) : entry;
+}
+
+static const session_pattern *find_pattern(const split_work *w, int type, int64_t count)
+{
+    for (int i = 0; i < w->pattern_count; i++)
+        if (w->patterns[i].type == type && w->patterns[i].nodes.count == count) return &w->patterns[i];
+    return NULL;
+}
+
+static const session_pattern *pattern_of(const split_work *w, int64_t cell)
+{
+    return find_pattern(w, grid_cell_type(&w->given, cell), size_of(w, cell));
+}
+
+/* ---- patterns and checks ---------------------------------------------------------------------------------------- */
+
+static insitu_status describe_type(const session_mesh *mesh, int64_t cell, int type, int64_t count, base_error *error)
+{
+    const long long at = cell, nodes = count;
+    if (type == GRID_POLYHEDRON || type == GRID_POLYGON)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld is a %s, and others are of higher order: give them in another mesh",
+                         mesh->label, at, type == GRID_POLYGON ? "polygon" : "polyhedron");
+    if (session_corner_type(type) == GRID_NO_TYPE && !grid_type_vertices(type))
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": cell %lld: unknown cell type %d", mesh->label, at,
+                         type);
+    return base_fail(error, INSITU_ERROR_MESH,
+                     "mesh \"%s\": cell %lld of type %d has %lld nodes by its offsets, which no order from 1 to %d has",
+                     mesh->label, at, type, nodes, NODES_MOST_ORDER);
+}
+
+static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t count, base_error *error)
+{
+    session_nodes nodes = {type, 1, grid_type_vertices(type), true, false};
+    const insitu_vertex_order order = w->mesh->given.vertex_order;
+    const bool is_linear = nodes.count && nodes.count == count;
+    if (!is_linear && !session_nodes_of(type, count, &nodes)) return describe_type(w->mesh, cell, type, count, error);
+    const char *why = is_linear ? NULL : session_order_refused(&nodes, order);
+    if (why)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld of type %d and order %d: vertex_order is %d: %s", w->mesh->label,
+                         (long long)cell, type, nodes.order, (int)order, why);
+    if (w->pattern_count == MOST_PATTERNS)
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": cell %lld: more than %d types and orders of cells",
+                         w->mesh->label, (long long)cell, MOST_PATTERNS);
+    session_pattern *made = &w->patterns[w->pattern_count++];
+    if (!session_make_pattern(type, &nodes, order, made))
+        return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the pieces of a cell", w->mesh->label);
+    for (int i = 0; i < made->piece_count; i++) w->is_of_type[made->types[i]] = true;
+    if (!nodes.is_complete) w->is_of_type[nodes.type == GRID_QUAD ? GRID_TRIANGLE : GRID_TET] = true;
+    return INSITU_OK;
+}
+
+static insitu_status check_offsets(const split_work *w, int64_t cell, base_error *error)
+{
+    const insitu_mesh *given = &w->mesh->given;
+    const long long base = given->index_base, first = first_of(w, cell) + base, next = first + size_of(w, cell);
+    const long long last = given->connectivity_count + base;
+    if (!w->given.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MESH,
+                     "mesh \"%s\": cell %lld: offsets %lld and %lld do not rise or are outside %lld..%lld",
+                     w->mesh->label, (long long)cell, first, next, base, last);
+}
+
+static void choose_type(split_work *w)
+{
+    int types = 0;
+    for (int type = 0; type < LINEAR_TYPES; type++) {
+        types += w->is_of_type[type];
+        if (w->is_of_type[type]) w->only_type = type;
+    }
+    if (types > 1) w->only_type = 0;
+}
+
+/* Finds the patterns of all cells. Returns an error for the first cell that has none, or has invalid offsets. */
+static insitu_status find_patterns(split_work *w, base_error *error)
+{
+    const insitu_mesh *given = &w->mesh->given;
+    const int64_t cells = w->given.offsets.data ? given->cell_count : 1;
+    int last_type = -1;
+    int64_t last_size = -1;
+    for (int64_t cell = 0; cell < cells; cell++) {
+        if (check_offsets(w, cell, error)) return error->status;
+        const int type = grid_cell_type(&w->given, cell);
+        const int64_t size = size_of(w, cell);
+        if (type == last_type && size == last_size) continue;
+        if (!find_pattern(w, type, size) && add_pattern(w, cell, type, size, error)) return error->status;
+        last_type = type;
+        last_size = size;
+    }
+    const int64_t end =
+        w->given.offsets.data ? grid_offset_end(&w->given.offsets, cells - 1) : given->connectivity_count;
+    if (end != given->connectivity_count)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld", w->mesh->label,
+                         (long long)end + given->index_base, given->index_base ? " + 1" : "",
+                         (long long)given->connectivity_count + given->index_base);
+    choose_type(w);
+    return INSITU_OK;
+}
+
+static insitu_status describe_index(const split_work *w, int64_t cell, base_error *error)
+{
+    const long long base = w->mesh->given.index_base, last = w->mesh->given.vertex_count - 1 + base;
+    const int64_t first = first_of(w, cell);
+    int64_t n = 0;
+    while (vertex_of(w, first + n) >= 0 && vertex_of(w, first + n) < w->mesh->given.vertex_count) n++;
+    return base_fail(error, INSITU_ERROR_MESH,
+                     "mesh \"%s\": cell %lld: index %lld of its node %lld is outside %lld..%lld (index_base is %lld)",
+                     w->mesh->label, (long long)cell, (long long)vertex_of(w, first + n) + base, (long long)n, base,
+                     last, base);
+}
+
+static insitu_status check_indices(const split_work *w, int threads, base_error *error)
+{
+    const int64_t cells = w->mesh->given.cell_count, vertices = w->mesh->given.vertex_count;
+    int64_t bad = cells;
+#pragma omp parallel num_threads(session_region_threads(threads, cells))
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : bad) nowait
+        for (int64_t cell = 0; cell < cells; cell++) {
+            const int64_t first = first_of(w, cell), size = size_of(w, cell);
+            for (int64_t n = 0; n < size && cell < bad; n++) {
+                const int64_t vertex = vertex_of(w, first + n);
+                if (vertex < 0 || vertex >= vertices) bad = cell;
+            }
+        }
+        region_leave();
+    }
+    return bad < cells ? describe_index(w, bad, error) : INSITU_OK;
+}
+
+/* ---- pieces ---------------------------------------------------------------------------------------------------- */
+
+static bool comes_before(const double a[3], const double b[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis];
+    return false;
+}
+
+/* Stores the rank of each midpoint of a serendipity cell in the order of coordinates; equal points have equal ranks. */
+static void rank_middles(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
+{
+    double at[12][3];
+    for (int n = 0; n < of->middle_count; n++)
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t vertex = vertex_of(w, first + of->middles[n]);
+            at[n][axis] = grid_array_number(&w->given.coordinates[axis], vertex);
+        }
+    for (int n = 0; n < of->middle_count; n++) {
+        int rank = 0;
+        for (int m = 0; m < of->middle_count; m++) rank += comes_before(at[m], at[n]);
+        ranks[of->middles[n]] = rank;
+    }
+}
+
+static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int places[PATTERN_MOST_LOOSE][4])
+{
+    int ranks[27] = {0};
+    rank_middles(w, of, first_of(w, cell), ranks);
+    return session_cut(of, ranks, places);
+}
+
+static void count_pieces(const split_work *w, int64_t cell)
+{
+    const session_pattern *of = pattern_of(w, cell);
+    int loose[PATTERN_MOST_LOOSE][4];
+    const int cut = of->polygon_count ? cut_cell(w, of, cell, loose) : 0;
+    w->firsts[cell + 1] = of->polygon_count ? cut : of->piece_count;
+    if (w->entries)
+        w->entries[cell + 1] = of->polygon_count ? cut * (of->nodes.type == GRID_QUAD ? 3 : 4) : of->piece_size;
+}
+
+static void add_up(int64_t *counts, int64_t cells)
+{
+    for (int64_t cell = 0; cells && cell < cells; cell++) counts[cell + 1] += counts[cell];
+}
+
+static insitu_status count_all(split_work *w, int threads, base_error *error)
+{
+    const int64_t cells = w->mesh->given.cell_count, most = 4294967294;
+    const size_t bytes = (size_t)(cells + 1) * sizeof *w->firsts;
+    w->firsts = base_calloc(bytes, 1);
+    if (!w->only_type) w->entries = base_calloc(bytes, 1);
+    if (!w->firsts || (!w->only_type && !w->entries))
+        return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %zu bytes of cells' pieces",
+                         w->mesh->label, bytes);
+#pragma omp parallel num_threads(session_region_threads(threads, cells))
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t cell = 0; cell < cells; cell++) count_pieces(w, cell);
+        region_leave();
+    }
+    add_up(w->firsts, cells);
+    if (w->entries) add_up(w->entries, cells);
+    if (w->firsts[cells] <= most) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": its cells have %lld pieces, at most %lld are supported",
+                     w->mesh->label, (long long)w->firsts[cells], (long long)most);
+}
+
+static int64_t entry_count(const split_work *w)
+{
+    const int64_t cells = w->mesh->given.cell_count;
+    return w->entries ? w->entries[cells] : w->firsts[cells] * grid_type_vertices(w->only_type);
+}
+
+/* Stores the corner at the given position of the cell's row, as its entry or as its vertex. */
+static void put_place(const split_work *w, int64_t cell, int64_t at, int place)
+{
+    const int64_t first = first_of(w, cell);
+    const int64_t corner = w->given.offsets.data ? first + place : cell * w->nodes + place;
+    session_put_index(&w->out, at, w->gives_entries ? corner : vertex_of(w, first + place));
+}
+
+static void put_cell(const split_work *w, int64_t cell)
+{
+    const session_pattern *of = pattern_of(w, cell);
+    int64_t at = w->entries ? w->entries[cell] : w->firsts[cell] * grid_type_vertices(w->only_type);
+    for (int n = 0; n < of->piece_size; n++) put_place(w, cell, at++, of->places[n]);
+    if (!of->polygon_count) return;
+    int loose[PATTERN_MOST_LOOSE][4];
+    const int size = of->nodes.type == GRID_QUAD ? 3 : 4, count = cut_cell(w, of, cell, loose);
+    for (int i = 0; i < count; i++)
+        for (int n = 0; n < size; n++) put_place(w, cell, at++, loose[i][n]);
+}
+
+static void put_cells(const split_work *w, int threads)
+{
+    const int64_t cells = w->mesh->given.cell_count;
+#pragma omp parallel num_threads(session_region_threads(threads, cells))
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t cell = 0; cell < cells; cell++) put_cell(w, cell);
+        region_leave();
+    }
+}
+
+/* ---- the topology ---------------------------------------------------------------------------------------------- */
+
+/* Stores for each piece the number and the ghost flag of its cell, and its type and offset. */
+static void put_parents(const split_work *w, session_topology *t)
+{
+    const insitu_mesh *given = &w->mesh->given;
+    for (int64_t cell = 0; cell < given->cell_count; cell++) {
+        const session_pattern *of = pattern_of(w, cell);
+        int64_t at = w->entries ? w->entries[cell] : 0;
+        for (int64_t i = w->firsts[cell]; i < w->firsts[cell + 1]; i++) {
+            const int loose = of->nodes.type == GRID_QUAD ? GRID_TRIANGLE : GRID_TET;
+            const int type = of->polygon_count ? loose : of->types[i - w->firsts[cell]];
+            t->parents[i] = (uint32_t)cell;
+            if (t->ghosts) t->ghosts[i] = grid_is_ghost(&w->given, cell);
+            if (!w->entries) continue;
+            t->cell_types[i] = (unsigned char)type;
+            session_put_index(&t->offsets, i, at);
+            at += grid_type_vertices(type);
+        }
+    }
+    if (w->entries) session_put_index(&t->offsets, w->firsts[given->cell_count], entry_count(w));
+}
+
+static insitu_status make_topology(split_work *w, session_mesh *mesh, int threads, base_error *error)
+{
+    session_topology *t = &mesh->topology;
+    const int64_t pieces = w->firsts[mesh->given.cell_count], entries = entry_count(w);
+    t->has_own_cells = t->is_split = true;
+    t->cell_type = w->only_type;
+    t->cell_count = pieces;
+    t->connectivity_count = entries;
+    for (int i = 0; i < w->pattern_count; i++) t->follows_places = t->follows_places || w->patterns[i].polygon_count;
+    if (!session_make_indices(mesh, "cells' pieces", entries, mesh->given.vertex_count, &t->connectivity, error))
+        return error->status;
+    if (w->entries && !session_make_indices(mesh, "cells' pieces", pieces, entries, &t->offsets, error))
+        return error->status;
+    t->parents = base_alloc((size_t)(pieces + 1) * sizeof *t->parents);
+    if (w->entries) t->cell_types = base_alloc((size_t)pieces + 1);
+    if (mesh->given.ghosts.data) t->ghosts = base_alloc((size_t)pieces + 1);
+    if (!t->parents || (w->entries && !t->cell_types) || (mesh->given.ghosts.data && !t->ghosts))
+        return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld pieces of cells", mesh->label,
+                         (long long)pieces);
+    put_parents(w, t);
+    w->out = t->connectivity;
+    put_cells(w, threads);
+    t->cell_bytes = (entries + 1) * t->connectivity.stride + pieces * (int64_t)sizeof *t->parents;
+    if (w->entries) t->cell_bytes += (pieces + 1) * t->offsets.stride + pieces;
+    if (t->ghosts) t->cell_bytes += pieces;
+    return INSITU_OK;
+}
+
+static split_work begin(const session_mesh *mesh)
+{
+    const insitu_mesh *given = &mesh->given;
+    const grid g = session_given_grid(given);
+    const int64_t nodes = session_cell_nodes(given);
+    return (split_work){
+        .mesh = mesh, .given = g, .nodes = nodes, .row = given->connectivity_row ? given->connectivity_row : nodes};
+}
+
+static void end(split_work *w)
+{
+    for (int i = 0; i < w->pattern_count; i++) session_drop_pattern(&w->patterns[i]);
+    base_free(w->firsts);
+    base_free(w->entries);
+}
+
+insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error)
+{
+    split_work w = begin(mesh);
+    insitu_status status = find_patterns(&w, error);
+    if (!status) status = check_indices(&w, threads, error);
+    if (!status) status = count_all(&w, threads, error);
+    if (!status) status = make_topology(&w, mesh, threads, error);
+    end(&w);
+    return status;
+}
+
+insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
+{
+    split_work w = begin(mesh);
+    insitu_status status = find_patterns(&w, error);
+    const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
+    const int64_t largest = w.given.offsets.data ? mesh->given.connectivity_count : cells * nodes;
+    w.gives_entries = true;
+    if (!status) status = count_all(&w, threads, error);
+    if (!status && !session_make_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
+        status = error->status;
+    w.out = *out;
+    if (!status) put_cells(&w, threads);
+    end(&w);
+    return status;
+}
+
+/* ---- counts ---------------------------------------------------------------------------------------------------- */
+
+session_counts session_count_parents(const session_mesh *mesh, bool any_inverted)
+{
+    const grid *g = &mesh->cells;
+    const uint32_t *parents = mesh->topology.parents;
+    session_counts out = {0};
+    for (int64_t first = 0, next = 0; first < g->cell_count; first = next) {
+        const bool is_ghost = grid_is_ghost(g, first);
+        bool is_flat = true;
+        mesh_tally of = tally_empty();
+        for (next = first; next < g->cell_count && parents[next] == parents[first]; next++) {
+            is_flat = is_flat && grid_is_flat(g, next);
+            if (any_inverted) tally_cell(g, next, &of);
+        }
+        out.ghosts += is_ghost;
+        out.drawn += !is_ghost;
+        out.inverted += of.inverted > 0;
+        out.flat += is_flat && !is_ghost;
+        out.shells += is_flat && !is_ghost && grid_is_shell_type(grid_cell_type(g, first));
+    }
+    return out;
+}

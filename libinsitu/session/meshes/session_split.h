@@ -1,0 +1,25 @@
+/* The linear pieces that are read in place of cells of higher order. */
+#ifndef SESSION_SPLIT_H
+#define SESSION_SPLIT_H
+
+#include "session_mesh.h"
+
+/* Returns whether some cells are of higher order. Reads the types of mixed cells. */
+bool session_has_higher_order(const insitu_mesh *given);
+
+/* Creates the mesh's topology of pieces. Returns an error, and creates nothing, if types, counts, offsets or indices of
+ * the caller's cells are invalid. Local. */
+insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error);
+
+/* Creates a connectivity of the pieces whose entries are not vertices but entries of the caller's connectivity, counted
+ * without the unused ends of rows. Local. */
+insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
+
+/* Returns the position in the caller's connectivity of an entry that is counted without the unused ends of rows. */
+int64_t session_entry_place(const insitu_mesh *given, int64_t entry);
+
+/* Counts the caller's cells of a mesh whose cells are split. A cell is inverted if one of its pieces is, which is
+ * tested only if any_inverted is set, and flat if all its pieces are. Local. */
+session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
+
+#endif

@@ -1,0 +1,439 @@
+/* Cells of higher order, drawn as pieces between their own nodes. A linear field on straight cells is a plane, whatever
+ * the cells: every ray that meets the cube has its hit, in closed form, and no other has one. Hexes draw, to the bit,
+ * the linear hexes between their nodes. Against a quadratic field the error falls by four as nodes are twice as dense.
+ * Ghosts, values in cells, thresholds and counts are those of the caller's cells. All pictures are the same on any
+ * ranks. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_mesh_order.h"
+#include "test_session_fixture.h"
+
+enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
+
+#define EYE 5.0
+#define VIEW_HEIGHT 2.6
+#define CAMERA                                                                                                         \
+    "    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.6}\n"
+#define IMAGE(name, layer)                                                                                             \
+    "  - name: " name "\n    size: [96, 72]\n    background: [0, 0, 0, 0]\n" CAMERA "    layers:\n      - " layer      \
+    "\n    outputs: [{path: " name ".exr}]\n"
+
+static const char plane_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1]}")
+    IMAGE("b", "slice: {field: f, planes: [{normal: [0.3, 0.2, 1], point: [0, 0, 0.1]}]}")
+        IMAGE("c", "surface: {colour_by: {field: f, map: grey, range: [-3, 3]}}");
+static const char sphere_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.5]}");
+static const char all_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1, 0.4], opacity: 0.6}")
+    IMAGE("b", "slice: {field: f, planes: [{normal: [1, 2, 3]}]}")
+        IMAGE("c", "surface: {threshold: {field: f, from: -0.9}, colour_by: {field: f}}")
+            IMAGE("d", "volume: {field: f}");
+static const char cell_scene[] =
+    "images:\n" IMAGE("a", "surface: {threshold: {field: c, from: 0.5}, colour_by: {field: c}}")
+        IMAGE("b", "volume: {field: c}") IMAGE("c", "isosurface: {field: f, values: [0.1]}");
+
+/* ---- drawing ---------------------------------------------------------------------------------------------------- */
+
+enum { MOST_IMAGES = 4 };
+
+typedef struct drawn {
+    int count;
+    caught_picture pictures[MOST_IMAGES];
+} drawn;
+
+static void free_drawn(drawn *d)
+{
+    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
+    *d = (drawn){0};
+}
+
+static drawn take_drawn(void)
+{
+    drawn out = {.count = own_rank == 0 ? caught_count : 0};
+    for (int i = 0; i < out.count; i++) out.pictures[i] = caught[i];
+    caught_count = 0;
+    return out;
+}
+
+static bool step_well(insitu_session *session, int cycle)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    return status == INSITU_OK;
+}
+
+/* more: a second field, or NULL. */
+static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh, const insitu_field *more,
+                  insitu_report *report)
+{
+    insitu_session *session = open_session(comm, write_scene(scene));
+    assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
+    if (more) assert_int_equal(insitu_set_field(session, "m", more), INSITU_OK);
+    const bool is_well = step_well(session, 0);
+    if (report) *report = *insitu_last_report(session);
+    assert_true(is_well);
+    const drawn out = take_drawn();
+    insitu_destroy(&session);
+    return out;
+}
+
+static bool same_drawn(const drawn *a, const drawn *b)
+{
+    bool is_same = a->count == b->count;
+    for (int i = 0; i < a->count && is_same; i++) is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
+    return is_same;
+}
+
+/* Depth is float, of numbers up to 6, after a few operations of the same precision. */
+static const double rounding = 1e-5;
+
+/* Returns whether the first pictures have the same hits, but for the rounding of places: these are relative to the
+ * middle of the cells that are drawn, which is another one if some are ghosts. */
+static bool same_depths(const drawn *a, const drawn *b)
+{
+    bool is_same = true;
+    for (int i = 0; own_rank == 0 && i < PIXELS; i++) {
+        const double left = (double)a->pictures[0].depth[i], right = (double)b->pictures[0].depth[i];
+        is_same = is_same && (left == right || fabs(left - right) < rounding);
+    }
+    return is_same;
+}
+
+static void pixel_place(int pixel, double out[2])
+{
+    const double size = VIEW_HEIGHT / HEIGHT;
+    out[0] = (pixel % WIDTH + 0.5 - WIDTH / 2.0) * size;
+    out[1] = (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * size;
+}
+
+/* ---- planes ----------------------------------------------------------------------------------------------------- */
+
+static double linear(const double p[3])
+{
+    return p[2] + 0.3 * p[0] + 0.2 * p[1];
+}
+
+/* The pixels whose depth is wrong: a hit where none should be, or the other way round, or at another place. */
+static int count_wrong(const caught_picture *picture, bool is_face)
+{
+    int wrong = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        double at[2];
+        pixel_place(pixel, at);
+        const bool is_in = fabs(at[0]) < 1 && fabs(at[1]) < 1;
+        const double z = is_face ? 1 : 0.1 - 0.3 * at[0] - 0.2 * at[1], depth = (double)picture->depth[pixel];
+        wrong += is_in ? !(fabs(depth - (EYE - z)) < rounding) : isfinite(depth);
+    }
+    return wrong;
+}
+
+static void planes_have_no_gap(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++) {
+        order_mesh part, whole;
+        insitu_report report;
+        order_mesh_create(&order_kinds[k], 2, 0, linear, own_rank, rank_count, &part);
+        drawn all = draw(MPI_COMM_WORLD, plane_scene, &part, NULL, &report);
+        everywhere(report.cells == part.cell_count && report.cells_inverted == 0 && report.cells_flat == 0);
+        order_mesh_create(&order_kinds[k], 2, 0, linear, 0, 1, &whole);
+        drawn alone = draw(MPI_COMM_SELF, plane_scene, &whole, NULL, NULL);
+        int wrong[3] = {0};
+        bool is_same = true;
+        for (int i = 0; own_rank == 0 && i < 3; i++) {
+            wrong[i] = count_wrong(&all.pictures[i], i == 2);
+            is_same = is_same && same_pictures(&all.pictures[i], &alone.pictures[i]);
+        }
+        if (wrong[0] || wrong[1] || wrong[2])
+            fprintf(stderr, "%s: %d, %d, %d pixels are wrong\n", order_kinds[k].name, wrong[0], wrong[1], wrong[2]);
+        everywhere(!wrong[0] && !wrong[1] && !wrong[2]);
+        everywhere(is_same);
+        free_drawn(&all);
+        free_drawn(&alone);
+        order_mesh_free(&part);
+        order_mesh_free(&whole);
+    }
+}
+
+/* ---- the order of the error ---------------------------------------------------------------------------------------
+ */
+
+static double sphere(const double p[3])
+{
+    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+}
+
+/* The largest distance along rays within 0.4 of the axis, where the sphere faces the eye. */
+static double sphere_error(const order_kind *kind, int side, double bend)
+{
+    order_mesh mesh;
+    order_mesh_create(kind, side, bend, sphere, own_rank, rank_count, &mesh);
+    drawn d = draw(MPI_COMM_WORLD, sphere_scene, &mesh, NULL, NULL);
+    double worst = 0;
+    for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++) {
+        double at[2];
+        pixel_place(pixel, at);
+        const double square = at[0] * at[0] + at[1] * at[1];
+        if (square > 0.16) continue;
+        const double error = fabs((double)d.pictures[0].depth[pixel] - (EYE - sqrt(0.5 - square)));
+        worst = error > worst || !isfinite(error) ? error : worst;
+    }
+    MPI_Bcast(&worst, 1, MPI_DOUBLE, 0, MPI_COMM_WORLD);
+    free_drawn(&d);
+    order_mesh_free(&mesh);
+    return worst;
+}
+
+/* An interpolant's error is a constant times the square of the spacing, plus less: the constant hardly changes between
+ * cells of this size. Rays sample its largest places, so the ratio of two maxima is near 4. */
+static void error_falls_by_four(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++)
+        for (int is_bent = 0; is_bent < 2; is_bent++) {
+            if (order_kinds[k].order == 4) continue; /* the finer mesh would take long */
+            const int side = order_kinds[k].order == 1 ? 6 : order_kinds[k].order == 3 ? 2 : 3;
+            const double coarse = sphere_error(&order_kinds[k], side, is_bent ? 0.08 : 0);
+            const double fine = sphere_error(&order_kinds[k], 2 * side, is_bent ? 0.08 : 0);
+            if (own_rank == 0)
+                printf("%s%s: error %.2g, with nodes twice as dense %.2g: %.2f\n", order_kinds[k].name,
+                       is_bent ? ", bent" : "", coarse, fine, coarse / fine);
+            everywhere(coarse / fine > 3.2 && coarse / fine < 5.5);
+        }
+}
+
+/* ---- hexes are the linear ones between their nodes --------------------------------------------------------------- */
+
+static double wavy(const double p[3])
+{
+    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
+}
+
+/* The linear hexes of a mesh of lexicographic hexes of order p. */
+static order_mesh linear_hexes(const order_mesh *of, int p)
+{
+    order_mesh out = *of;
+    const int n = p + 1;
+    int64_t *at = out.connectivity = malloc((size_t)(of->cell_count * p * p * p * 8) * sizeof *at);
+    for (int64_t cell = 0; cell < of->cell_count; cell++)
+        for (int i = 0; i < p * p * p; i++)
+            for (int c = 0; c < 8; c++) {
+                const int x = i % p + (c % 4 == 1 || c % 4 == 2), y = i / p % p + (c % 4 > 1), z = i / p / p + c / 4;
+                *at++ = of->connectivity[cell * of->nodes + x + n * (y + n * z)];
+            }
+    out.mesh.cell_type = INSITU_HEX;
+    out.mesh.vertex_order = INSITU_ORDER_VTK;
+    out.mesh.cell_count = of->cell_count * p * p * p;
+    out.mesh.connectivity = (insitu_array){out.connectivity, INSITU_INT64, 0};
+    out.mesh.connectivity_count = out.mesh.cell_count * 8;
+    return out;
+}
+
+/* Vertices of each cell's own, without connectivity. */
+static order_mesh own_nodes(const order_mesh *of, int p)
+{
+    order_mesh out = *of;
+    const int64_t count = of->cell_count * of->nodes;
+    out.coordinates = malloc((size_t)(3 * count) * sizeof(double));
+    out.values = malloc((size_t)count * sizeof(double));
+    for (int64_t i = 0; i < count; i++) {
+        memcpy(out.coordinates + 3 * i, of->coordinates + 3 * of->connectivity[i], 3 * sizeof(double));
+        out.values[i] = of->values[of->connectivity[i]];
+    }
+    insitu_mesh_interleaved(&out.mesh, out.coordinates, INSITU_FLOAT64);
+    out.mesh.connectivity = (insitu_array){0};
+    out.mesh.connectivity_count = 0;
+    out.mesh.vertex_count = out.vertex_count = out.field.count = count;
+    out.mesh.order = p;
+    out.field.values = (insitu_array){out.values, INSITU_FLOAT64, 0};
+    return out;
+}
+
+/* Surfaces to the bit; samples of volumes are blended in the order of cells, whose numbers are the same. */
+static void hexes_are_those_between_their_nodes(void **state)
+{
+    (void)state;
+    for (int p = 1; p <= 4; p++) {
+        const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
+        order_mesh mesh;
+        order_mesh_create(&kind, 2, 0.1, wavy, own_rank, rank_count, &mesh);
+        order_mesh cut = linear_hexes(&mesh, p), own = own_nodes(&mesh, p);
+        /* The threshold of picture 2 shows whole cells, which linear ones do not know. */
+        drawn high = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
+        drawn low = draw(MPI_COMM_WORLD, all_scene, &cut, NULL, NULL);
+        drawn implied = draw(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
+        bool is_same = true;
+        for (int i = 0; own_rank == 0 && i < high.count; i++)
+            is_same = is_same && (i == 2 || same_pictures(&high.pictures[i], &low.pictures[i]));
+        everywhere(is_same);
+        everywhere(same_drawn(&high, &implied));
+        free_drawn(&high);
+        free_drawn(&low);
+        free_drawn(&implied);
+        free(cut.connectivity);
+        free(own.coordinates);
+        free(own.values);
+        order_mesh_free(&mesh);
+    }
+}
+
+/* ---- the caller's cells -------------------------------------------------------------------------------------------
+ */
+
+/* Cells with values of 0 and 1 in turn; a threshold on them draws what the mesh of those with 1 alone does, and so do
+ * ghosts in place of the others. */
+static void values_in_cells_are_the_callers(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++) {
+        order_mesh mesh;
+        insitu_report report;
+        order_mesh_create(&order_kinds[k], 2, 0.05, wavy, own_rank, rank_count, &mesh);
+        double *values = malloc((size_t)(mesh.cell_count + 1) * sizeof *values);
+        unsigned char *ghosts = malloc((size_t)mesh.cell_count + 1);
+        int64_t ghost_count = 0;
+        for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
+            ghosts[cell] = cell % 3 == 1;
+            ghost_count += ghosts[cell];
+            values[cell] = 1 - ghosts[cell];
+        }
+        insitu_field c = mesh.field;
+        c.name = "c";
+        c.centring = INSITU_CELL;
+        c.count = mesh.cell_count;
+        c.values = (insitu_array){values, INSITU_FLOAT64, 0};
+        drawn threshold = draw(MPI_COMM_WORLD, cell_scene, &mesh, &c, NULL);
+        mesh.mesh.ghosts = (insitu_array){ghosts, INSITU_UINT8, 0};
+        drawn hidden = draw(MPI_COMM_WORLD, cell_scene, &mesh, &c, &report);
+        everywhere(report.cells == mesh.cell_count && report.cells_ghost == ghost_count);
+        everywhere(same_depths(&threshold, &hidden)); /* colours range over other cells */
+        free_drawn(&threshold);
+        free_drawn(&hidden);
+        free(values);
+        free(ghosts);
+        order_mesh_free(&mesh);
+    }
+}
+
+/* A threshold on a field at vertices shows whole cells: those all of whose nodes are within it, as ghosts say here. */
+static void thresholds_show_whole_cells(void **state)
+{
+    (void)state;
+    const char *scene = "images:\n" IMAGE("a", "surface: {threshold: {field: f, from: -0.3}, colour_by: {field: f}}");
+    const char *plain = "images:\n" IMAGE("a", "surface: {colour_by: {field: f}}");
+    for (int k = 0; k < order_kind_count; k++) {
+        order_mesh mesh;
+        order_mesh_create(&order_kinds[k], 2, 0.05, wavy, own_rank, rank_count, &mesh);
+        unsigned char *ghosts = calloc((size_t)mesh.cell_count + 1, 1);
+        for (int64_t i = 0; i < mesh.cell_count * mesh.nodes; i++)
+            ghosts[i / mesh.nodes] |= mesh.values[mesh.connectivity[i]] < -0.3;
+        drawn threshold = draw(MPI_COMM_WORLD, scene, &mesh, NULL, NULL);
+        mesh.mesh.ghosts = (insitu_array){ghosts, INSITU_UINT8, 0};
+        drawn hidden = draw(MPI_COMM_WORLD, plain, &mesh, NULL, NULL);
+        everywhere(same_depths(&threshold, &hidden));
+        free_drawn(&threshold);
+        free_drawn(&hidden);
+        free(ghosts);
+        order_mesh_free(&mesh);
+    }
+}
+
+/* ---- corners ------------------------------------------------------------------------------------------------------
+ */
+
+/* A field with a value at each node of each cell draws what vertices of each cell's own do. */
+static void corner_fields_are_the_cells_own(void **state)
+{
+    (void)state;
+    for (int p = 2; p <= 3; p++)
+        for (int has_offsets = 0; has_offsets < 2; has_offsets++) {
+            const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
+            order_mesh mesh;
+            order_mesh_create(&kind, 2, 0.1, wavy, own_rank, rank_count, &mesh);
+            order_mesh own = own_nodes(&mesh, p);
+            int64_t *offsets = malloc((size_t)(mesh.cell_count + 1) * sizeof *offsets);
+            for (int64_t cell = 0; cell <= mesh.cell_count; cell++) offsets[cell] = cell * mesh.nodes;
+            for (int64_t i = 0; i < own.vertex_count; i++) own.values[i] += 0.1 * sin((double)(i / mesh.nodes));
+            if (has_offsets) mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
+            mesh.field = own.field;
+            mesh.field.centring = INSITU_CORNER;
+            drawn torn = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
+            drawn doubled = draw(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
+            everywhere(same_drawn(&torn, &doubled));
+            free_drawn(&torn);
+            free_drawn(&doubled);
+            free(offsets);
+            free(own.coordinates);
+            free(own.values);
+            order_mesh_free(&mesh);
+        }
+}
+
+/* ---- nodes that move ----------------------------------------------------------------------------------------------
+ */
+
+/* Turned by about a radian, which changes all orders of coordinates. */
+static void turn_nodes(order_mesh *mesh)
+{
+    for (int64_t i = 0; i < mesh->vertex_count; i++) {
+        double *p = mesh->coordinates + 3 * i;
+        const double x = p[0], y = p[1];
+        p[0] = 0.6 * x - 0.8 * y;
+        p[1] = 0.8 * x + 0.6 * y;
+    }
+}
+
+/* Draws the kind's cells, then the turned ones, of which `changed` is told. The origin that places are relative to
+ * stays that of the first step, so that pictures may be compared to the bit. */
+static drawn draw_turned(const order_kind *kind, unsigned changed)
+{
+    order_mesh mesh;
+    order_mesh_create(kind, 2, 0, wavy, own_rank, rank_count, &mesh);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_scene));
+    assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
+    everywhere(step_well(session, 0));
+    turn_nodes(&mesh);
+    mesh.mesh.changed = changed;
+    assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
+    if (changed == INSITU_CHANGED_ALL) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
+    everywhere(step_well(session, 1));
+    const drawn out = take_drawn();
+    insitu_destroy(&session);
+    order_mesh_free(&mesh);
+    return out;
+}
+
+/* Serendipity cells are cut anew as their nodes move; others keep their pieces. Both draw the surfaces that a mesh does
+ * which is new. */
+static void moved_nodes_draw_as_new_ones(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++) {
+        drawn moved = draw_turned(&order_kinds[k], INSITU_CHANGED_GEOMETRY);
+        drawn anew = draw_turned(&order_kinds[k], INSITU_CHANGED_ALL);
+        bool is_same = moved.count == anew.count;
+        for (int i = 0; own_rank == 0 && i < 3; i++)
+            is_same = is_same && same_pictures(&moved.pictures[i], &anew.pictures[i]);
+        everywhere(is_same);
+        free_drawn(&moved);
+        free_drawn(&anew);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(planes_have_no_gap),
+        cmocka_unit_test(error_falls_by_four),
+        cmocka_unit_test(hexes_are_those_between_their_nodes),
+        cmocka_unit_test(values_in_cells_are_the_callers),
+        cmocka_unit_test(thresholds_show_whole_cells),
+        cmocka_unit_test(corner_fields_are_the_cells_own),
+        cmocka_unit_test(moved_nodes_draw_as_new_ones),
+    };
+    return run_session_tests(argc, argv, tests, NULL, NULL);
+}
