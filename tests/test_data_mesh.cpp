@@ -50,6 +50,30 @@ int64_t *integers(const insitu_array &a, int64_t count)
     return out;
 }
 
+/* Meshes of tests have linear cells: quadratic ones become those of their corners, which come first. */
+void keep_corners(test_mesh *mesh)
+{
+    static const struct {
+        int type, linear, corners;
+    } quadratic[] = {{INSITU_QUADRATIC_TET, INSITU_TET, 4},
+                     {INSITU_QUADRATIC_HEX, INSITU_HEX, 8},
+                     {INSITU_QUADRATIC_WEDGE, INSITU_WEDGE, 6},
+                     {INSITU_QUADRATIC_PYRAMID, INSITU_PYRAMID, 5}};
+    int64_t at = 0;
+    for (int64_t i = 0; i < mesh->cell_count; i++) {
+        const int64_t first = mesh->offsets[i];
+        int64_t count = mesh->offsets[i + 1] - first;
+        for (const auto &q : quadratic) {
+            if (mesh->types[i] != q.type) continue;
+            mesh->types[i] = static_cast<unsigned char>(q.linear);
+            count = q.corners;
+        }
+        mesh->offsets[i] = at;
+        for (int64_t n = 0; n < count; n++) mesh->connectivity[at++] = mesh->connectivity[first + n];
+    }
+    mesh->offsets[mesh->cell_count] = mesh->connectivity_count = at;
+}
+
 void copy_cells(const insitu_mesh &mesh, test_mesh *out)
 {
     const bool is_mixed = mesh.cell_types.data != nullptr;
@@ -65,6 +89,7 @@ void copy_cells(const insitu_mesh &mesh, test_mesh *out)
         if (i == mesh.cell_count) break;
         out->types[i] = static_cast<unsigned char>(is_mixed ? integer(mesh.cell_types, i) : int64_t{mesh.cell_type});
     }
+    keep_corners(out);
     if (!mesh.face_count) return;
     out->face_count = mesh.face_count;
     out->face_connectivity_count = mesh.face_connectivity_count;

@@ -4,8 +4,8 @@
  * list.
  *
  * A voxel differs from a hexahedron only in the order of its points. Polyhedra and prisms of five and six sides become
- * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). The corners of higher-order cells are their first
- * points, in the order of the linear cell. */
+ * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Quadratic and Lagrange cells are libinsitu's too. Of
+ * other cells of higher order the corners are the first points, in the order of the linear cell. */
 #include "vtk_cells.h"
 
 #include "vtk_faces.h"
@@ -13,7 +13,9 @@
 #include <array>
 
 #include <vtkCellArray.h>
+#include <vtkCellData.h>
 #include <vtkCellTypes.h>
+#include <vtkDataArray.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
@@ -23,11 +25,11 @@ namespace insitu_vtk
 namespace
 {
 
-enum class conversion_kind { not_drawn, flat, as_it_is, polygon, reordered, faces, linear };
+enum class conversion_kind { not_drawn, flat, as_it_is, polygon, reordered, faces, linear, higher };
 
 struct linear_cell {
     uint8_t type;
-    uint8_t vertex_count;
+    uint8_t vertex_count;            // 0: all points of the cell
     std::array<uint8_t, 8> vertices; // indices into the cell's points
 };
 
@@ -96,18 +98,84 @@ const conversion_table &cell_conversions()
     return table;
 }
 
+/* Makes the table of the cells of higher order: libinsitu's type, and how many of the first points its cells have. The
+ * points on faces and inside that libinsitu's type lacks are left out. */
+conversion_table make_higher_conversions()
+{
+    conversion_table table;
+    const struct {
+        int type, known;
+        uint8_t count;
+    } cells[] = {{VTK_QUADRATIC_TRIANGLE, INSITU_QUADRATIC_TRIANGLE, 6},
+                 {VTK_QUADRATIC_QUAD, INSITU_QUADRATIC_QUAD, 8},
+                 {VTK_QUADRATIC_TETRA, INSITU_QUADRATIC_TET, 10},
+                 {VTK_QUADRATIC_HEXAHEDRON, INSITU_QUADRATIC_HEX, 20},
+                 {VTK_QUADRATIC_WEDGE, INSITU_QUADRATIC_WEDGE, 15},
+                 {VTK_QUADRATIC_PYRAMID, INSITU_QUADRATIC_PYRAMID, 13},
+                 {VTK_BIQUADRATIC_QUAD, INSITU_BIQUADRATIC_QUAD, 9},
+                 {VTK_TRIQUADRATIC_HEXAHEDRON, INSITU_TRIQUADRATIC_HEX, 27},
+                 {VTK_BIQUADRATIC_QUADRATIC_WEDGE, INSITU_BIQUADRATIC_WEDGE, 18},
+                 {VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON, INSITU_QUADRATIC_HEX, 20},
+                 {VTK_BIQUADRATIC_TRIANGLE, INSITU_QUADRATIC_TRIANGLE, 6},
+                 {VTK_TRIQUADRATIC_PYRAMID, INSITU_LAGRANGE_PYRAMID, 14}};
+    for (const auto &c : cells)
+        table[static_cast<size_t>(c.type)] = {
+            conversion_kind::higher, c.count, 1, {static_cast<uint8_t>(c.known), c.count, {}}};
+    for (int type = VTK_LAGRANGE_TRIANGLE; type <= VTK_LAGRANGE_PYRAMID; type++)
+        table[static_cast<size_t>(type)] = {conversion_kind::higher, 3, 1, {static_cast<uint8_t>(type), 0, {}}};
+    return table;
+}
+
+const cell_conversion &higher_conversion(uint8_t type)
+{
+    static const conversion_table table = make_higher_conversions();
+    return table[type];
+}
+
+/* Returns whether a Lagrange cell with the same order along all axes can have this number of points. */
+bool is_complete(int type, int64_t points)
+{
+    for (int64_t p = 1; p <= 32; p++) {
+        const int64_t n = p + 1, square = n * n, half = n * (p + 2) / 2;
+        const int64_t counts[] = {half,       square,   half * (p + 3) / 3,
+                                  square * n, half * n, n * (p + 2) * (2 * p + 3) / 6};
+        if (counts[type - VTK_LAGRANGE_TRIANGLE] == points) return type != VTK_LAGRANGE_PYRAMID || p <= 2;
+    }
+    return false;
+}
+
 /* Pointers to the cell arrays of one VTK grid. */
 template <typename Id> struct raw_cells {
     const uint8_t *types;
     const Id *offsets;
     const Id *connectivity;
     int64_t count;
+    bool are_higher_known; // unless there are polyhedra or polygons beside them, or Lagrange cells of mixed orders
 
+    const cell_conversion &conversion_of(int64_t cell) const
+    {
+        const cell_conversion &higher = higher_conversion(types[cell]);
+        const bool is_lagrange = types[cell] >= VTK_LAGRANGE_TRIANGLE && types[cell] <= VTK_LAGRANGE_PYRAMID;
+        if (higher.kind != conversion_kind::higher || !are_higher_known || size(cell) < higher.needed_points ||
+            (is_lagrange && !is_complete(types[cell], size(cell))))
+            return cell_conversions()[types[cell]];
+        return higher;
+    }
+    /* Returns whether the cell is drawn from VTK's own connectivity. */
+    bool is_as_it_is(int64_t cell, const cell_conversion &r) const
+    {
+        if (r.kind == conversion_kind::polygon) return size(cell) >= r.needed_points;
+        if (r.kind == conversion_kind::higher && r.replacement.type != types[cell]) return false;
+        return r.kind == conversion_kind::higher || r.kind == conversion_kind::as_it_is
+                   ? size(cell) == linear_size(cell, r)
+                   : false;
+    }
     int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
-    /* Returns the number of points of the linear cell that represents the cell. */
+    /* Returns the number of the cell's points that are passed to libinsitu. */
     int64_t linear_size(int64_t cell, const cell_conversion &r) const
     {
-        return r.kind == conversion_kind::polygon ? size(cell) : r.replacement.vertex_count;
+        return r.kind == conversion_kind::polygon || !r.replacement.vertex_count ? size(cell)
+                                                                                 : r.replacement.vertex_count;
     }
 };
 
@@ -142,7 +210,7 @@ new_size count_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces,
     new_size size;
     size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
-        const cell_conversion &r = cell_conversions()[raw.types[i]];
+        const cell_conversion &r = raw.conversion_of(i);
         const bool is_faced = !with_faces.has.empty() && with_faces.has[static_cast<size_t>(i)];
         const bool is_drawn = is_faced || (r.linear_cell_count > 0 && raw.size(i) >= r.needed_points);
         if (r.kind == conversion_kind::flat)
@@ -165,7 +233,7 @@ void fill_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint
     int64_t at = 0;
     size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
-        const cell_conversion &r = cell_conversions()[raw.types[i]];
+        const cell_conversion &r = raw.conversion_of(i);
         const bool is_faced = !with_faces.has.empty() && with_faces.has[static_cast<size_t>(i)];
         if (!is_faced && (r.linear_cell_count == 0 || raw.size(i) < r.needed_points)) continue;
         *types++ = is_faced ? static_cast<uint8_t>(INSITU_POLYHEDRON) : r.replacement.type;
@@ -178,8 +246,9 @@ void fill_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint
             continue;
         }
         for (int64_t v = 0; v < raw.linear_size(i, r); v++) {
-            const int64_t point =
-                r.kind == conversion_kind::polygon ? v : r.replacement.vertices[static_cast<size_t>(v)];
+            const int64_t point = r.kind == conversion_kind::polygon || r.kind == conversion_kind::higher
+                                      ? v
+                                      : r.replacement.vertices[static_cast<size_t>(v)];
             connectivity[at++] = raw.connectivity[raw.offsets[i] + point];
         }
     }
@@ -195,7 +264,7 @@ std::string why_converted(const std::array<int64_t, 256> &by_type)
                                    "",
                                    "voxels and pixels reordered",
                                    "faces of polyhedra and prisms shared",
-                                   "higher-order cells by their corners"};
+                                   "cells of higher order by the nodes that are known"};
     std::array<bool, 7> has{};
     for (size_t type = 0; type < 256; type++)
         if (by_type[type] > 0) has[static_cast<size_t>(cell_conversions()[type].kind)] = true;
@@ -249,9 +318,9 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
     mesh.connectivity = {raw.connectivity, id_type, 0};
     mesh.connectivity_count = connectivity_count;
     log.bytes_borrowed += connectivity_count * static_cast<int64_t>(sizeof(Id));
-    const cell_conversion &first = cell_conversions()[raw.types[0]];
+    const cell_conversion &first = raw.conversion_of(0);
     if (first.kind != conversion_kind::polygon && by_type[raw.types[0]] == raw.count &&
-        grid->GetCells()->IsHomogeneous() == first.needed_points) {
+        grid->GetCells()->IsHomogeneous() == raw.linear_size(0, first)) {
         mesh.cell_type = static_cast<insitu_cell_type>(raw.types[0]);
         return;
     }
@@ -261,28 +330,46 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
     log.bytes_borrowed += raw.count + (raw.count + 1) * static_cast<int64_t>(sizeof(Id));
 }
 
+/* Returns whether cells of the type cannot be in one mesh with cells of higher order. */
+bool is_apart(uint8_t type)
+{
+    const conversion_kind what = cell_conversions()[type].kind;
+    return what == conversion_kind::polygon || what == conversion_kind::faces;
+}
+
+/* Returns whether each Lagrange cell has the same order along all axes. */
+bool has_even_orders(vtkUnstructuredGrid *grid)
+{
+    vtkDataArray *degrees = grid->GetCellData()->GetHigherOrderDegrees();
+    bool is_even = true;
+    for (vtkIdType i = 0; degrees && degrees->GetNumberOfComponents() == 3 && i < degrees->GetNumberOfTuples(); i++) {
+        const double *of = degrees->GetTuple3(i);
+        is_even = is_even && of[0] == of[1] && (of[2] == of[0] || of[2] == 0);
+    }
+    return is_even;
+}
+
 template <typename Array>
 bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, const cells_view &view,
                 std::string &error)
 {
     using id = typename Array::ValueType;
-    const raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0),
-                               connectivity->GetPointer(0), grid->GetNumberOfCells()};
+    raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0), connectivity->GetPointer(0),
+                         grid->GetNumberOfCells(), has_even_orders(grid)};
     const int64_t connectivity_count = connectivity->GetNumberOfValues();
     std::array<int64_t, 256> by_type{};
     bool is_as_it_is = true;
     for (int64_t i = 0; i < raw.count; i++) {
         by_type[raw.types[i]]++;
-        const cell_conversion &r = cell_conversions()[raw.types[i]];
         if (raw.offsets[i] < 0 || raw.offsets[i] > raw.offsets[i + 1] || raw.offsets[i + 1] > connectivity_count) {
             error = view.what + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) + ", " +
                     std::to_string(raw.offsets[i + 1]) + " are not within the connectivity's " +
                     std::to_string(connectivity_count) + " entries";
             return false;
         }
-        is_as_it_is = is_as_it_is && ((r.kind == conversion_kind::as_it_is && raw.size(i) == r.needed_points) ||
-                                      (r.kind == conversion_kind::polygon && raw.size(i) >= r.needed_points));
+        raw.are_higher_known = raw.are_higher_known && !is_apart(raw.types[i]);
     }
+    for (int64_t i = 0; i < raw.count; i++) is_as_it_is = is_as_it_is && raw.is_as_it_is(i, raw.conversion_of(i));
     if (is_as_it_is) {
         view.cells.count = raw.count;
         borrow_cells(grid, raw, by_type, connectivity_count, view);

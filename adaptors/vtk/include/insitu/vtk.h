@@ -25,7 +25,9 @@
  * Cells of the types 10, 12, 13, 14, and of the shell types 5, 7, 9, are borrowed with 32- or 64-bit storage. Voxels
  * (11) and pixels (8) are drawn as hexahedra and quads, with a copied connectivity. The face streams of polyhedra (42)
  * are copied to a list of faces that cells share. Pentagonal and hexagonal prisms (15, 16) become polyhedra too.
- * Quadratic and higher-order cells are drawn as linear cells with the same corners, copied and reported. All other
+ * Quadratic and Lagrange cells are borrowed and drawn as linear pieces between their points; of the types 33, 34 and 37
+ * the first 20, 6 and 14 points are copied. Bezier cells, cells of several orders, and all cells of higher order in
+ * grids with polygons or polyhedra are copied, drawn as linear cells with the same corners, and reported. All other
  * cells are reported and not drawn, including polyhedra without faces, lines and points.
  *
  * Of polygonal data the points are borrowed, and the polygons too if there are no lines, points or strips.
@@ -57,7 +59,8 @@ typedef struct insitu_vtk_report {
     int fields;              /* number of fields set, over all meshes */
     int64_t cells;           /* number of cells set, including ghosts */
     int64_t cells_split;     /* number of cells split into several; currently always 0 */
-    int64_t cells_linear;    /* number of quadratic and higher-order cells drawn as linear ones */
+    int64_t cells_linear;    /* number of cells of higher order drawn by their corners: Bezier cells, cells of several
+                                orders or with points missing, and all in grids with polygons or polyhedra */
     int64_t cells_flat;      /* number of points and lines, which are not drawn */
     int64_t cells_not_drawn; /* number of 3-D cells not drawn: unknown types, too few points or faces */
     int64_t bytes_borrowed;  /* size in bytes of VTK's arrays that are borrowed */
