@@ -22,6 +22,7 @@
 #include "kernel_curved_batch.h"
 #include "kernel_prefetch.h"
 #include "kernel_surface.h"
+#include "kernel_surface_cells.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_segments.h"
@@ -44,23 +45,18 @@ SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
     if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);
 }
 
-static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, const kernel_tile_candidate *candidate,
-                             int part, int value, unsigned blocks)
+static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part, int value,
+                             unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
-    if (arrays->has_lanes && kernel_is_linear(kernel_arrays_type(arrays, candidate->cell))) {
-        kernel_arrays_fetch_tet(c, arrays, candidate->cell);
-        kernel_tet_place(c, t->frame, &t->tile);
-    } else {
-        kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
-        if (kernel_has_own_faces(c->type)) {
-            kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
-            return;
-        }
-        kernel_cell_move(c, t->frame, &t->tile, g);
+    kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
+    if (kernel_has_own_faces(c->type)) {
+        kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
+        return;
     }
+    kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
     t->curved->bounds = NULL;
@@ -82,21 +78,13 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* Returns whether the cell, of the batch's layer and part, is traced in a batch of hexes, wedges or pyramids. In a mesh
- * of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because their hits
- * then hide other cells sooner. */
-SIMD_INLINE bool kernel_is_for_curved_batch(const kernel_tile_trace *t, const kernel_batch *b,
-                                            const kernel_tile_candidate *candidate, int type)
-{
-    if (kernel_is_linear(type) || kernel_has_own_faces(type) || !kernel_curved_batch_fit(t, &b->arrays)) return false;
-    return kernel_is_box(type) || b->arrays.type != GRID_NO_TYPE ||
-           kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
-}
-
-/* Queue of a tile's cells before tracing: batches of cells, and cells that are traced one by one. */
+/* Queue of a tile's cells before tracing: vectors of cells of one type, and cells that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
 typedef struct kernel_tile_queue {
+    int layer, part;      /* the last queued cell's; -1: none yet */
+    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
+    kernel_surface_cells pending[KERNEL_LANE_TYPES];
     kernel_batch batch;
     kernel_curved_batch curved_batch;
     int alone_count;
@@ -105,32 +93,72 @@ typedef struct kernel_tile_queue {
 
 static void kernel_tile_queue_begin(kernel_tile_queue *m)
 {
-    kernel_batch_begin(&m->batch);
+    m->layer = m->part = -1;
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
+        m->pending[i].type = kernel_lane_types[i];
+        m->pending[i].count = 0;
+        m->pending[i].layer = m->pending[i].part = -1;
+    }
     kernel_curved_batch_begin(&m->curved_batch);
     m->alone_count = 0;
 }
 
-/* Returns whether the cell is traced in a batch, of tets or of hexes, wedges or pyramids. */
-SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
-                                     const kernel_tile_candidate *candidate)
+/* Makes the current layer and the part those of the cells queued next. */
+SIMD_INLINE void kernel_tile_queue_turn(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
 {
-    const int type = kernel_arrays_type(&b->arrays, candidate->cell);
-    return kernel_is_linear(type) ? b->takes_batches : kernel_is_for_curved_batch(t, b, candidate, type);
+    if (m->layer == t->layer && m->part == part) return;
+    m->layer = t->layer;
+    m->part = part;
+    kernel_arrays_begin(&m->arrays, t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part]);
 }
 
-/* Traces the queued cells that fit no batch, one by one. The batches are traced first, because their cells were found
- * earlier and may hide these. */
+/* Returns whether a cell of the queue's layer and part is queued in a vector of its type; polyhedra are not. In a mesh
+ * of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because their hits
+ * then hide other cells sooner. */
+SIMD_INLINE bool kernel_is_for_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate, int type)
+{
+    if (!m->arrays.has_lanes || kernel_has_own_faces(type)) return false;
+    return kernel_is_linear(type) || kernel_is_box(type) || m->arrays.type != GRID_NO_TYPE ||
+           kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
+}
+
+/* Traces the pending cells of a type. */
+static void kernel_tile_queue_run(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own)
+{
+    const int layer = t->layer;
+    if (!own->count) return;
+    kernel_tile_set_layer(t, own->layer);
+    if (kernel_is_linear(own->type))
+        kernel_batch_run(t, &m->batch, own);
+    else
+        kernel_curved_batch_run(t, &m->curved_batch, own);
+    kernel_tile_set_layer(t, layer);
+}
+
+SIMD_INLINE void kernel_tile_queue_put(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own,
+                                       const kernel_tile_candidate *candidate, int value)
+{
+    if (own->layer != m->layer || own->part != m->part) {
+        kernel_tile_queue_run(t, m, own);
+        own->layer = m->layer;
+        own->part = m->part;
+        own->arrays = m->arrays;
+    }
+    if (own->count == SIMD_WIDTH) kernel_tile_queue_run(t, m, own);
+    kernel_surface_cells_add(t, own, candidate, value);
+}
+
+/* Traces the cells that are queued in no vector. Traces the vectors first, because their cells were found earlier and
+ * may hide these. */
 static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
-    kernel_batch_end(t, &m->batch);
-    kernel_curved_batch_end(t, &m->curved_batch);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
     for (int n = 0; n < m->alone_count; n++) {
         int part;
         const int value = kernel_tile_source(t, m->alone[n].source, &part);
         const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
-        kernel_batch_turn(t, &m->batch, part);
-        if (blocks) kernel_tile_meet(t, &m->batch.arrays, &m->alone[n], part, value, blocks);
+        if (blocks) kernel_tile_meet(t, &m->alone[n], part, value, blocks);
     }
     m->alone_count = 0;
 }
@@ -140,25 +168,21 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
-    kernel_batch_turn(t, &m->batch, part);
-    const int type = kernel_arrays_type(&m->batch.arrays, candidate->cell);
-    if (kernel_is_linear(type) && m->batch.takes_batches) {
-        kernel_batch_add(t, &m->batch, candidate, value);
-    } else if (kernel_is_for_curved_batch(t, &m->batch, candidate, type)) {
-        kernel_curved_batch_turn(t, &m->curved_batch, &m->batch.arrays, part);
-        kernel_curved_batch_wait(t, &m->curved_batch, type, candidate, value);
-    } else {
-        if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
-        m->alone[m->alone_count++] = *candidate;
+    kernel_tile_queue_turn(t, m, part);
+    const int type = kernel_arrays_type(&m->arrays, candidate->cell);
+    if (kernel_is_for_vectors(m, candidate, type)) {
+        kernel_tile_queue_put(t, m, &m->pending[kernel_found_number(type)], candidate, value);
+        return;
     }
+    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
+    m->alone[m->alone_count++] = *candidate;
 }
 
 /* Traces all cells that are still queued. */
 static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     kernel_tile_queue_alone(t, m);
-    kernel_batch_end(t, &m->batch);
-    kernel_curved_batch_end(t, &m->curved_batch);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
 }
 
 /* Per-thread state kept from tile to tile: the tree search, and the queue of cells to trace. */
@@ -201,14 +225,14 @@ static void kernel_pending_sort(kernel_pending *w)
 static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
                                                                kernel_pending *w)
 {
-    kernel_batch *b = &m->batch;
     kernel_pending_sort(w);
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
-        if (!b->count) kernel_batch_turn(t, b, part);
-        if (b->layer == t->layer && b->part == part && kernel_is_for_batch(t, b, w->items[n]))
-            continue; /* batches prefetch their own cells */
+        if (m->layer < 0) kernel_tile_queue_turn(t, m, part);
+        if (m->layer == t->layer && m->part == part &&
+            kernel_is_for_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
+            continue; /* vectors prefetch their own cells */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  w->items[n]->cell);
     }

@@ -9,6 +9,7 @@
 #include "kernel_polyhedron.h"
 #include "kernel_tile.h"
 #include "kernel_traverse.h"
+#include "kernel_tets.h"
 #include "kernel_types.h"
 
 typedef struct chord_state {

@@ -163,7 +163,7 @@ static void contract(const batch *b, kernel_contracted *out, kernel_bounds *boun
     vi lanes;
     kernel_contraction c;
     kernel_sight ray;
-    kernel_map_lanes map;
+    kernel_map map;
     kernel_point at;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);

@@ -135,11 +135,14 @@ static void random_points(double from[3], double to[3])
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
-/* Rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
+/* Rays near the first one, from 1e-7 to 1e-1 off, or anywhere. Bounds are of rays about the depth axis, as a tile's
+ * are: half of the near ones are. */
 static void aim_all(bundle *b, bool is_near)
 {
+    const double lean = is_near && uniform(0, 1) < 0.5 ? pow(10, uniform(-3, -1)) : 1;
     double from[3], to[3];
     random_points(from, to);
+    for (int a = 0; a < 2; a++) to[a] = from[a] + lean * (to[a] - from[a]);
     bundle_aim(b, 0, from, to);
     for (int lane = 1; lane < SIMD_WIDTH; lane++) {
         double p[3], q[3];

@@ -349,17 +349,17 @@ typedef struct count {
     double worst, worst_band; /* residual in bands; band */
 } count;
 
-static double sum_of(const kernel_polynomial *p)
+static double sum_of(const vf c[8])
 {
     double sum = 0;
-    for (int i = 0; i < 8; i++) sum += fabs((double)p->c[i]);
+    for (int i = 0; i < 8; i++) sum += fabs((double)c[i][0]);
     return sum;
 }
 
 static double band_of(const kernel_map *map, const course *c)
 {
-    double band = 7 * 6e-8 * sum_of(&map->field);
-    for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_of(&map->position[a]) + 3 * 1.5 + 0.5);
+    double band = 7 * 6e-8 * sum_of(map->field);
+    for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_of(map->position[a]) + 3 * 1.5 + 0.5);
     return band;
 }
 

@@ -489,7 +489,6 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     const kernel_half_mask rises = is_regular & (kernel_half_mask)(rise * 0.9999 > least);
     const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
     kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
-    /* the linear function L at vertex 0, and half the thickness of the slab |L| <= thickness around the isosurface */
     const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
     e[0] -= level;
     const kernel_half thickness = kernel_half_error(type, e) + 1e-5 + 16 * 6e-8 * size;
@@ -542,19 +541,14 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
     return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
 }
 
-SIMD_INLINE void kernel_curved_spread(const float *of, int count, float out[8][SIMD_WIDTH])
-{
-    for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? of[i] : 0));
-}
-
 /* Computes the bounds of one cell that is traced on its own, with its data in all lanes. */
-static __attribute__((noinline)) void kernel_curved_alone(const kernel_cell *c, const kernel_beam *beam,
-                                                          kernel_curved *out)
+static __attribute__((noinline, unused)) void kernel_curved_alone(const kernel_cell *c, const kernel_beam *beam,
+                                                                  kernel_curved *out)
 {
     kernel_curved_room *room = out->room;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
-    for (int n = 0; n < 4; n++) kernel_curved_spread(numbers[n], c->count, room->at[n]);
-    kernel_curved_spread(c->g, c->count, room->colours);
+    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, room->at[n]);
+    kernel_map_spread(c->g, c->count, room->colours);
     kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])room->at, beam, &room->bounds);
     out->type = c->type;
     out->lane = 0;

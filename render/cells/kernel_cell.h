@@ -130,61 +130,6 @@ SIMD_INLINE float kernel_blur_least(kernel_blur most)
     return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
 }
 
-/* ---- four edges at once: the same operations as for one edge, and so the same bits ---- */
-
-typedef float kernel_four __attribute__((vector_size(16)));
-
-SIMD_INLINE kernel_four kernel_four_load(const float *p)
-{
-    kernel_four v;
-    memcpy(&v, p, sizeof v);
-    return v;
-}
-
-/* Permutes the lanes of a vector, and of all four vectors of a kernel_spots. */
-#define KERNEL_PICKED(v, i, j, k, l) __builtin_shufflevector(v, v, i, j, k, l)
-#define KERNEL_PICK(at, i, j, k, l)                                                                                    \
-    (kernel_spots)                                                                                                     \
-    {                                                                                                                  \
-        KERNEL_PICKED(at[0], i, j, k, l), KERNEL_PICKED(at[1], i, j, k, l), KERNEL_PICKED(at[2], i, j, k, l),          \
-            KERNEL_PICKED(at[3], i, j, k, l)                                                                           \
-    }
-
-/* Four vertices in tile space, with kernel_spot_size() of each. */
-typedef struct kernel_spots {
-    kernel_four x, y, z, size;
-} kernel_spots;
-
-typedef double kernel_doubles __attribute__((vector_size(32)));
-
-SIMD_INLINE kernel_four kernel_four_abs(kernel_four v)
-{
-    typedef int32_t kernel_four_bits __attribute__((vector_size(16)));
-    return (kernel_four)((kernel_four_bits)v & 0x7fffffff);
-}
-
-/* Computes the edge functions of four edges from a to b, with their errors and extents (kernel_blur). */
-SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_spots a, kernel_spots b,
-                                   kernel_line lines[4], kernel_four *errors, kernel_four *extents)
-{
-    const bool flat = f->job->camera.is_orthographic;
-    const kernel_doubles ax = __builtin_convertvector(a.x, kernel_doubles),
-                         ay = __builtin_convertvector(a.y, kernel_doubles);
-    const kernel_doubles bx = __builtin_convertvector(b.x, kernel_doubles),
-                         by = __builtin_convertvector(b.y, kernel_doubles);
-    kernel_doubles da = __builtin_convertvector(a.z, kernel_doubles) + f->depth_shift;
-    kernel_doubles db = __builtin_convertvector(b.z, kernel_doubles) + f->depth_shift;
-    if (flat) da = db = (kernel_doubles){1, 1, 1, 1};
-    const kernel_four c = __builtin_convertvector(ax * by - bx * ay, kernel_four);
-    const kernel_four cu = __builtin_convertvector(db * ay - da * by, kernel_four);
-    const kernel_four cv = __builtin_convertvector(da * bx - db * ax, kernel_four);
-    const kernel_four bound = 6 * 6e-8f * (a.size * b.size);
-    for (int n = 0; n < 4; n++) lines[n] = (kernel_line){c[n], cu[n], cv[n], bound[n]};
-    const kernel_four x = kernel_four_abs(a.x - b.x), y = kernel_four_abs(a.y - b.y), z = kernel_four_abs(a.z - b.z);
-    *errors = 6e-8f * (3 * kernel_four_abs(c) + radius * (4 * kernel_four_abs(cu) + 3 * kernel_four_abs(cv)));
-    *extents = z + 0.25f * (x + y);
-}
-
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
 typedef struct kernel_cell {
@@ -415,32 +360,11 @@ SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile,
     *out_z = (float)(z - tile->depth_shift);
 }
 
-/* Transforms a tet's four vertices into tile space at once, by the operations of kernel_place_in(), so that the bits
- * are the same. */
-SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
-{
-    kernel_doubles d[3], place[3];
-    for (int a = 0; a < 3; a++)
-        d[a] = (kernel_doubles){c->world[0][a], c->world[1][a], c->world[2][a], c->world[3][a]} - f->job->camera.eye[a];
-    for (int a = 0; a < 3; a++)
-        place[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-    const kernel_doubles depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * place[2] : place[2];
-    const kernel_four x = __builtin_convertvector(place[0] - tile->centre_x * depth, kernel_four);
-    const kernel_four y = __builtin_convertvector(place[1] - tile->centre_y * depth, kernel_four);
-    const kernel_four z = __builtin_convertvector(place[2] - tile->depth_shift, kernel_four);
-    memcpy(c->x, &x, sizeof x);
-    memcpy(c->y, &y, sizeof y);
-    memcpy(c->z, &z, sizeof z);
-}
-
 /* Transforms the cell's vertices into tile space. They are not yet in canonical order, and have no edge functions. */
 SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
-    if (kernel_is_linear(c->type))
-        kernel_tet_place(c, f, tile);
-    else
-        for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
     c->has_lines = c->has_normal = false;
 }
@@ -479,36 +403,24 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 /* ---- edge functions of a cell ---- */
 
-/* Returns, per face, the sum over the face's edges. The additions are in the order of kernel_triangle_least(), so that
- * the bits are the same. */
-SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
-{
-    return (__builtin_shufflevector(e[0], e[1], 0, 0, 1, 3) + __builtin_shufflevector(e[0], e[1], 3, 4, 5, 5)) +
-           __builtin_shufflevector(e[0], e[1], 1, 2, 2, 4);
-}
-
 SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    kernel_four at[4], errors[2], extents[2];
-    kernel_line lines[8];
-    float doubt = 0;
-    for (int i = 0; i < 4; i++) at[3][i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
-    at[0] = kernel_four_load(c->x);
-    at[1] = kernel_four_load(c->y);
-    at[2] = kernel_four_load(c->z);
-    /* The first call computes edges 0 to 3, the second edges 4 and 5. */
-    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2), lines, &errors[0],
-                      &extents[0]);
-    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3), lines + 4, &errors[1],
-                      &extents[1]);
+    kernel_blur blur[KERNEL_TET_EDGES];
+    float size[4];
+    for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    c->doubt = 0;
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        c->lines[n] = lines[n];
-        doubt = doubt < lines[n].bound ? lines[n].bound : doubt;
+        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
+        const kernel_spot from = kernel_cell_spot(c, i), to = kernel_cell_spot(c, j);
+        c->lines[n] = kernel_line_between(f, from, to, size[i], size[j]);
+        blur[n] = kernel_line_blur(&c->lines[n], tile->radius, from, to);
+        c->doubt = c->doubt < c->lines[n].bound ? c->lines[n].bound : c->doubt;
     }
-    c->doubt = doubt;
-    const kernel_four error = kernel_tet_face_sums(errors), extent = kernel_tet_face_sums(extents);
-    const kernel_four least = error * extent * (0.5f / KERNEL_WEIGHT_ERROR);
-    memcpy(c->least, &least, sizeof least);
+    for (int n = 0; n < 4; n++) {
+        const kernel_blur *ij = &blur[(int)kernel_tet_face[n][3]], *jk = &blur[(int)kernel_tet_face[n][4]];
+        const kernel_blur *ik = &blur[(int)kernel_tet_face[n][5]];
+        c->least[n] = kernel_least_weight((ij->error + jk->error) + ik->error, (ij->extent + jk->extent) + ik->extent);
+    }
 }
 
 SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)

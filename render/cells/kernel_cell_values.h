@@ -1,5 +1,4 @@
-/* Converts a cell's values to the form that layers need: relative to an isovalue, in the domain of a transfer function,
- * or as colours. Also fetches single cells from arrays of any layout. */
+/* A cell's values as layers need them: beside an isovalue, in the domain of a transfer function, as colours. */
 #ifndef RENDER_KERNEL_CELL_VALUES_H
 #define RENDER_KERNEL_CELL_VALUES_H
 
@@ -7,7 +6,6 @@
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_interest.h"
 #include "kernel_types.h"
@@ -88,25 +86,6 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
     for (int i = 0; i < c->count; i++) {
         c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
         c->is_constant = c->is_constant && c->values[i] == c->values[0];
-    }
-}
-
-/* Fetches a tet with finite values, including its vertices' coordinates; the caller must transform it into tile
- * space. */
-SIMD_INLINE void kernel_arrays_fetch_tet(kernel_cell *c, const kernel_arrays *p, uint32_t index)
-{
-    int32_t own[GRID_MAX_CELL_VERTICES][SIMD_WIDTH];
-    kernel_arrays_cells(p, &index, 1, 4, own, 0);
-    c->index = index;
-    c->type = GRID_TET;
-    c->count = 4;
-    c->is_finite = c->is_placed = true;
-    c->has_lines = c->has_normal = false;
-    for (int i = 0; i < 4; i++) {
-        const int64_t vertex = own[i][0];
-        c->vertices[i] = vertex;
-        c->values[i] = kernel_numbers_one(&p->values, p->is_by_cell ? (int64_t)index : vertex);
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_numbers_one(&p->coordinates[a], vertex);
     }
 }
 

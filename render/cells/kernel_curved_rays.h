@@ -28,73 +28,93 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
     to->count++;
 }
 
-SIMD_INLINE void kernel_curved_side(const kernel_placed_curved *h, const kernel_lane_rays *p, int n,
-                                    kernel_curved_sides *s)
+/* ---- which faces ---- */
+
+SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, int type,
+                                       kernel_projected *out)
 {
-    const vf e = vf_muladd(kernel_take(h->cv[n], p->lane), p->v,
-                           vf_muladd(kernel_take(h->cu[n], p->lane), p->u, kernel_take(h->c[n], p->lane)));
-    s->least = vf_min(vf_abs(e), s->least);
-    s->side[n] = vi_from_bits(e);
+    for (int i = 0; i < grid_type_vertices(type); i++) {
+        const vf z = kernel_take(at[2][i], r->lane);
+        out->x[i] = (kernel_take(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
+        out->y[i] = (kernel_take(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
+    }
 }
 
-SIMD_INLINE void kernel_curved_sides_of(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
-                                        kernel_curved_sides *s)
+/* Returns the bits of an edge function, whose sign is exact, and lowers *least to its absolute value. */
+SIMD_INLINE vi kernel_curved_side(const kernel_projected *s, int a, int b, vf *least)
+{
+    const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
+    *least = vf_min(vf_abs(e), *least);
+    return vi_from_bits(e);
+}
+
+/* Computes the sides of the shape's edges, and of each quad's diagonal from its loop's vertex 0. */
+SIMD_INLINE void kernel_curved_sides_of(const kernel_projected *s, int type, kernel_curved_sides *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    s->least = vf_set(INFINITY);
-    for (int n = 0; n < shape->edge_count; n++) kernel_curved_side(h, p, n, s);
-    for (int face = 0; face < shape->face_count; face++)
-        if (shape->faces[face].count == 4) kernel_curved_side(h, p, shape->edge_count + face, s);
-}
-
-/* Returns the rays that cross exactly one of a quad's two triangles. The quad's diagonal begins at vertex 1 of its loop
- * in lanes in which turn is set, else at vertex 0. */
-SIMD_INLINE vm kernel_halves_once_turned(const vm around[4], vm turn, vm side)
-{
-    vm from[4];
-    for (int i = 0; i < 4; i++) from[i] = vm_or(vm_and(turn, around[(i + 1) & 3]), vm_andnot(around[i], turn));
-    return kernel_halves_once(from, side);
-}
-
-/* Projects the vertices of each ray's cell along the ray. */
-SIMD_INLINE void kernel_curved_project(const kernel_placed_curved *h, const kernel_lane_rays *p, int count, vf x[8],
-                                       vf y[8])
-{
-    for (int i = 0; i < count; i++) {
-        const vf z = kernel_take(h->at[2][i], p->lane);
-        x[i] = (kernel_take(h->at[0][i], p->lane) - p->rays.origin_x) - p->rays.slope_x * z;
-        y[i] = (kernel_take(h->at[1][i], p->lane) - p->rays.origin_y) - p->rays.slope_y * z;
+    out->least = vf_set(INFINITY);
+    for (int n = 0; n < shape->edge_count; n++)
+        out->side[n] = kernel_curved_side(s, shape->edges[n][0], shape->edges[n][1], &out->least);
+    for (int face = 0; face < shape->face_count; face++) {
+        const signed char *loop = shape->faces[face].vertices;
+        if (shape->faces[face].count == 4)
+            out->side[shape->edge_count + face] = kernel_curved_side(s, loop[0], loop[2], &out->least);
     }
+}
+
+/* Returns per ray a mask of the faces whose edge functions all have the same sign: those that the ray crosses. */
+SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    vi faces = vi_set(0);
+    for (int face = 0; face < shape->face_count; face++) {
+        vi around[4];
+        kernel_face_sides(shape, face, sides, around);
+        faces |= kernel_face_bit(kernel_sides_agree(around, shape->faces[face].count), face);
+    }
+    return faces;
+}
+
+/* Returns the rays that cross just one half of a quad, even if it does not look convex; the result does not depend on
+ * which diagonal halves it. Adds the rays that may cross its patch twice to *alone. */
+SIMD_INLINE vm kernel_curved_once(const kernel_projected *s, const kernel_curved_sides *sides,
+                                  const kernel_shape *shape, int face, vm rays, vm *alone)
+{
+    vm side[4];
+    kernel_quad_around(shape, face, sides, side);
+    *alone = vm_or(*alone, kernel_curved_bends(s->x, s->y, shape->faces[face].vertices, rays, side));
+    return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
+}
+
+/* Finds the two faces that each ray crosses once. Any other ray is marked to be traced in its cell alone (out->alone).
+ * at: the cells' vertices, per lane. dents: per ray, bits of the quads that may not look convex; NULL: there are none.
+ */
+SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *dents,
+                                    vm rays, kernel_curved_crossed *out, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    kernel_projected seen;
+    kernel_curved_sides sides;
+    kernel_curved_project(at, r, type, &seen);
+    kernel_curved_sides_of(&seen, type, &sides);
+    vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
+    vi faces = kernel_curved_around(&sides, type);
+    for (int face = 0; dents && face < shape->face_count; face++) {
+        if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*dents << (31 - face))))) continue;
+        const vm once = kernel_curved_once(&seen, &sides, shape, face, rays, &alone);
+        faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
+    }
+    kernel_curved_count(faces, rays, alone, out);
 }
 
 SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
                                      kernel_curved_crossed *out)
 {
-    const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_curved_sides sides;
-    vf x[8], y[8];
-    vi faces = vi_set(0);
-    kernel_curved_sides_of(h, p, type, &sides);
-    vm alone = vm_not(vf_lt(kernel_take(h->doubt, p->lane), sides.least));
-    kernel_curved_project(h, p, grid_type_vertices(type), x, y);
-    const vi turned = vi_from_bits(kernel_take((const float *)(const void *)h->turned, p->lane));
-    for (int face = 0; face < shape->face_count; face++) {
-        vi once;
-        if (shape->faces[face].count == 3) {
-            vi around[4];
-            kernel_face_sides(shape, face, &sides, around);
-            once = kernel_sides_agree(around, 3);
-        } else {
-            const vm turn = vm_sign(turned << (31 - face)), diagonal = vm_sign(sides.side[shape->edge_count + face]);
-            vm side[4];
-            kernel_quad_around(shape, face, &sides, side);
-            once = vi_select(kernel_halves_once_turned(side, turn, diagonal), vi_set(-1), vi_set(0));
-            alone = vm_or(alone, kernel_curved_bends(x, y, shape->faces[face].vertices, p->active, side));
-        }
-        faces |= kernel_face_bit(once, face);
-    }
-    kernel_curved_count(faces, p->active, alone, out);
+    const vi all = vi_set((1 << KERNEL_CURVED_FACES) - 1);
+    kernel_curved_find((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, out, type);
 }
+
+/* ---- where ---- */
 
 /* The corners of a quad, another one for each ray: vertex numbers in the cell, and field values. */
 typedef struct kernel_curved_quad {
@@ -141,21 +161,32 @@ typedef struct kernel_curved_triangle {
     vf e[3];
 } kernel_curved_triangle;
 
-/* Computes the edge functions of the rays in `weak` again, from projected vertices. */
-static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
-                                                                        const kernel_lane_rays *p, vm weak,
-                                                                        kernel_curved_triangle *own)
+/* Returns the rays on which the triangle's weights are not good enough. number: the triangle's, per ray. */
+SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_placed_curved *h, vi lane, vm rays, vi number,
+                                           const kernel_curved_triangle *own)
 {
-    vf x[3], y[3];
+    const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
+    return vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
+}
+
+/* Computes edge functions in doubt, and those of weak weights, again from projected vertices. */
+static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
+                                                                        const kernel_lane_rays *p, vm rays, vi number,
+                                                                        const vm doubt[3], kernel_curved_triangle *own)
+{
+    vf x[3], y[3], e[3];
     for (int i = 0; i < 3; i++) {
         const vi at = own->corner[i] * SIMD_WIDTH + p->lane;
         const vf z = vf_gather(h->at[2][0], at);
         x[i] = (vf_gather(h->at[0][0], at) - p->rays.origin_x) - p->rays.slope_x * z;
         y[i] = (vf_gather(h->at[1][0], at) - p->rays.origin_y) - p->rays.slope_y * z;
     }
-    own->e[0] = vf_select(weak, kernel_edge_between(x[0], y[0], x[1], y[1]), own->e[0]);
-    own->e[1] = vf_select(weak, kernel_edge_between(x[1], y[1], x[2], y[2]), own->e[1]);
-    own->e[2] = vf_select(weak, kernel_edge_between(x[0], y[0], x[2], y[2]), own->e[2]);
+    e[0] = kernel_edge_between(x[0], y[0], x[1], y[1]);
+    e[1] = kernel_edge_between(x[1], y[1], x[2], y[2]);
+    e[2] = kernel_edge_between(x[0], y[0], x[2], y[2]);
+    for (int i = 0; i < 3; i++) own->e[i] = vf_select(doubt[i], e[i], own->e[i]);
+    const vm weak = kernel_curved_triangle_weak(h, p->lane, rays, number, own);
+    for (int i = 0; i < 3; i++) own->e[i] = vf_select(weak, e[i], own->e[i]);
 }
 
 /* Gathers the corners and edge functions of the triangle `face` for the given rays. Other lanes get valid but
@@ -166,15 +197,17 @@ SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, cons
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
     const vi word = kernel_face_word(h, p->lane, face);
+    vm doubt[3], any = vm_none();
     for (int i = 0; i < 3; i++) own->corner[i] = word >> (4 * i) & 7;
     for (int i = 0; i < 3; i++) {
         const kernel_triangle_lines *lines = &h->triangles[0];
         own->e[i] = vf_muladd(vf_gather(lines->cv[i], at), p->v,
                               vf_muladd(vf_gather(lines->cu[i], at), p->u, vf_gather(lines->c[i], at)));
+        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(own->e[i])));
+        any = vm_or(any, doubt[i]);
     }
-    const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
-    const vm weak = vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + p->lane)));
-    if (__builtin_expect(vm_any(weak), 0)) kernel_curved_triangle_mend(h, p, weak, own);
+    any = vm_or(any, kernel_curved_triangle_weak(h, p->lane, rays, number, own));
+    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_mend(h, p, rays, number, doubt, own);
 }
 
 /* Returns the mean of the corners' values v, weighted by the edge functions. */

@@ -14,6 +14,7 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_shapes.h"
+#include "kernel_tets.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "simd.h"

@@ -25,20 +25,6 @@ enum { KERNEL_MAP_STEPS = 10 };
  * curvature: the next step would be below float32's resolution for all but the most warped cells. */
 #define KERNEL_MAP_TOLERANCE 5e-5f
 
-typedef struct kernel_polynomial {
-    float c[8];
-} kernel_polynomial;
-
-/* The polynomials of a cell's map and field. Positions are relative to vertex 0 in tile space, so that they are of the
- * cell's size. */
-typedef struct kernel_map {
-    bool is_pyramid;
-    float origin[3]; /* vertex 0 in tile space */
-    float tolerance; /* the Newton step that is smaller than this is the last one */
-    kernel_polynomial position[3], field;
-    double exact[4][8]; /* unrounded coefficients of the three positions and of the field */
-} kernel_map;
-
 /* Computes the coefficients c of a hex from the numbers v at its vertices; both may be doubles or vectors of
  * doubles. */
 #define KERNEL_HEX_FIT(c, v)                                                                                           \
@@ -95,28 +81,6 @@ SIMD_INLINE void kernel_half_fit(int type, kernel_half c[8], const kernel_half v
     KERNEL_FIT(type, c, v);
 }
 
-SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, const float *v, float origin,
-                                             double exact[8])
-{
-    double d[GRID_MAX_CELL_VERTICES];
-    for (int i = 0; i < grid_type_vertices(type); i++) d[i] = (double)v[i] - (double)origin;
-    kernel_polynomial_fit(exact, type, d);
-    for (int i = 0; i < 8; i++) p->c[i] = (float)exact[i];
-}
-
-SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
-{
-    m->is_pyramid = kernel_has_apex(c->type);
-    m->origin[0] = c->x[0];
-    m->origin[1] = c->y[0];
-    m->origin[2] = c->z[0];
-    kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0], m->exact[0]);
-    kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0], m->exact[1]);
-    kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0], m->exact[2]);
-    kernel_polynomial_of_floats(&m->field, c->type, c->f, 0, m->exact[3]);
-    m->tolerance = KERNEL_MAP_TOLERANCE;
-}
-
 /* The product m of the map's polynomial, and its derivatives. */
 typedef struct kernel_product {
     vf m, dr, ds, dq;
@@ -155,12 +119,6 @@ SIMD_INLINE void kernel_gradient_of(const vf c[8], bool is_pyramid, const kernel
     out[2] += (r[0] * c[5] + r[1] * c[6]) + m->m * c[7];
 }
 
-/* Copies one polynomial's coefficients to all lanes. */
-SIMD_INLINE void kernel_polynomial_spread(const kernel_polynomial *p, vf out[8])
-{
-    for (int i = 0; i < 8; i++) out[i] = vf_set(p->c[i]);
-}
-
 SIMD_INLINE void kernel_cross(const vf a[3], const vf b[3], vf out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
@@ -191,30 +149,19 @@ SIMD_INLINE void kernel_jacobian_of(const vf position[3][8], bool is_pyramid, co
     out->det = kernel_dot(row[0], out->cross[0]);
 }
 
-/* The maps and fields of cells of one type, one cell per lane. */
-typedef struct kernel_map_lanes {
+/* The maps of cells of one type, one per lane. Positions are relative to vertex 0 in tile space, so that they are of
+ * the cell's size. */
+typedef struct kernel_map {
     bool is_pyramid;
-    float tolerance;
-    vf origin[3], position[3][8], field[8];
-    kernel_half exact[2][4][8]; /* unrounded coefficients, by halves of the lanes */
-} kernel_map_lanes;
-
-SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
-{
-    out->is_pyramid = map->is_pyramid;
-    out->tolerance = map->tolerance;
-    for (int a = 0; a < 3; a++) {
-        out->origin[a] = vf_set(map->origin[a]);
-        kernel_polynomial_spread(&map->position[a], out->position[a]);
-    }
-    kernel_polynomial_spread(&map->field, out->field);
-    for (int n = 0; n < 4; n++)
-        for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
-}
+    float tolerance; /* a Newton step smaller than it is the last */
+    vf origin[3];    /* vertex 0 in tile space */
+    vf position[3][8], field[8];
+    kernel_half exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
+} kernel_map;
 
 /* Computes the map of each ray's own cell. at: x, y, z and the field by vertex, in vectors whose lanes are cells; lane:
  * lane of each ray's cell. */
-SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map_lanes *out, int type)
+SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map *out, int type)
 {
     const int count = grid_type_vertices(type);
     out->is_pyramid = kernel_has_apex(type);
@@ -235,9 +182,24 @@ SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kerne
 }
 
 static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][SIMD_WIDTH], vi lane, int type,
-                                                          kernel_map_lanes *out)
+                                                          kernel_map *out)
 {
     KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
+}
+
+/* Writes the numbers of a cell's vertices to all lanes. */
+SIMD_INLINE void kernel_map_spread(const float *numbers, int count, float out[8][SIMD_WIDTH])
+{
+    for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? numbers[i] : 0));
+}
+
+/* Computes the map of one cell, which contains all rays' points. */
+SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
+{
+    const float *const numbers[4] = {c->x, c->y, c->z, c->f};
+    float at[4][8][SIMD_WIDTH];
+    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, at[n]);
+    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])at, vi_set(0), c->type, m);
 }
 
 /* Computes the polynomial of a field in each ray's own cell, from its values at the cells' vertices. */
@@ -265,7 +227,7 @@ SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, con
 }
 
 /* Computes the rays' points at depth t, relative to the map's origin. */
-SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes *map, vf t, vf out[3])
+SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map *map, vf t, vf out[3])
 {
     out[0] = (rays->origin_x + rays->slope_x * t) - map->origin[0];
     out[1] = (rays->origin_y + rays->slope_y * t) - map->origin[1];
@@ -275,7 +237,7 @@ SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes 
 /* Computes the reference coordinates of the point at depth t on each ray in `wanted` by Newton's method, from the guess
  * in r. Returns the rays that did not converge. A ray that has converged is not changed any more, so its result does
  * not depend on the other rays of the packet. */
-SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
+SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map, vm wanted, vf t, vf r[3])
 {
     vf target[3];
     vm open = wanted;
@@ -315,7 +277,7 @@ SIMD_INLINE vf kernel_map_beyond(const vf r[3])
 /* Computes the reference coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method
  * may diverge or find another solution outside the cell; it is then repeated from the middle of the cell. Returns the
  * rays without a solution in or near the cell, whose r must not be used. */
-SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
+SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map *map, vm wanted, vf t, vf r[3])
 {
     const vf most = vf_set(KERNEL_MAP_BEYOND);
     const vm failed = kernel_map_newton(rays, map, wanted, t, r);
@@ -330,7 +292,7 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map_lanes
 
 /* Computes the direction of the field's gradient at the reference coordinates r, in tile space, of any length and of
  * either sign. */
-SIMD_INLINE void kernel_lanes_normal(const kernel_map_lanes *map, const vf r[3], vf out[3])
+SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf out[3])
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
     kernel_jacobian j;
@@ -373,8 +335,8 @@ SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
 
 /* Returns the field at depth t, and computes the reference coordinates from the guess in r. For rays for which the
  * inverse map fails, both are interpolated linearly between the faces, and *failures counts them. */
-SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_interval *i,
-                                  vm wanted, vf t, vf r[3], int64_t *failures)
+SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map, const kernel_interval *i, vm wanted,
+                                  vf t, vf r[3], int64_t *failures)
 {
     const vm failed = kernel_map_invert(rays, map, wanted, t, r);
     const bool has_failed = vm_any(failed);
@@ -393,9 +355,7 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map_lane
 SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t, vf r[3])
 {
     const kernel_rays own = kernel_packet_rays(p);
-    kernel_map_lanes lanes;
-    kernel_map_spread(map, &lanes);
-    return kernel_solve_lanes(&own, &lanes, i, rays, t, r, &p->thread->map_failures);
+    return kernel_solve_lanes(&own, map, i, rays, t, r, &p->thread->map_failures);
 }
 
 SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)

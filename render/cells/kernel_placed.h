@@ -1,7 +1,6 @@
-/* Transforms tets into tile space and computes their edge functions, one tet per lane. The operations are those of
- * kernel_tet_place(), kernel_cell_order() and kernel_tet_lines(), so the results are the same to the bit. Vertices are
- * sorted first, so that all else follows their canonical order. Computations in double are done in two halves of the
- * lanes. */
+/* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_cell_move(), kernel_cell_order()
+ * and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes. Vertices are put in
+ * order first, so that all else comes in order. What is computed in double is computed in two halves. */
 #ifndef RENDER_KERNEL_PLACED_H
 #define RENDER_KERNEL_PLACED_H
 
@@ -23,6 +22,7 @@ typedef struct kernel_placed {
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
+    vi vertex[4];
 } kernel_placed;
 
 /* A vertex of each lane's tet while the vertices are sorted: coordinates and vertex index. */
@@ -54,6 +54,7 @@ SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p
     for (int last = 3; last > 0; last--)
         for (int i = 0; i < last; i++) kernel_ordered_swap(is_narrow, &spots[i], &spots[i + 1]);
     for (int i = 0; i < 4; i++) {
+        out->vertex[i] = spots[i].vertex;
         out->values[i] = kernel_numbers_take(&p->values, spots[i].vertex);
         for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &spots[i].at[a]);
     }
@@ -113,7 +114,7 @@ static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, cons
     kernel_placed_lines(out, f, tile);
 }
 
-/* Copies lane n to a single cell, with all that rays need of a tet in float32. */
+/* Copies the tet in lane n, with all that rays need of a tet in float32. */
 SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_cell *c)
 {
     c->type = GRID_TET;
@@ -131,7 +132,7 @@ SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_c
     c->doubt = placed->doubt[n];
 }
 
-/* Copies lane n's coordinates and values in double to the cell, as kernel_double.h needs them. */
+/* Sets the cell's places and values in double. */
 SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {

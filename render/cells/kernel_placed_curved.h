@@ -1,8 +1,8 @@
-/* Transforms hexes, wedges or pyramids into tile space and computes their edge functions, one cell per lane, all of one
- * type. The operations are those of kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and
- * kernel_curved_lines(), so the results are the same to the bit. Vertices are permuted into their canonical order
- * first, so that all else follows that order. Computations in double are done in two halves of the lanes. Callers pass
- * the type as a constant, so that loops have constant lengths. */
+/* Hexes, wedges or pyramids, one a lane, placed for a tile, with lines for the triangles among their faces: the
+ * operations of kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_curved_lines(), and so the
+ * same bits, for as many cells of one type at once as a vector has lanes. Vertices are turned into the order of
+ * coordinates first, so that all else comes in order. What is computed in double is computed in two halves. A
+ * function's type is a constant where it is called from, so that its loops have known lengths. */
 #ifndef RENDER_KERNEL_PLACED_CURVED_H
 #define RENDER_KERNEL_PLACED_CURVED_H
 
@@ -27,17 +27,12 @@ enum {
 /* The edge functions of a triangle with corners i, j, k in the order of coordinates: of the edges ij, jk and ik, each
  * from the smaller vertex. */
 typedef struct kernel_triangle_lines {
-    float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH];
+    float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH], bound[3][SIMD_WIDTH];
 } kernel_triangle_lines;
 
-/* Cells of one type, one per lane. The direction of an edge function is fixed by the shape: from an edge's first vertex
- * to its second, and for a quad's diagonal from vertex 0 of its loop to 2, or from 1 to 3 in lanes in which the face's
- * bit in `turned` is set. */
+/* Cells of one type in lanes. */
 typedef struct kernel_placed_curved {
     float at[4][8][SIMD_WIDTH]; /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex */
-    float c[KERNEL_MAX_LINES][SIMD_WIDTH], cu[KERNEL_MAX_LINES][SIMD_WIDTH], cv[KERNEL_MAX_LINES][SIMD_WIDTH];
-    float doubt[SIMD_WIDTH];    /* largest error bound of the cell's edge functions */
-    int32_t turned[SIMD_WIDTH]; /* a bit for each face whose diagonal is from vertex 1 to 3 of its loop */
     /* Per face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
      * kernel_triangle_order(). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
@@ -46,7 +41,6 @@ typedef struct kernel_placed_curved {
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     /* The following members are used only by kernel_placed_curved_cell(), which extracts one lane's cell. */
-    float bound[KERNEL_MAX_LINES][SIMD_WIDTH], least_of_all[SIMD_WIDTH];
     kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_placed_curved;
@@ -219,36 +213,8 @@ SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_array
 
 /* ---- edge functions ---- */
 
-/* A vertex in tile space, with its size (kernel_lanes_size()), from which edge functions are computed. */
-typedef struct kernel_lanes_spot {
-    vf at[3], size;
-} kernel_lanes_spot;
-
-/* Maxima over all edge functions: of the error bound that decides whether a sign is certain, and of the error and
- * extent that bound the accuracy of weights. */
-typedef struct kernel_lanes_blur {
-    vf doubt, error, extent;
-} kernel_lanes_blur;
-
-/* Computes edge function number n from its two end vertices. Exchanging the ends changes only signs. The error and
- * extent are computed only for types with triangles. */
-SIMD_INLINE void kernel_placed_line_of(kernel_placed_curved *out, const kernel_frame *f, float radius, int type, int n,
-                                       const kernel_lanes_spot ends[2], kernel_lanes_blur *own)
-{
-    const kernel_lanes_spot *a = &ends[0], *b = &ends[1];
-    vf line[3];
-    kernel_lanes_line(f, a->at, b->at, line);
-    own->doubt = kernel_lanes_doubt(a->size, b->size);
-    vf_store(out->c[n], line[0]);
-    vf_store(out->cu[n], line[1]);
-    vf_store(out->cv[n], line[2]);
-    vf_store(out->bound[n], own->doubt);
-    if (kernel_has_triangles(type)) kernel_lanes_line_blur(line, radius, a->at, b->at, &own->error, &own->extent);
-}
-
-/* Returns a quad's corners in cyclic order from the smallest vertex towards its smaller neighbour, four bits each.
- * odd_lanes: the lanes in which that order begins at vertex 1 or 3 of the loop. */
-SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
+/* Returns the loop's corners from the least on, towards the lesser neighbour, four bits a corner. */
+SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
     /* Lanes in which 2 is smaller than 0, 3 is smaller than 1, and the smallest of all is 1 or 3. */
@@ -264,27 +230,7 @@ SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8]
     const int loops = loop[0] | loop[1] << 4 | loop[2] << 8 | loop[3] << 12;
     vi word = none;
     for (int i = 0; i < 4; i++) word |= (vi_set(loops) >> (((first + i * step) & 3) << 2) & 15) << (4 * i);
-    *odd_lanes = odd;
     return word;
-}
-
-/* Stores a quad's corners in canonical order, and returns the end vertices of its diagonal in ends. */
-SIMD_INLINE void kernel_placed_quad(kernel_placed_curved *out, int type, int face, const vf rank[8],
-                                    const kernel_lanes_spot spots[8], kernel_lanes_spot ends[2])
-{
-    const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
-    vm odd;
-    const vi word = kernel_curved_quad_word(loop, rank, &odd);
-    vi turned;
-    memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
-    memcpy(&turned, out->turned, sizeof turned);
-    turned |= vi_select(odd, vi_set(1 << face), vi_set(0));
-    memcpy(out->turned, &turned, sizeof turned);
-    for (int end = 0; end < 2; end++) {
-        const kernel_lanes_spot *even = &spots[(int)loop[2 * end]], *own = &spots[(int)loop[2 * end + 1]];
-        for (int a = 0; a < 3; a++) ends[end].at[a] = vf_select(odd, own->at[a], even->at[a]);
-        ends[end].size = vf_select(odd, own->size, even->size);
-    }
 }
 
 /* The order of a triangle's corners: first[n] and last[n] are the lanes in which vertex n of the loop is the smallest
@@ -320,80 +266,75 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
 }
 
-/* Stores a triangle's corners in the order of coordinates, its edge functions, and the least sum of weights that is
- * accurate enough. blurs: errors and extents of the cell's edge functions. */
+/* The edges' lines with their bounds, each from the shape's first vertex to its second, and the errors and extents of
+ * kernel_blur. */
+typedef struct kernel_lanes_lines {
+    vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
+} kernel_lanes_lines;
+
+SIMD_INLINE void kernel_lanes_lines_of(const kernel_placed_curved *placed, const kernel_frame *f,
+                                       const kernel_tile *tile, int type, kernel_lanes_lines *out)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    vf at[8][3], size[8];
+    for (int i = 0; i < grid_type_vertices(type); i++) {
+        for (int a = 0; a < 3; a++) at[i][a] = vf_load(placed->at[a][i]);
+        size[i] = kernel_lanes_size(f, tile, at[i]);
+    }
+    for (int n = 0; n < shape->edge_count; n++) {
+        const int i = shape->edges[n][0], j = shape->edges[n][1];
+        kernel_lanes_line(f, at[i], at[j], out->line[n]);
+        kernel_lanes_line_blur(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
+        out->line[n][3] = kernel_lanes_doubt(size[i], size[j]);
+    }
+}
+
+/* Stores a triangle's corners in the order, its edges' lines, and the least sum of weights that is good enough. */
 SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int face, const vf rank[8],
-                                        const kernel_lanes_blur *blurs)
+                                        const kernel_lanes_lines *lines)
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
-    kernel_triangle_lines *lines = &out->triangles[face - kernel_first_triangle(type)];
+    kernel_triangle_lines *own = &out->triangles[face - kernel_first_triangle(type)];
     kernel_lanes_order o;
     vm falls[3];
     vf opposite[3], in_order[3], errors[3], extents[3];
     const vi word = kernel_triangle_word(loop, rank, &o, falls);
     memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
-    float(*const from[3])[SIMD_WIDTH] = {out->c, out->cu, out->cv};
-    float(*const to[3])[SIMD_WIDTH] = {lines->c, lines->cu, lines->cv};
-    for (int n = 0; n < 3; n++) {
+    float(*const to[4])[SIMD_WIDTH] = {own->c, own->cu, own->cv, own->bound};
+    for (int n = 0; n < 4; n++) {
         for (int i = 0; i < 3; i++) {
             const int side = (i + 1) % 3;
-            const vf v = vf_load(from[n][(int)sides[side][0]]), turned = -v;
+            const vf v = lines->line[(int)sides[side][0]][n], turned = -v;
             const vm falling = sides[side][1] ? vm_not(falls[side]) : falls[side];
-            opposite[i] = vf_select(falling, turned, v);
+            opposite[i] = n == 3 ? v : vf_select(falling, turned, v);
         }
         kernel_order_sides(&o, opposite, in_order);
         for (int i = 0; i < 3; i++) vf_store(to[n][i], in_order[i]);
     }
-    for (int i = 0; i < 3; i++) opposite[i] = blurs[(int)sides[(i + 1) % 3][0]].error;
+    for (int i = 0; i < 3; i++) opposite[i] = lines->error[(int)sides[(i + 1) % 3][0]];
     kernel_order_sides(&o, opposite, errors);
-    for (int i = 0; i < 3; i++) opposite[i] = blurs[(int)sides[(i + 1) % 3][0]].extent;
+    for (int i = 0; i < 3; i++) opposite[i] = lines->extent[(int)sides[(i + 1) % 3][0]];
     kernel_order_sides(&o, opposite, extents);
     const vf error = (errors[0] + errors[1]) + errors[2], extent = (extents[0] + extents[1]) + extents[2];
     vf_store(out->least[face - kernel_first_triangle(type)], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
 }
 
-SIMD_INLINE void kernel_blur_add(kernel_lanes_blur *most, int type, const kernel_lanes_blur *own)
-{
-    most->doubt = vf_max(own->doubt, most->doubt);
-    if (kernel_is_box(type)) return;
-    most->error = vf_max(own->error, most->error);
-    most->extent = vf_max(own->extent, most->extent);
-}
-
-/* Computes the edge functions of all edges, and of the quads' diagonals from their smallest corners. */
-SIMD_INLINE void kernel_placed_lines_of(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
-                                        int type, const vf rank[8])
+/* Computes the faces' corners, and the triangles' lines. */
+SIMD_INLINE void kernel_placed_faces(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
+                                     int type, const vf rank[8])
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    const vf zero = vf_set(0);
-    kernel_lanes_spot spots[8], ends[2];
-    kernel_lanes_blur most = {zero, zero, zero}, blurs[12], own;
-    for (int i = 0; i < grid_type_vertices(type); i++) {
-        for (int a = 0; a < 3; a++) spots[i].at[a] = vf_load(out->at[a][i]);
-        spots[i].size = kernel_lanes_size(f, tile, spots[i].at);
-    }
-    memset(out->turned, 0, sizeof out->turned);
-    for (int n = 0; n < shape->edge_count; n++) {
-        ends[0] = spots[(int)shape->edges[n][0]];
-        ends[1] = spots[(int)shape->edges[n][1]];
-        kernel_placed_line_of(out, f, tile->radius, type, n, ends, &blurs[n]);
-        kernel_blur_add(&most, type, &blurs[n]);
-    }
+    kernel_lanes_lines lines;
+    if (kernel_has_triangles(type)) kernel_lanes_lines_of(out, f, tile, type, &lines);
     for (int face = 0; face < shape->face_count; face++) {
-        if (shape->faces[face].count == 3) {
-            kernel_placed_triangle(out, type, face, rank, blurs);
+        if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
+            kernel_placed_triangle(out, type, face, rank, &lines);
             continue;
         }
-        kernel_placed_quad(out, type, face, rank, spots, ends);
-        kernel_placed_line_of(out, f, tile->radius, type, shape->edge_count + face, ends, &own);
-        kernel_blur_add(&most, type, &own);
+        const vi word = kernel_curved_quad_word(shape->faces[face].vertices, rank);
+        memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
     }
-    vf_store(out->doubt, most.doubt);
-    /* An upper bound for all triangles: it uses the largest error and extent of any edge function for all three edges
-     * (kernel_blur_least()). */
-    if (kernel_has_triangles(type))
-        vf_store(out->least_of_all, 1.0001f * ((3 * most.error) * (3 * most.extent) * (0.5f / KERNEL_WEIGHT_ERROR)));
 }
 
 /* ---- whole cells ---- */
@@ -419,7 +360,7 @@ SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_ar
     }
     kernel_lanes_relative(values, count, isovalues, relative);
     for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
-    kernel_placed_lines_of(out, f, tile, type, rank);
+    kernel_placed_faces(out, f, tile, type, rank);
     return collapsed;
 }
 
@@ -435,23 +376,14 @@ static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *ou
 
 /* ---- extracting one cell ---- */
 
-SIMD_INLINE void kernel_placed_flip(kernel_line *line)
-{
-    line->c = -line->c;
-    line->cu = -line->cu;
-    line->cv = -line->cv;
-}
-
-/* Copies lane n to a single cell, with all that surfaces need of it. Edge functions are negated if their first vertex
- * is not the one of smaller rank. */
+/* Copies the cell in lane n, without lines. */
 static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_placed_curved *h, int type, int n,
                                                                 kernel_cell *c)
 {
-    const kernel_shape *shape = kernel_cell_shape(type);
     c->type = type;
     c->count = grid_type_vertices(type);
-    c->is_finite = c->is_placed = c->has_lines = true;
-    c->has_normal = false;
+    c->is_finite = c->is_placed = true;
+    c->has_lines = c->has_normal = false;
     for (int i = 0; i < c->count; i++) {
         c->x[i] = h->at[0][i][n];
         c->y[i] = h->at[1][i][n];
@@ -460,15 +392,6 @@ static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_pla
         c->rank[i] = h->rank[i][n];
         for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&h->world[a][i], n);
     }
-    for (int i = 0; i < shape->edge_count + shape->face_count; i++) {
-        const bool is_edge = i < shape->edge_count;
-        const int face = is_edge ? 0 : i - shape->edge_count, turn = h->turned[n] >> face & 1;
-        const signed char *ends = is_edge ? shape->edges[i] : shape->faces[face].vertices + turn;
-        if (!is_edge && shape->faces[face].count == 3) continue;
-        c->lines[i] = (kernel_line){h->c[i][n], h->cu[i][n], h->cv[i][n], h->bound[i][n]};
-        if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_flip(&c->lines[i]);
-    }
-    c->least[0] = kernel_is_box(type) ? (float)INFINITY : h->least_of_all[n];
 }
 
 /* The rays that cross exactly two faces (`two`), with the numbers of these faces; and the rays that must be traced one

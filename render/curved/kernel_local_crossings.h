@@ -10,6 +10,7 @@
 
 #include "grid.h"
 #include "kernel_crossings.h"
+#include "kernel_curved_rays.h"
 #include "kernel_local.h"
 #include "kernel_placed_curved.h"
 #include "kernel_quad.h"
@@ -117,9 +118,9 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
         kernel_lanes_order unused;
-        vm odd, falls[3];
+        vm falls[3];
         const vi word = shape->faces[face].count == 3 ? kernel_triangle_word(loop, lists[4], &unused, falls)
-                                                      : kernel_curved_quad_word(loop, lists[4], &odd);
+                                                      : kernel_curved_quad_word(loop, lists[4]);
         vf_store(out->words[face], vf_from_bits(word));
     }
     if (SIMD_WIDTH < KERNEL_LOCAL_ROW) return;
@@ -130,103 +131,22 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 
 /* ---- rays ---- */
 
-/* The vertices of each ray's cell, projected along the ray into its plane; the ray is at (0, 0). */
-typedef struct kernel_local_seen {
-    vf x[8], y[8];
-} kernel_local_seen;
-
-SIMD_INLINE void kernel_local_see(const kernel_local_faces *f, const kernel_local_rays *rays, int type,
-                                  kernel_local_seen *out)
+static __attribute__((noinline)) void kernel_local_find_dented(const kernel_local_faces *f, const kernel_lane_rays *own,
+                                                               const vi *dents, vm rays, int type,
+                                                               kernel_curved_crossed *out)
 {
-    for (int i = 0; i < grid_type_vertices(type); i++) {
-        const vf z = kernel_take(f->at[2][i], rays->lane);
-        out->x[i] = (kernel_take(f->at[0][i], rays->lane) - rays->origin[0]) - rays->slope[0] * z;
-        out->y[i] = (kernel_take(f->at[1][i], rays->lane) - rays->origin[1]) - rays->slope[1] * z;
-    }
-}
-
-/* Returns the bits of the edge function of vertices a and b; their sign bit is the side on which the ray passes the
- * edge. Lowers *least to the function's absolute value: if that is too small, the sign is uncertain. */
-SIMD_INLINE vi kernel_local_edge(const kernel_local_seen *s, int a, int b, vf *least)
-{
-    const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
-    *least = vf_min(vf_abs(e), *least);
-    return vi_from_bits(e);
-}
-
-SIMD_INLINE void kernel_local_sides_of(const kernel_local_seen *s, int type, kernel_curved_sides *out)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    out->least = vf_set(INFINITY);
-    for (int n = 0; n < shape->edge_count; n++)
-        out->side[n] = kernel_local_edge(s, shape->edges[n][0], shape->edges[n][1], &out->least);
-    for (int face = 0; face < shape->face_count; face++) {
-        const signed char *loop = shape->faces[face].vertices;
-        if (shape->faces[face].count == 4)
-            out->side[shape->edge_count + face] = kernel_local_edge(s, loop[0], loop[2], &out->least);
-    }
-}
-
-/* Returns per ray a mask of the faces whose edge functions all have the same sign: those that the ray crosses. */
-SIMD_INLINE vi kernel_local_faces_around(const kernel_curved_sides *sides, int type)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    vi faces = vi_set(0);
-    for (int face = 0; face < shape->face_count; face++) {
-        vi around[4];
-        kernel_face_sides(shape, face, sides, around);
-        faces |= kernel_face_bit(kernel_sides_agree(around, shape->faces[face].count), face);
-    }
-    return faces;
-}
-
-/* Returns the rays that cross a quad exactly once, even if it does not look convex. Adds the rays that may cross it
- * twice to *alone. */
-SIMD_INLINE vm kernel_local_quad_crossed(const kernel_local_seen *s, const kernel_curved_sides *sides,
-                                         const kernel_shape *shape, int face, vm rays, vm *alone)
-{
-    vm side[4];
-    kernel_quad_around(shape, face, sides, side);
-    *alone = vm_or(*alone, kernel_curved_bends(s->x, s->y, shape->faces[face].vertices, rays, side));
-    return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
-}
-
-/* Finds the faces that the rays cross. dents: per ray, a bit for each quad that may not look convex; NULL if there are
- * none. */
-SIMD_INLINE void kernel_local_find_given(const kernel_local_faces *f, const kernel_local_rays *own, const vi *dents,
-                                         vm rays, kernel_curved_crossed *out, int type)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_local_seen seen;
-    kernel_curved_sides sides;
-    kernel_local_see(f, own, type, &seen);
-    kernel_local_sides_of(&seen, type, &sides);
-    vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
-    vi faces = kernel_local_faces_around(&sides, type);
-    for (int face = 0; dents && face < shape->face_count; face++) {
-        if (!vm_any(vm_and(rays, vm_sign(*dents << (31 - face))))) continue;
-        const vm once = kernel_local_quad_crossed(&seen, &sides, shape, face, rays, &alone);
-        faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
-    }
-    kernel_curved_count(faces, rays, alone, out);
-}
-
-static __attribute__((noinline)) void kernel_local_find_dented(const kernel_local_faces *f,
-                                                               const kernel_local_rays *own, const vi *dents, vm rays,
-                                                               int type, kernel_curved_crossed *out)
-{
-    KERNEL_OF_TYPE(type, kernel_local_find_given, f, own, dents, rays, out);
+    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])f->at, own, dents, rays, out);
 }
 
 /* Finds the two faces that each ray crosses once. All other rays are added to out->alone, to be traced one by one. */
-SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_local_rays *own, vm rays, int type,
+SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_lane_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
     const vi dents = vi_from_bits(kernel_take(f->dents, own->lane));
     if (vm_any(vm_and(rays, vm_sign(-dents))))
         kernel_local_find_dented(f, own, &dents, rays, type, out);
     else
-        kernel_local_find_given(f, own, NULL, rays, out, type);
+        kernel_curved_find((const float(*)[8][SIMD_WIDTH])f->at, own, NULL, rays, out, type);
 }
 
 /* ---- corners ---- */
@@ -282,8 +202,8 @@ SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const ke
     }
 }
 
-SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kernel_local_rays *rays, vm active,
-                                         int type, const vi face[2], kernel_local_corners out[2])
+SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kernel_lane_rays *rays, vm active, int type,
+                                         const vi face[2], kernel_local_corners out[2])
 {
     kernel_local_pair pair;
     if (__builtin_expect(kernel_local_pair_of(f, active, rays->lane, &pair), 1))
@@ -291,9 +211,11 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
     else
         for (int n = 0; n < 2; n++) kernel_local_corners_take(f, NULL, type, rays->lane, face[n], &out[n]);
     for (int n = 0; n < 2; n++)
-        for (int i = 0; i < 4; i++)
-            for (int a = 0; a < 2; a++)
-                out[n].at[i][a] = (out[n].at[i][a] - rays->origin[a]) - rays->slope[a] * out[n].at[i][2];
+        for (int i = 0; i < 4; i++) {
+            vf *at = out[n].at[i];
+            at[0] = (at[0] - rays->rays.origin_x) - rays->rays.slope_x * at[2];
+            at[1] = (at[1] - rays->rays.origin_y) - rays->rays.slope_y * at[2];
+        }
 }
 
 /* Returns a vertex's reference coordinate on an axis, relative to the middle of the cell. */
@@ -370,7 +292,7 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2],
 }
 
 /* Computes entry and exit of the rays that cross two faces; the nearer point comes first. */
-SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_local_rays *rays,
+SIMD_INLINE void kernel_local_cross(const kernel_local_faces *f, const kernel_lane_rays *rays,
                                     const kernel_curved_crossed *crossed, int type, kernel_point out[2])
 {
     const vi face[2] = {crossed->first, crossed->last};

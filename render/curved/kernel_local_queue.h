@@ -1,6 +1,6 @@
-/* Queues of hexes, wedges and pyramids, one queue per cell type, for meshes with arrays of any layout. When a queue is
- * full, a vector of its cells is transformed at once. Samples (kernel_local_samples.h) and segments
- * (kernel_local_segments.h) are computed from these queues. */
+/* Queues of cells of volumes, one per type, for arrays of any layout. When a queue is full, a vector of its cells is
+ * transformed at once. kernel_tile_cells.h uses them for tets, kernel_local_samples.h and kernel_local_segments.h for
+ * hexes, wedges and pyramids. */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -182,10 +182,10 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
 }
 
 /* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
-SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_queue *q, int end, int type)
+SIMD_INLINE void kernel_local_learn(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
 {
     for (; q->known < end; q->known++)
-        kernel_arrays_vertices(&l->arrays, q->cell[q->known], grid_type_vertices(type), q->vertex[0] + q->known,
+        kernel_arrays_vertices(p, q->cell[q->known], grid_type_vertices(type), q->vertex[0] + q->known,
                                KERNEL_LOCAL_ROOM);
 }
 
@@ -194,7 +194,7 @@ SIMD_INLINE void kernel_local_learn(const kernel_local_lanes *l, kernel_local_qu
 SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
-    kernel_local_learn(l, q, count, type);
+    kernel_local_learn(&l->arrays, q, count, type);
     for (int n = count; n < SIMD_WIDTH; n++) {
         q->cell[n] = q->cell[0];
         for (int i = 0; i < vertices; i++) q->vertex[i][n] = q->vertex[i][0];
@@ -218,34 +218,33 @@ SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
 }
 
 /* Appends a cell, whose vertex indices must have been prefetched, to the queue. Returns whether the queue is full. */
-SIMD_INLINE bool kernel_local_push(const kernel_local_lanes *l, kernel_local_queue *q, uint32_t cell, unsigned blocks,
+SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q, uint32_t cell, unsigned blocks,
                                    unsigned box, int type)
 {
     const int n = q->count++;
     q->cell[n] = cell;
     q->blocks[n] = (uint16_t)blocks;
     q->box[n] = (uint16_t)box;
-    kernel_local_learn(l, q, q->count - KERNEL_LOCAL_AHEAD, type);
+    kernel_local_learn(p, q, q->count - KERNEL_LOCAL_AHEAD, type);
     return q->count == KERNEL_LOCAL_ROOM;
 }
 
 /* ---- intervals of rays in cells ---- */
 
 /* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell's slabs. */
-SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_local_rays *rays, vf depth,
-                                      vf *near, vf *far)
+SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth, vf *near,
+                                      vf *far)
 {
-    vf d[2];
+    const vf d[2] = {(rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_take(cells->origin[0], rays->lane),
+                     (rays->rays.origin_y + rays->rays.slope_y * depth) - kernel_take(cells->origin[1], rays->lane)};
     *near = vf_set(-INFINITY);
     *far = vf_set(INFINITY);
-    for (int a = 0; a < 2; a++)
-        d[a] = (rays->origin[a] + rays->slope[a] * depth) - kernel_take(cells->origin[a], rays->lane);
     for (int i = 0; i < 3; i++) {
         vf row[3];
         for (int a = 0; a < 3; a++) row[a] = kernel_take(cells->inverse[i][a], rays->lane);
         const vf offset = kernel_take(cells->offset[i], rays->lane);
         const vf at = vf_muladd(row[0], d[0], vf_muladd(row[1], d[1], offset));
-        const vf inverse = 1.0f / vf_muladd(row[0], rays->slope[0], vf_muladd(row[1], rays->slope[1], row[2]));
+        const vf inverse = 1.0f / vf_muladd(row[0], rays->rays.slope_x, vf_muladd(row[1], rays->rays.slope_y, row[2]));
         const vf low = (kernel_take(cells->low[i], rays->lane) - at) * inverse;
         const vf high = (kernel_take(cells->high[i], rays->lane) - at) * inverse;
         /* A ray parallel to a slab may give NaN here; max() and min() then keep the bounds of the other slabs. */

@@ -284,24 +284,6 @@ SIMD_INLINE vi kernel_batch_at(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
-/* A vector of rays in tile space. lane: the lane that holds the ray's cell; at: position of its pixel among the
- * packets. */
-typedef struct kernel_local_rays {
-    vi lane, at;
-    vf origin[2], slope[2];
-} kernel_local_rays;
-
-SIMD_INLINE void kernel_local_rays_of(kernel_local_rays *rays, const kernel_tile *tile, vi pixel, vi lane)
-{
-    const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
-    rays->lane = lane & (SIMD_WIDTH - 1);
-    rays->at = kernel_batch_at(column, row);
-    rays->origin[0] = kernel_batch_of_tile(tile->origin_x, column);
-    rays->origin[1] = kernel_batch_of_tile(tile->origin_y, row);
-    rays->slope[0] = kernel_batch_of_tile(tile->slope_x, column);
-    rays->slope[1] = kernel_batch_of_tile(tile->slope_y, row);
-}
-
 SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
 {
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
@@ -309,28 +291,34 @@ SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
                      at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
-/* A vector of rays from a list, each traced in its own cell. */
+/* Rays of pixels, each with its own cell. */
 typedef struct kernel_lane_rays {
-    vm active;
     vi lane, at; /* lane that holds the ray's cell; position of its pixel among the tile's packets */
     kernel_rays rays;
+    /* for rays of a list */
+    vm active;
     vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
     vf far;  /* nearest hit so far; set only when surfaces are traced */
 } kernel_lane_rays;
+
+/* Computes the rays of the tile's pixels, each with the lane of its cell. */
+SIMD_INLINE void kernel_lane_rays_of(kernel_lane_rays *out, const kernel_tile *tile, vi pixel, vi lane)
+{
+    const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
+    out->lane = lane & (SIMD_WIDTH - 1);
+    out->at = kernel_batch_at(column, row);
+    out->rays = (kernel_rays){kernel_batch_of_tile(tile->origin_x, column), kernel_batch_of_tile(tile->origin_y, row),
+                              kernel_batch_of_tile(tile->slope_x, column), kernel_batch_of_tile(tile->slope_y, row)};
+}
 
 /* Loads up to SIMD_WIDTH rays of the list, from ray `first` on; missing rays are inactive. */
 SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile_trace *t,
                                         const kernel_pixel_list *rays, int first)
 {
-    const kernel_tile *tile = &t->tile;
     const bool flat = t->frame->job->camera.is_orthographic;
     const int left = rays->count - first;
-    const vi pixel = kernel_bytes(rays->pixel + first), column = pixel & (KERNEL_TILE - 1), row = pixel >> 4;
     out->active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    out->lane = kernel_bytes(rays->lane + first) & (SIMD_WIDTH - 1);
-    out->at = kernel_batch_at(column & (KERNEL_TILE - 1), row & (KERNEL_TILE - 1));
-    out->rays = (kernel_rays){kernel_batch_of_tile(tile->origin_x, column), kernel_batch_of_tile(tile->origin_y, row),
-                              kernel_batch_of_tile(tile->slope_x, column), kernel_batch_of_tile(tile->slope_y, row)};
+    kernel_lane_rays_of(out, &t->tile, kernel_bytes(rays->pixel + first), kernel_bytes(rays->lane + first));
     out->u = flat ? out->rays.origin_x : out->rays.slope_x;
     out->v = flat ? out->rays.origin_y : out->rays.slope_y;
 }

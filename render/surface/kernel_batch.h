@@ -13,14 +13,15 @@
 #include <string.h>
 
 #include "kernel_accept.h"
-#include "kernel_arrays.h"
 #include "kernel_cell.h"
+#include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
 #include "kernel_placed.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
-#include "kernel_tet_rays.h"
+#include "kernel_surface_cells.h"
+#include "kernel_tets.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -34,30 +35,15 @@ enum {
 _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
 
 typedef struct kernel_batch {
-    int count, layer, part; /* layer and part of the batch's cells; -1 if no cell was added yet */
-    kernel_arrays arrays;   /* arrays of the layer's field on the mesh part */
-    bool takes_batches;     /* whether tets of this layer and part may be traced in batches */
-    bool is_of_faces;       /* copy of the layer's is_of_faces */
-    /* The batch's cells, one per lane: */
-    uint32_t cell[SIMD_WIDTH];
-    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
-    float near[SIMD_WIDTH];
-    int value[SIMD_WIDTH];
-    int32_t vertex[4][SIMD_WIDTH];
-    double isovalue[SIMD_WIDTH];
-    kernel_placed tets; /* transformed cells; f is the field minus the isovalue, scaled */
+    const kernel_surface_cells *own; /* the cells being traced */
+    kernel_placed tets;              /* transformed cells; f is the field minus the isovalue, scaled */
+    bool is_of_faces;                /* copy of the layer's is_of_faces */
     bool has_normals;
     vf normal[3];
     kernel_pixel_list rays; /* list of rays to be traced */
 } kernel_batch;
 
 /* ---- lanes are cells ---- */
-
-static void kernel_batch_begin(kernel_batch *b)
-{
-    b->count = 0;
-    b->layer = b->part = -1;
-}
 
 /* Computes the gradients in all cells of the batch, by the operations of kernel_tet_normal(), when one of them is hit
  * for the first time. */
@@ -89,14 +75,19 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 
 /* ---- a cell of the batch that is traced by blocks ---- */
 
-/* Copies lane n to a single cell. World coordinates are not copied, because the normal is already known. */
-static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, int n, kernel_cell *c)
+static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace *t, const kernel_batch *b, int n,
+                                                        kernel_cell *c)
 {
+    const render_surface_layer *layer = t->surface->layer;
     kernel_placed_cell(&b->tets, n, c);
-    c->part = b->part;
-    c->index = b->cell[n];
+    c->part = b->own->part;
+    c->index = b->own->cell[n];
     c->has_normal = true;
     for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
+    if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_placed_exactly(&b->tets, n, c);
+    if (!layer->colour_map && !layer->lines) return;
+    for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
+    if (layer->colour_map) kernel_cell_colours(c, t->surface, b->own->part);
 }
 
 /* ---- lanes are pixels ---- */
@@ -127,10 +118,10 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi pl
     if (!b->has_normals) kernel_batch_normals(b, t->frame);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
-        const float *colour = t->surface->layer->colours + 3 * b->value[n];
-        const kernel_ray_hit one = {.part = b->part,
-                                    .value = b->value[n],
-                                    .cell = b->cell[n],
+        const float *colour = t->surface->layer->colours + 3 * b->own->value[n];
+        const kernel_ray_hit one = {.part = b->own->part,
+                                    .value = b->own->value[n],
+                                    .cell = b->own->cell[n],
                                     .depth = depth[i],
                                     .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]},
                                     .colour = {colour[0], colour[1], colour[2]}};
@@ -148,7 +139,7 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         vf depth;
         kernel_lane_rays_begin(&r, t, &b->rays, first);
         r.far = kernel_batch_far(t, r.at);
-        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->near), r.lane), r.far));
+        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->own->near), r.lane), r.far));
         if (!vm_any(r.active)) continue;
         const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
         if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
@@ -159,69 +150,34 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 
 /* ---- batches ---- */
 
-static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b)
+static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b, kernel_surface_cells *own)
 {
-    kernel_place_tets(&b->tets, &b->arrays, t->frame, &t->tile, b->vertex, b->count);
-    for (int n = b->count; n < SIMD_WIDTH; n++) b->isovalue[n] = b->isovalue[0];
-    kernel_lanes_relative(b->tets.values, 4, b->isovalue, b->tets.f);
+    const render_surface_layer *layer = t->surface->layer;
+    /* Layers that need more of a hit than its depth and normal are traced cell by cell. */
+    const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map && !layer->lines;
+    const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
+    kernel_surface_cells_close(own);
+    kernel_place_tets(&b->tets, &own->arrays, t->frame, &t->tile, own->vertex, own->count);
+    kernel_lanes_relative(b->tets.values, 4, own->isovalue, b->tets.f);
+    b->own = own;
+    b->is_of_faces = layer->is_of_faces;
     b->has_normals = false;
     b->rays.count = 0;
-    for (int n = 0; n < b->count; n++) {
-        const unsigned blocks = b->blocks[n] & kernel_blocks_beyond(t, b->near[n]);
+    for (int n = 0; n < own->count; n++) {
+        unsigned blocks = own->blocks[n] & kernel_blocks_beyond(t, own->near[n]);
         if (!blocks) continue;
-        if (kernel_box_pixels(b->box[n]) <= KERNEL_BATCH_PIXELS) {
-            kernel_pixel_list_add_box(&b->rays, b->box[n], n);
+        if (kernel_box_pixels(own->box[n]) <= most) {
+            kernel_pixel_list_add_box(&b->rays, own->box[n], n);
+            for (blocks = own->blocks[n] & ~t->begun; blocks; blocks &= blocks - 1)
+                kernel_block_begin(t, __builtin_ctz(blocks));
             continue;
         }
         if (!b->has_normals) kernel_batch_normals(b, t->frame);
-        kernel_batch_cell(b, n, t->cell);
-        kernel_blocks_meet(t, blocks, b->part, t->cell->index, t->cell, b->value[n]);
+        kernel_batch_cell(t, b, n, t->cell);
+        kernel_blocks_meet(t, blocks, own->part, t->cell->index, t->cell, own->value[n]);
     }
     kernel_batch_trace(t, b);
-    b->count = 0;
-}
-
-/* Starts a new part and layer: traces the pending cells of the last one first. */
-SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int part)
-{
-    const int layer = t->layer;
-    if (b->layer == layer && b->part == part) return;
-    if (b->count) {
-        kernel_tile_set_layer(t, b->layer);
-        kernel_batch_run(t, b);
-        kernel_tile_set_layer(t, layer);
-    }
-    b->layer = layer;
-    b->part = part;
-    b->is_of_faces = t->surface->layer->is_of_faces;
-    kernel_arrays_begin(&b->arrays, t->frame->job->parts[part].cells,
-                        &t->frame->surfaces[layer].layer->field.fields[part]);
-    b->takes_batches = b->arrays.has_lanes && !t->surface->layer->colour_map && !t->surface->layer->lines &&
-                       kernel_tile_layer_batches(t);
-}
-
-/* Traces the batch's remaining cells. */
-SIMD_INLINE void kernel_batch_end(kernel_tile_trace *t, kernel_batch *b)
-{
-    if (!b->count) return;
-    kernel_tile_set_layer(t, b->layer);
-    kernel_batch_run(t, b);
-}
-
-SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const kernel_tile_candidate *candidate,
-                                  int value)
-{
-    if (b->count == SIMD_WIDTH) kernel_batch_run(t, b);
-    const int n = b->count++;
-    b->cell[n] = candidate->cell;
-    b->blocks[n] = candidate->blocks;
-    b->box[n] = candidate->box;
-    b->near[n] = candidate->near;
-    b->value[n] = value;
-    b->isovalue[n] = t->surface->layer->values[value];
-    kernel_arrays_cells(&b->arrays, &candidate->cell, 1, 4, b->vertex, n);
-    for (unsigned blocks = candidate->blocks & ~t->begun; blocks; blocks &= blocks - 1)
-        kernel_block_begin(t, __builtin_ctz(blocks));
+    own->count = 0;
 }
 
 #endif

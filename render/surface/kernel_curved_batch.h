@@ -21,7 +21,6 @@
 
 #include "grid.h"
 #include "kernel_accept.h"
-#include "kernel_arrays.h"
 #include "kernel_bounds.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
@@ -34,6 +33,7 @@
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
+#include "kernel_surface_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -43,22 +43,8 @@
 /* maximum number of pixels in the box of a wedge or pyramid that is traced in a batch, if the mesh has mixed types */
 enum { KERNEL_CURVED_PIXELS = 64 };
 
-/* Cells of one type that are queued to be transformed together. */
-typedef struct kernel_curved_batch_pending {
-    int type, count;
-    uint32_t cell[SIMD_WIDTH];
-    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
-    double isovalue[SIMD_WIDTH];
-    int32_t vertex[8][SIMD_WIDTH];
-    int value[SIMD_WIDTH];
-    float near[SIMD_WIDTH];
-} kernel_curved_batch_pending;
-
 typedef struct kernel_curved_batch {
-    int layer, part;                        /* layer and part of the batch's cells; -1 if no cell was added yet */
-    kernel_arrays arrays;                   /* arrays of the layer's field on the mesh part */
-    kernel_curved_batch_pending pending[3]; /* queues of cells by type (kernel_shape_number()) */
-    kernel_curved_batch_pending *own;       /* the queue whose cells are being traced */
+    const kernel_surface_cells *own; /* the cells being traced */
     kernel_placed_curved placed;
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];
@@ -75,11 +61,6 @@ typedef struct kernel_curved_batch {
 static void kernel_curved_batch_begin(kernel_curved_batch *h)
 {
     h->rays.count = 0;
-    h->layer = h->part = -1;
-    for (int n = 0; n < 3; n++) {
-        h->pending[n].type = kernel_curved_types[n];
-        h->pending[n].count = 0;
-    }
     memset(h->colours, 0, sizeof h->colours);
     memset(h->lines, 0, sizeof h->lines);
 }
@@ -94,13 +75,14 @@ SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h
 
 /* ---- single cells of the batch ---- */
 
-/* Copies the cell in lane n to cells[n], unless that has been done. */
-SIMD_INLINE void kernel_curved_ready(kernel_curved_batch *h, int n)
+/* Copies the cell in lane n to h->cells[n], with lines, unless that is done. */
+SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_batch *h, int n)
 {
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
     kernel_placed_curved_cell(&h->placed, h->own->type, n, &h->cells[n]);
-    h->cells[n].part = h->part;
+    kernel_cell_lines(&h->cells[n], t->frame, &t->tile);
+    h->cells[n].part = h->own->part;
     h->cells[n].index = h->own->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
     for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->placed.vertex[i][n];
@@ -133,7 +115,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
                                       .is_opaque = true,
                                       .is_contracted = true};
         p->is_nearer = false;
-        kernel_curved_ready(h, n);
+        kernel_curved_ready(t, h, n);
         curved.lane = n;
         kernel_cell_surface(p, &state, &h->cells[n], &curved, h->own->value[n], vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
@@ -284,7 +266,7 @@ static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_til
 SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
                                            const vf r[3], kernel_along *out, int type)
 {
-    kernel_map_lanes map;
+    kernel_map map;
     vf c[8];
     kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, lane, &map, type);
     kernel_maps_polynomial((const float(*)[SIMD_WIDTH])h->lines, lane, c, type);
@@ -296,7 +278,7 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
                                                                         kernel_curved_batch *h)
 {
     const kernel_surface *s = t->surface;
-    const grid_field *field = &s->layer->colour_field.fields[h->part];
+    const grid_field *field = &s->layer->colour_field.fields[h->own->part];
     const int count = grid_type_vertices(h->own->type);
     for (int n = 0; n < h->own->count; n++)
         for (int i = 0; i < count; i++) {
@@ -316,7 +298,7 @@ typedef struct kernel_curved_batch_places {
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
                                                                       kernel_curved_batch *h)
 {
-    const grid_field *field = &t->surface->layer->lines->field.fields[h->part];
+    const grid_field *field = &t->surface->layer->lines->field.fields[h->own->part];
     for (int n = 0; n < h->own->count; n++)
         for (int i = 0; i < grid_type_vertices(h->own->type); i++)
             h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->placed.vertex[i][n]);
@@ -359,7 +341,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), value = h->own->value[rays->lane[first + i]];
         const float *plain = layer->colours + 3 * value;
-        const kernel_ray_hit one = {.part = h->part,
+        const kernel_ray_hit one = {.part = h->own->part,
                                     .value = value,
                                     .cell = h->own->cell[rays->lane[first + i]],
                                     .depth = places->t[i],
@@ -373,7 +355,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
 
 /* Computes the field's gradients at the reference coordinates r, in camera axes. With RENDER_VERTEX it stores r
  * instead, from which kernel_vertex_normals() later computes normals. */
-SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
+SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map *map, const vf r[3],
                                             vf normal[3])
 {
     if (t->surface->layer->normal == RENDER_VERTEX) {
@@ -386,8 +368,8 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
 
 /* Accepts hits of the rays in `found` from index n on. Returns the mask of blocks with a nearer hit. */
 SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curved_batch *h, int n,
-                                              const kernel_lane_rays *p, const kernel_map_lanes *map,
-                                              const kernel_point *at, vm hit)
+                                              const kernel_lane_rays *p, const kernel_map *map, const kernel_point *at,
+                                              vm hit)
 {
     kernel_curved_batch_places places;
     places.t = at->t;
@@ -403,7 +385,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_map_lanes map;
+        kernel_map map;
         kernel_point ends[2], at;
         kernel_lane_rays_begin(&p, t, &h->found, n);
         p.far = kernel_batch_far(t, p.at);
@@ -434,7 +416,7 @@ SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_c
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_map_lanes map;
+        kernel_map map;
         kernel_point at;
         kernel_lane_rays_begin(&p, t, &h->found, n);
         p.far = kernel_batch_far(t, p.at);
@@ -522,17 +504,17 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* Transforms the queued cells, and lists their rays. Cells with collapsed faces are traced block by block. */
-static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trace *t, kernel_curved_batch *h)
+/* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes go to packets one by one.
+ */
+static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                kernel_surface_cells *own)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
-    kernel_curved_batch_pending *own = h->own;
-    for (int n = own->count; n < SIMD_WIDTH; n++) {
-        for (int i = 0; i < 8; i++) own->vertex[i][n] = own->vertex[i][0];
-        own->isovalue[n] = own->isovalue[0];
-    }
+    const bool by_ray = kernel_tile_layer_batches(t);
+    kernel_surface_cells_close(own);
+    h->own = own;
     const vm collapsed =
-        kernel_place_curved(&h->placed, &h->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
+        kernel_place_curved(&h->placed, &own->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
     kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
@@ -543,69 +525,23 @@ static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trac
     for (int n = 0; n < own->count; n++) {
         const unsigned blocks = own->blocks[n] & t->wanted & kernel_blocks_beyond(t, own->near[n]);
         if (!blocks) continue;
-        if (!(vm_bits(collapsed) >> n & 1)) {
+        if (by_ray && !(vm_bits(collapsed) >> n & 1)) {
             kernel_curved_batch_rays_of(t, h, n, own->box[n], own->blocks[n]);
             continue;
         }
-        kernel_curved_ready(h, n);
+        kernel_curved_ready(t, h, n);
         cells.lane = n;
-        kernel_blocks_meet(t, blocks, h->part, own->cell[n], &h->cells[n], own->value[n]);
+        kernel_blocks_meet(t, blocks, h->own->part, own->cell[n], &h->cells[n], own->value[n]);
     }
     t->curved = alone;
 }
 
 static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                              kernel_curved_batch_pending *own)
+                                                              kernel_surface_cells *own)
 {
-    h->own = own;
-    kernel_curved_batch_place(t, h);
+    kernel_curved_batch_place(t, h, own);
     if (h->rays.count) kernel_curved_batch_trace(t, h);
     own->count = 0;
-}
-
-/* Traces the cells of all queues. */
-SIMD_INLINE void kernel_curved_batch_end(kernel_tile_trace *t, kernel_curved_batch *h)
-{
-    const int layer = t->layer;
-    for (int n = 0; n < 3; n++) {
-        if (!h->pending[n].count) continue;
-        kernel_tile_set_layer(t, h->layer);
-        kernel_curved_batch_run(t, h, &h->pending[n]);
-        kernel_tile_set_layer(t, layer);
-    }
-}
-
-/* Starts a new part and layer: traces the queued cells of the last one first. */
-SIMD_INLINE void kernel_curved_batch_turn(kernel_tile_trace *t, kernel_curved_batch *h, const kernel_arrays *arrays,
-                                          int part)
-{
-    if (h->layer == t->layer && h->part == part) return;
-    kernel_curved_batch_end(t, h);
-    h->layer = t->layer;
-    h->part = part;
-    h->arrays = *arrays;
-}
-
-/* Returns whether hexes, wedges and pyramids of the current layer can be traced in batches. */
-SIMD_INLINE bool kernel_curved_batch_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
-{
-    return arrays->has_lanes && kernel_tile_layer_batches(t);
-}
-
-/* Queues a cell of the given type. A queue that is full is traced first. */
-SIMD_INLINE void kernel_curved_batch_wait(kernel_tile_trace *t, kernel_curved_batch *h, int type,
-                                          const kernel_tile_candidate *candidate, int value)
-{
-    kernel_curved_batch_pending *own = &h->pending[kernel_shape_number(type)];
-    if (own->count == SIMD_WIDTH) kernel_curved_batch_run(t, h, own);
-    const int n = own->count++;
-    own->cell[n] = candidate->cell;
-    own->blocks[n] = candidate->blocks;
-    own->box[n] = candidate->box;
-    own->near[n] = candidate->near;
-    own->value[n] = value;
-    own->isovalue[n] = t->surface->layer->values[value];
-    kernel_arrays_cells(&h->arrays, &candidate->cell, 1, grid_type_vertices(type), own->vertex, n);
 }
 
 #endif

@@ -10,6 +10,7 @@
 #include "kernel_crossings.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_traverse.h"
 #include "kernel_types.h"

@@ -91,7 +91,7 @@ static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, c
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r, each lane in
  * its own cell. `line` is the polynomial of the contour lines' field. */
-SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map_lanes *map, const vf line[8], const vf r[3],
+SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map *map, const vf line[8], const vf r[3],
                                   kernel_along *out)
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
@@ -112,18 +112,16 @@ SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map_lane
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one hex, wedge or
  * pyramid. */
 static __attribute__((noinline)) void kernel_curved_along(const kernel_packet *p, const kernel_surface *s,
-                                                          const kernel_cell *c, const kernel_map_lanes *map,
-                                                          const vf r[3], kernel_along *out)
+                                                          const kernel_cell *c, const kernel_map *map, const vf r[3],
+                                                          kernel_along *out)
 {
     const grid_field *field = &s->layer->lines->field.fields[c->part];
-    kernel_polynomial line;
-    float value[GRID_MAX_CELL_VERTICES];
-    double unused[8];
-    vf spread[8];
-    for (int i = 0; i < c->count; i++) value[i] = (float)kernel_lines_value(s, field, c->vertices[i]);
-    kernel_polynomial_of_floats(&line, c->type, value, 0, unused);
-    kernel_polynomial_spread(&line, spread);
-    kernel_map_along(p->tile, map, spread, r, out);
+    double value[GRID_MAX_CELL_VERTICES], fit[8];
+    vf line[8];
+    for (int i = 0; i < c->count; i++) value[i] = (double)(float)kernel_lines_value(s, field, c->vertices[i]);
+    kernel_polynomial_fit(fit, c->type, value);
+    for (int i = 0; i < 8; i++) line[i] = vf_set((float)fit[i]);
+    kernel_map_along(p->tile, map, line, r, out);
 }
 
 /* The share of each hit's pixel that the nearest line covers, and the index of that line. */

@@ -45,9 +45,8 @@ enum {
     KERNEL_SLAB_ROWS
 };
 
-/* Layout of a hex's record in floats: 8 vertices, each with its value minus the isovalue; then `corners` and `turned`
- * as in kernel_placed_curved. */
-enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_TURNED = 38, KERNEL_CURVED_RECORD_WORDS = 40 };
+/* A hex's record: 8 vertices with their values less the isovalue, corners as in kernel_placed_curved, and no more. */
+enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_WORDS = 40 };
 
 /* A cell, and one of the isovalues that cross it. */
 typedef struct kernel_occluder {

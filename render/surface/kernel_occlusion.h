@@ -19,6 +19,7 @@
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
 #include "kernel_surface.h"
+#include "kernel_tets.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_polyhedra.h"

@@ -80,42 +80,6 @@ SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hex
     for (int i = 0; i < 2; i++) vf_gather_rows(hexes + KERNEL_CURVED_RECORD_QUADS + 4 * i, rays->record, words[i]);
     for (int face = 0; face < KERNEL_CURVED_FACES; face++)
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
-    vf_store((float *)(void *)h->turned, words[1][KERNEL_CURVED_RECORD_TURNED - KERNEL_CURVED_RECORD_QUADS - 4]);
-}
-
-/* Computes the edge function of edge n for the pair's ray. Its sign is exact, because products of float32 are exact in
- * double. */
-SIMD_INLINE void kernel_pairs_line(kernel_placed_curved *h, int n, const vf from[2], const vf to[2])
-{
-    vf c = vf_set(0);
-    for (int half = 0; half < 2; half++)
-        kernel_half_put(&c, half,
-                        kernel_half_of(&from[0], half) * kernel_half_of(&to[1], half) -
-                            kernel_half_of(&to[0], half) * kernel_half_of(&from[1], half));
-    vf_store(h->c[n], c);
-    vf_store(h->cu[n], vf_set(0));
-    vf_store(h->cv[n], vf_set(0));
-}
-
-SIMD_INLINE void kernel_pairs_lines(kernel_placed_curved *h)
-{
-    const vi turned = kernel_load_ints(h->turned);
-    vf at[8][2];
-    for (int i = 0; i < 8; i++)
-        for (int a = 0; a < 2; a++) at[i][a] = vf_load(h->at[a][i]);
-    for (int n = 0; n < KERNEL_CURVED_EDGES; n++)
-        kernel_pairs_line(h, n, at[kernel_shapes[0].edges[n][0]], at[kernel_shapes[0].edges[n][1]]);
-    for (int face = 0; face < KERNEL_CURVED_FACES; face++) {
-        const signed char *loop = kernel_shapes[0].faces[face].vertices;
-        const vm odd = vm_sign(turned << (31 - face));
-        vf from[2], to[2];
-        for (int a = 0; a < 2; a++) {
-            from[a] = vf_select(odd, at[loop[1]][a], at[loop[0]][a]);
-            to[a] = vf_select(odd, at[loop[3]][a], at[loop[2]][a]);
-        }
-        kernel_pairs_line(h, KERNEL_CURVED_EDGES + face, from, to);
-    }
-    vf_store(h->doubt, vf_set(0));
 }
 
 /* The result for each ray-hex pair: the hex blocks the ray, or it is in doubt; in all other pairs the hex does not
@@ -192,7 +156,6 @@ static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o
         kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, &rays);
     }
     kernel_pairs_place(pairs, o->hexes, &rays);
-    kernel_pairs_lines(&pairs->placed);
     const vm active = vm_from_bits((1u << pairs->count) - 1);
     const kernel_pair_verdict verdict = kernel_pairs_judge(pairs, active, vf_load(rays.far));
     for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)

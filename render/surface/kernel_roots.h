@@ -110,7 +110,7 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
 
 /* Judges the piece between two points. side: the sign of the field at `from`, 1 or -1. gap: upper bound of the distance
  * of Y(from) and Y(to) from the ray. */
-SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kernel_limits *b, const kernel_point *from,
+SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_limits *b, const kernel_point *from,
                                         const kernel_point *to, vf gap, vf side)
 {
     const bool is_pyramid = map->is_pyramid;
@@ -151,7 +151,7 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
  * size, which are processed in order. */
 typedef struct kernel_search {
     kernel_rays rays;
-    kernel_map_lanes map; /* set only if the ends of the interval do not decide all rays; the same holds for `limits` */
+    kernel_map map; /* set only if the ends of the interval do not decide all rays; the same holds for `limits` */
     kernel_limits limits;
     const kernel_interval *interval;
     int64_t *failures; /* counter of failed inversions of the map */
@@ -180,7 +180,7 @@ SIMD_INLINE void kernel_search_face(const kernel_search *s, vm rays, vf face, ke
  * face's crossing. */
 SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
 {
-    const kernel_map_lanes *map = &s->map;
+    const kernel_map *map = &s->map;
     const kernel_product m = kernel_product_at(map->is_pyramid, at->r);
     vf target[3], off[3], sum = vf_set(0);
     kernel_rays_at(&s->rays, map, at->t, target);
@@ -266,9 +266,9 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 }
 
 /* Begins a search for rays, each in its own cell. Returns false if no ray has a root. */
-static __attribute__((noinline)) bool kernel_search_in(kernel_search *s, const kernel_curved *c,
-                                                       const kernel_rays *rays, vi lane, const kernel_interval *i,
-                                                       vm wanted, int64_t *failures)
+static __attribute__((noinline, unused)) bool kernel_search_in(kernel_search *s, const kernel_curved *c,
+                                                               const kernel_rays *rays, vi lane,
+                                                               const kernel_interval *i, vm wanted, int64_t *failures)
 {
     s->rays = *rays;
     s->interval = i;
@@ -350,7 +350,7 @@ SIMD_INLINE void kernel_search_end(kernel_search *s)
 }
 
 /* Continues the search with the next roots. Returns false if there are none. */
-static __attribute__((noinline)) bool kernel_search_on(kernel_search *s)
+static __attribute__((noinline, unused)) bool kernel_search_on(kernel_search *s)
 {
     if (vm_any(s->open))
         kernel_search_next(s);
@@ -398,8 +398,8 @@ SIMD_INLINE kernel_half kernel_half_value(const kernel_half c[8], const kernel_h
 
 /* Computes in double how far the points with reference coordinates r at depth t are from their rays, and the field
  * there. The results are exact except for the rounding of r and t. */
-SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *at,
-                                  vf off[3], vf *value)
+SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map, const kernel_point *at, vf off[3],
+                                  vf *value)
 {
     for (int half = 0; half < 2; half++) {
         kernel_half r[3], target[3];
@@ -430,7 +430,7 @@ typedef struct kernel_residual {
 
 /* Does a step of Newton's method for the four equations at once; t stays between low and high. Returns the rays that
  * have not converged. */
-SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *low,
+SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map, const kernel_point *low,
                                   const kernel_point *high, vm wanted, const kernel_residual *residual,
                                   kernel_point *out)
 {
@@ -460,8 +460,8 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lane
 }
 
 /* Does the last step of Newton's method, with residuals computed in double. */
-SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
-                                    const kernel_point *low, const kernel_point *high, kernel_point *out)
+SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *map, vm wanted, const kernel_point *low,
+                                    const kernel_point *high, kernel_point *out)
 {
     kernel_point last = *out;
     kernel_residual residual;
@@ -475,8 +475,7 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map_la
 
 /* Does the last step of Newton's method, from points whose reference coordinates have an error of at most `end`.
  * Changes the map's tolerance. */
-SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map_lanes *map, vm wanted, float end,
-                                    kernel_point *at)
+SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map *map, vm wanted, float end, kernel_point *at)
 {
     const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
     map->tolerance = 4 * end;
@@ -486,8 +485,8 @@ SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map_lanes *m
 
 /* Refines the roots between low and high by Newton's method; residuals of the last step are in double. Returns those of
  * the wanted rays for which it does not converge. */
-SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
-                                   const kernel_point *low, const kernel_point *high, kernel_point *out)
+SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *map, vm wanted, const kernel_point *low,
+                                   const kernel_point *high, kernel_point *out)
 {
     const vf zero = vf_set(0), fall = low->value - high->value;
     const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, low->value / fall), zero, vf_set(1));
@@ -513,7 +512,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
 
 /* Refines the roots that have been found. Rays for which Newton's method does not converge are refined by
  * bracketing. */
-static __attribute__((noinline)) void kernel_polish(const kernel_search *s, kernel_point *out)
+static __attribute__((noinline, unused)) void kernel_polish(const kernel_search *s, kernel_point *out)
 {
     const vm open = kernel_polish_lanes(&s->rays, &s->map, s->found, &s->low, &s->high, out);
     if (vm_any(open)) kernel_bracket(s, open, out);

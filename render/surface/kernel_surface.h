@@ -28,6 +28,7 @@
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
+#include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -186,7 +187,7 @@ static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*valu
 
 /* Accepts those of the found crossings of the isovalue that are visible, and returns them. */
 SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                    const kernel_curved *curved, int value, const kernel_map_lanes *map, vm found,
+                                    const kernel_curved *curved, int value, const kernel_map *map, vm found,
                                     const kernel_point *at)
 {
     const vm hit = kernel_visible(p, state->surface, found, at->t);
@@ -255,7 +256,7 @@ static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel
     kernel_contracted known;
     kernel_contract_packet(curved, &rays, lane, wanted, &known);
     if (vm_any(known.one)) {
-        kernel_map_lanes map;
+        kernel_map map;
         kernel_point at = {.t = known.t};
         memcpy(at.r, known.r, sizeof at.r);
         kernel_maps_of_type(curved->at, lane, curved->type, &map);

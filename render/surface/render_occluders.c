@@ -251,21 +251,17 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Stores the corners of the hex's faces and the directions of their diagonals, in the format of
- * kernel_placed_curved. */
+/* Faces' corners as kernel_placed_curved has them. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
-    int32_t turned = 0;
     for (int face = 0; face < 6; face++) {
         const signed char *loop = kernel_shapes[0].faces[face].vertices;
         int corner[4];
         kernel_quad_corners(c, loop, corner);
         const int32_t word = corner[0] | corner[1] << 4 | corner[2] << 8 | corner[3] << 12;
-        if (corner[0] == loop[1] || corner[0] == loop[3]) turned |= 1 << face;
         memcpy(&out->words[KERNEL_CURVED_RECORD_QUADS + face], &word, sizeof word);
     }
-    memcpy(&out->words[KERNEL_CURVED_RECORD_TURNED], &turned, sizeof turned);
-    out->words[KERNEL_CURVED_RECORD_WORDS - 1] = 0;
+    for (int n = KERNEL_CURVED_RECORD_QUADS + 6; n < KERNEL_CURVED_RECORD_WORDS; n++) out->words[n] = 0;
 }
 
 static bool collapses(const kernel_cell *c)

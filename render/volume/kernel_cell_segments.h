@@ -18,6 +18,7 @@
 #include "kernel_polyhedron.h"
 #include "kernel_samples.h"
 #include "kernel_segment_list.h"
+#include "kernel_tets.h"
 #include "kernel_types.h"
 #include "render_polyhedra.h"
 #include "simd.h"

@@ -113,7 +113,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
 
 /* A vector of rays, each with its cell. */
 typedef struct kernel_local_pairs {
-    kernel_local_rays rays;
+    kernel_lane_rays rays;
     kernel_point ends[2];
     kernel_local_deviations off_chord;
     vm active;

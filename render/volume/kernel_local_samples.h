@@ -118,12 +118,13 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi bits = vi_from_bits(vf_load(b->bits + n));
     const vf depth = vf_load(b->t + n);
-    kernel_local_rays rays;
+    kernel_lane_rays rays;
     kernel_local_points points;
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH], lane[SIMD_WIDTH];
     float values[SIMD_WIDTH];
-    kernel_local_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
-    const vf place[3] = {rays.origin[0] + rays.slope[0] * depth, rays.origin[1] + rays.slope[1] * depth, depth};
+    kernel_lane_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
+    const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
+                         depth};
     const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
     const vf inside = kernel_local_inside(type, points.r), blur = kernel_take(b->lanes.cells.blur, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(blur, inside));
@@ -194,9 +195,9 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     const int left = b->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi pixel = kernel_bytes(b->rays.pixel + n);
-    kernel_local_rays rays;
+    kernel_lane_rays rays;
     vf base, step, near, far;
-    kernel_local_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->rays.lane + n));
+    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->rays.lane + n));
     const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
     kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
@@ -281,7 +282,7 @@ SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_batch *b, 
         kernel_local_end(t, b);
         kernel_local_lanes_turn(t, &b->lanes, part);
     }
-    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes, q, cell, blocks, box)) kernel_local_run(t, b, queue);
+    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes.arrays, q, cell, blocks, box)) kernel_local_run(t, b, queue);
 }
 
 #endif

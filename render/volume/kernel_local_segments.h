@@ -254,7 +254,7 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 /* Processes the rays in `wanted` in single cells; rays of the same cell and packet are processed together. */
 static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
                                                                   const kernel_local_queue *q,
-                                                                  const kernel_local_rays *rays, unsigned wanted)
+                                                                  const kernel_lane_rays *rays, unsigned wanted)
 {
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
     memcpy(at, &rays->at, sizeof at);
@@ -288,12 +288,12 @@ SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi word
 
 /* Loads the rays of a list from index n on; returns the lanes that have one. */
 SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
-                                      kernel_local_rays *rays)
+                                      kernel_lane_rays *rays)
 {
     const int left = list->count - n;
     const vm all = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     *words = vi_select(all, vi_from_bits(vf_load(list->words + n)), vi_set(0));
-    kernel_local_rays_of(rays, tile, *words, *words >> KERNEL_LOCAL_CELL);
+    kernel_lane_rays_of(rays, tile, *words, *words >> KERNEL_LOCAL_CELL);
     return all;
 }
 
@@ -302,7 +302,7 @@ SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kerne
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_stretches *b,
                                              const kernel_local_queue *q, int type, int n)
 {
-    kernel_local_rays rays;
+    kernel_lane_rays rays;
     kernel_curved_crossed crossed;
     vi words;
     const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
@@ -347,9 +347,9 @@ SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_l
     const int left = b->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi pixel = kernel_bytes(b->rays.pixel + n), lane = kernel_bytes(b->rays.lane + n);
-    kernel_local_rays rays;
+    kernel_lane_rays rays;
     vf near, far, begin, end;
-    kernel_local_rays_of(&rays, &t->tile, pixel, lane);
+    kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
     const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
     kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
@@ -507,7 +507,7 @@ SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_s
         kernel_local_segments_end(t, b);
         kernel_local_lanes_turn(t, &b->lanes, part);
     }
-    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes, &b->lanes.queues[queue], cell, blocks, box))
+    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes.arrays, &b->lanes.queues[queue], cell, blocks, box))
         kernel_local_segments_run(t, b, queue);
 }
 

@@ -1,11 +1,11 @@
-/* Processes small tets with one pixel-tet pair per lane, because most rays of a packet would miss such a tet. Tets are
- * transformed SIMD_WIDTH at a time in any case (kernel_placed.h). The pixels of their bounding boxes are listed, and
- * the rays' crossings are computed by the operations of kernel_crossings.h, with the same bits (kernel_tet_rays.h). */
+/* Small tets, one pixel-tet pair per lane: of a packet's rays most would miss such a tet. Tets are transformed
+ * SIMD_WIDTH at a time in any case (kernel_placed.h). The pixels of their bounding boxes are listed, and their
+ * crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tets.h). */
 #ifndef RENDER_KERNEL_SMALL_TETS_H
 #define RENDER_KERNEL_SMALL_TETS_H
 
 #include "kernel_local_queue.h"
-#include "kernel_tet_rays.h"
+#include "kernel_tets.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
 #include "simd.h"
@@ -29,7 +29,7 @@ static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lane
     rays->count = 0;
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        unsigned box = cells->wait_box[n];
+        unsigned box = cells->tets.box[n];
         if (!kernel_local_cut(l->ends, n, &box)) continue;
         if (kernel_box_pixels(box) > most)
             others |= 1u << n;

@@ -18,6 +18,7 @@
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_interest.h"
+#include "kernel_local_queue.h"
 #include "kernel_map.h"
 #include "kernel_outline.h"
 #include "kernel_packet.h"
@@ -31,14 +32,7 @@
 #include "render.h"
 #include "simd.h"
 
-enum {
-    KERNEL_OPEN_PIECE = 16,
-    KERNEL_SORT_PIECE = 64,
-    KERNEL_SORT_ENDS = 48,
-    /* prefetch distance in tets: vertex indices are prefetched that far ahead, then coordinates and values */
-    KERNEL_WAIT_AHEAD = 8,
-    KERNEL_WAIT_ROOM = SIMD_WIDTH + 2 * KERNEL_WAIT_AHEAD
-};
+enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64, KERNEL_SORT_ENDS = 48 };
 
 /* Callback that traces those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the
  * remaining lanes. */
@@ -58,13 +52,7 @@ typedef struct kernel_tile_cells {
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
-    /* Queue of tets, with the blocks and the box of pixels that each may meet. When it is full, the first SIMD_WIDTH
-     * tets are processed. */
-    /* number of tets in the queue; of these, the first `known` have their vertex indices in wait_vertices */
-    int pending, known;
-    uint32_t wait_cell[KERNEL_WAIT_ROOM];
-    uint16_t wait_blocks[KERNEL_WAIT_ROOM], wait_box[KERNEL_WAIT_ROOM];
-    int32_t wait_vertices[4][KERNEL_WAIT_ROOM];
+    kernel_local_queue tets;          /* tets that are transformed SIMD_WIDTH at a time */
     kernel_tile_take_tets *take_tets; /* NULL if each tet is processed on its own */
 } kernel_tile_cells;
 
@@ -174,14 +162,6 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
-/* Reads the vertex indices of the pending tets before index `end`. */
-SIMD_INLINE void kernel_tile_learn_pending(kernel_tile_cells *cells, int end)
-{
-    for (; cells->known < end; cells->known++)
-        kernel_arrays_vertices(&cells->arrays, cells->wait_cell[cells->known], 4,
-                               cells->wait_vertices[0] + cells->known, KERNEL_WAIT_ROOM);
-}
-
 /* Transforms the first `count` pending tets. Returns the lanes of those that are visible in a block in which some ray
  * has no nearer end. */
 SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
@@ -191,39 +171,25 @@ SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile
     int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
     unsigned lanes = 0;
-    kernel_tile_learn_pending(cells, count);
-    for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->wait_vertices[i], sizeof vertices[i]);
+    kernel_local_learn(&cells->arrays, &cells->tets, count, GRID_TET);
+    for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->tets.vertex[i], sizeof vertices[i]);
     kernel_place_tets(&cells->placed, &cells->arrays, t->frame, &t->tile, vertices, count);
     kernel_placed_domain(&cells->placed, transfer);
     unsigned candidates = kernel_placed_showing(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
-    candidates = kernel_arrays_drawn(&cells->arrays, cells->wait_cell, candidates);
+    candidates = kernel_arrays_drawn(&cells->arrays, cells->tets.cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
-        cells->wait_blocks[n] &= (uint16_t)kernel_blocks_beyond(t, near[n]);
-        lanes |= (unsigned)(cells->wait_blocks[n] != 0) << n;
+        cells->tets.blocks[n] &= (uint16_t)kernel_blocks_beyond(t, near[n]);
+        lanes |= (unsigned)(cells->tets.blocks[n] != 0) << n;
     }
     return lanes;
-}
-
-/* Moves the pending tets behind the first vector to the front. */
-SIMD_INLINE void kernel_tile_pop_pending(kernel_tile_cells *cells)
-{
-    enum { LEFT = KERNEL_WAIT_ROOM - SIMD_WIDTH };
-    cells->pending = cells->pending > SIMD_WIDTH ? cells->pending - SIMD_WIDTH : 0;
-    cells->known = cells->known > SIMD_WIDTH ? cells->known - SIMD_WIDTH : 0;
-    if (!cells->pending) return;
-    memmove(cells->wait_cell, cells->wait_cell + SIMD_WIDTH, LEFT * sizeof *cells->wait_cell);
-    memmove(cells->wait_blocks, cells->wait_blocks + SIMD_WIDTH, LEFT * sizeof *cells->wait_blocks);
-    memmove(cells->wait_box, cells->wait_box + SIMD_WIDTH, LEFT * sizeof *cells->wait_box);
-    for (int i = 0; i < 4; i++)
-        memmove(cells->wait_vertices[i], cells->wait_vertices[i] + SIMD_WIDTH, LEFT * sizeof *cells->wait_vertices[i]);
 }
 
 /* Transforms the first vector of pending tets, and passes them to take_tets or, one by one, to take(). */
 static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                             kernel_tile_take *take)
 {
-    const int count = cells->pending < SIMD_WIDTH ? cells->pending : SIMD_WIDTH;
+    const int count = cells->tets.count < SIMD_WIDTH ? cells->tets.count : SIMD_WIDTH;
     const bool is_double = t->frame->is_double;
     unsigned lanes = kernel_tile_place_pending(t, cells, count);
     if (cells->take_tets && lanes) lanes = cells->take_tets(t, lanes);
@@ -231,16 +197,16 @@ static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t
         const int n = __builtin_ctz(lanes);
         kernel_placed_cell(&cells->placed, n, &cells->cell);
         if (is_double) kernel_placed_exactly(&cells->placed, n, &cells->cell);
-        const unsigned blocks = cells->wait_blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
-        cells->cell.index = cells->wait_cell[n];
+        const unsigned blocks = cells->tets.blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
+        cells->cell.index = cells->tets.cell[n];
         if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
     }
-    kernel_tile_pop_pending(cells);
+    kernel_local_pop(&cells->tets);
 }
 
 SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
 {
-    while (cells->pending) kernel_tile_take_some(t, cells, take);
+    while (cells->tets.count) kernel_tile_take_some(t, cells, take);
 }
 
 /* Makes the volume and mesh part those of the pending tets; tets of another part are processed first. Returns whether
@@ -263,12 +229,8 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
                                   unsigned box, kernel_tile_take *take)
 {
-    const int n = cells->pending++;
-    cells->wait_cell[n] = cell;
-    cells->wait_blocks[n] = (uint16_t)blocks;
-    cells->wait_box[n] = (uint16_t)box;
-    kernel_tile_learn_pending(cells, cells->pending - KERNEL_WAIT_AHEAD);
-    if (cells->pending == KERNEL_WAIT_ROOM) kernel_tile_take_some(t, cells, take);
+    if (kernel_local_push(&cells->arrays, &cells->tets, cell, blocks, box, GRID_TET))
+        kernel_tile_take_some(t, cells, take);
 }
 
 /* ---- cells found by traversing trees ---- */
@@ -395,7 +357,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
-    cells->pending = cells->known = 0;
+    cells->tets.count = cells->tets.known = 0;
     cells->take_tets = take_tets;
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;

@@ -33,7 +33,7 @@
 #include "kernel_segment_list.h"
 #include "kernel_segments.h"
 #include "kernel_small_tets.h"
-#include "kernel_tet_rays.h"
+#include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
@@ -158,7 +158,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
     return others;
 }
 
-/* ---- windows ---- */
+/* ---- windows of depth ---- */
 
 SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_segments *r, float far,
                                            int64_t first_fragment)

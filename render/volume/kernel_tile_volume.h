@@ -28,7 +28,7 @@
 #include "kernel_packet.h"
 #include "kernel_samples.h"
 #include "kernel_small_tets.h"
-#include "kernel_tet_rays.h"
+#include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_depth.h"

@@ -1,0 +1,253 @@
+/* Crossings of rays with tets: four triangles, of which a ray crosses two or none (kernel_cell.h). The same source is
+ * compiled for a packet of rays and one tet, and for rays that have a tet each: kernel_tets.is_one is a compile-time
+ * constant wherever these functions are inlined. */
+#ifndef RENDER_KERNEL_TETS_H
+#define RENDER_KERNEL_TETS_H
+
+#include <math.h>
+
+#include "kernel_cell.h"
+#include "kernel_crossings.h"
+#include "kernel_packet.h"
+#include "kernel_placed.h"
+#include "kernel_shapes.h"
+#include "kernel_tile_trace.h"
+#include "simd.h"
+
+/* A packet of rays with one tet, or rays with a vector of tets, of which each ray has the lane of its own. */
+typedef struct kernel_tets {
+    bool is_one;
+    const kernel_packet *packet;
+    const kernel_cell *one;
+    const kernel_lane_rays *own;
+    const kernel_placed *placed;
+} kernel_tets;
+
+/* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_placed. */
+#define KERNEL_TET_NUMBER(t, of_one, of_placed)                                                                        \
+    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->placed->of_placed, (t)->own->lane))
+
+/* Returns a copy for a function that is not inlined, so that the original stays in registers. */
+SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
+{
+    kernel_tets out = *t;
+    if (t->is_one) return out;
+    *rays = *t->own;
+    out.own = rays;
+    return out;
+}
+
+SIMD_INLINE void kernel_tets_project(const kernel_tets *t, vf x[4], vf y[4])
+{
+    const kernel_rays rays = t->is_one ? kernel_packet_rays(t->packet) : t->own->rays;
+    for (int i = 0; i < 4; i++) {
+        const vf z = KERNEL_TET_NUMBER(t, z[i], at[2][i]);
+        x[i] = (KERNEL_TET_NUMBER(t, x[i], at[0][i]) - rays.origin_x) - rays.slope_x * z;
+        y[i] = (KERNEL_TET_NUMBER(t, y[i], at[1][i]) - rays.origin_y) - rays.slope_y * z;
+    }
+}
+
+SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
+{
+    vf x[4], y[4];
+    kernel_tets_project(t, x, y);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
+        e[n] = kernel_edge_between(x[i], y[i], x[j], y[j]);
+    }
+}
+
+/* Computes the edge functions whose sign is in doubt again, from projected vertices, so that their sign is exact. */
+static __attribute__((noinline)) void kernel_tets_exactly(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
+{
+    vf exact[KERNEL_TET_EDGES];
+    kernel_tets_edges_projected(t, exact);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const vm sure = vf_lt(KERNEL_TET_NUMBER(t, lines[n].bound, bound[n]), vf_abs(e[n]));
+        e[n] = vf_select(sure, e[n], exact[n]);
+    }
+}
+
+/* Computes the edge functions on the rays. is_pencil: the edges have lines for these rays. */
+SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
+{
+    const vf u = t->is_one ? t->packet->u : t->own->u, v = t->is_one ? t->packet->v : t->own->v;
+    vf least = vf_set(INFINITY);
+    if (!is_pencil) {
+        kernel_tets_edges_projected(t, e);
+        return;
+    }
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const vf c = KERNEL_TET_NUMBER(t, lines[n].c, c[n]);
+        const vf cu = KERNEL_TET_NUMBER(t, lines[n].cu, cu[n]);
+        const vf cv = KERNEL_TET_NUMBER(t, lines[n].cv, cv[n]);
+        e[n] = vf_muladd(cv, v, vf_muladd(cu, u, c));
+        least = vf_min(vf_abs(e[n]), least);
+    }
+    if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt, doubt), least))), 0)) {
+        kernel_lane_rays own;
+        const kernel_tets copy = kernel_tets_copy(t, &own);
+        kernel_tets_exactly(&copy, e);
+    }
+}
+
+/* Finds the rays that cross each of a tet's four faces, in the order of kernel_tet_face. */
+SIMD_INLINE void kernel_tets_faces(vm rays, const vf e[KERNEL_TET_EDGES], vm hit[4])
+{
+    for (int n = 0; n < 4; n++) {
+        const signed char *face = kernel_tet_face[n];
+        hit[n] = kernel_inside(rays, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]]);
+    }
+}
+
+/* Sums of a crossed triangle's vertex numbers, weighed by its edge functions (kernel_cell.h). */
+typedef struct kernel_sums {
+    vf depth, value, colour, weight;
+} kernel_sums;
+
+#define KERNEL_TET_WEIGH(t, face, ij, jk, ik, of_one, of_placed)                                                       \
+    vf_muladd(ij, KERNEL_TET_NUMBER(t, of_one[(int)(face)[2]], of_placed[(int)(face)[2]]),                             \
+              vf_muladd(-(ik), KERNEL_TET_NUMBER(t, of_one[(int)(face)[1]], of_placed[(int)(face)[1]]),                \
+                        (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_placed[(int)(face)[0]])))
+
+/* has_colour: only with one tet. */
+SIMD_INLINE kernel_sums kernel_tets_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
+                                         bool has_colour)
+{
+    return (kernel_sums){.depth = KERNEL_TET_WEIGH(t, face, ij, jk, ik, z, at[2]),
+                         .value = KERNEL_TET_WEIGH(t, face, ij, jk, ik, f, f),
+                         .colour = has_colour ? KERNEL_TET_WEIGH(t, face, ij, jk, ik, g, f) : vf_set(0),
+                         .weight = kernel_weight(ij, jk, ik)};
+}
+
+SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const kernel_sums *b)
+{
+    return (kernel_sums){vf_select(m, a->depth, b->depth), vf_select(m, a->value, b->value),
+                         vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
+}
+
+/* The two crossings of each ray with a tet, in either order. */
+typedef struct kernel_ends {
+    kernel_sums a, b;
+} kernel_ends;
+
+/* Selects, for each ray, the first and the last of the four faces that it crosses. */
+SIMD_INLINE kernel_ends kernel_tets_choose(const vm hit[4], const kernel_sums sums[4])
+{
+    const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
+    const kernel_sums b = kernel_sums_select(hit[2], &sums[2], &sums[1]);
+    return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
+}
+
+/* Divides each crossing's sums by its weight, and stores the nearer crossing as the entry, the other as the exit. */
+SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, kernel_interval *out)
+{
+    const vf scale_a = 1.0f / ends->a.weight, scale_b = 1.0f / ends->b.weight;
+    const vf t_a = ends->a.depth * scale_a, t_b = ends->b.depth * scale_b;
+    const vf v_a = ends->a.value * scale_a, v_b = ends->b.value * scale_b;
+    const vm swap = vf_lt(t_b, t_a);
+    out->t_in = vf_select(swap, t_b, t_a);
+    out->t_out = vf_select(swap, t_a, t_b);
+    out->v_in = vf_select(swap, v_b, v_a);
+    out->v_out = vf_select(swap, v_a, v_b);
+    if (!has_colour) return;
+    const vf w_a = ends->a.colour * scale_a, w_b = ends->b.colour * scale_b;
+    out->w_in = vf_select(swap, w_b, w_a);
+    out->w_out = vf_select(swap, w_a, w_b);
+}
+
+/* Returns the rays that cross face n and whose weights are not good enough. */
+SIMD_INLINE vm kernel_tets_weak(const kernel_tets *t, int n, vm hit, vf weight)
+{
+    return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
+}
+
+/* Chooses as kernel_tets_choose() does, with edges projected again for rays whose weights are not good enough. */
+SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
+                                                   bool has_colour)
+{
+    vf x[4], y[4];
+    kernel_sums sums[4];
+    vm hit[4];
+    kernel_tets_project(t, x, y);
+    kernel_tets_faces(rays, e, hit);
+    for (int n = 0; n < 4; n++) {
+        const signed char *face = kernel_tet_face[n];
+        const int i = face[0], j = face[1], k = face[2];
+        vf ij = e[(int)face[3]], jk = e[(int)face[4]], ik = e[(int)face[5]];
+        const vm weak = kernel_tets_weak(t, n, hit[n], kernel_weight(ij, jk, ik));
+        if (vm_any(weak)) {
+            ij = vf_select(weak, kernel_edge_between(x[i], y[i], x[j], y[j]), ij);
+            jk = vf_select(weak, kernel_edge_between(x[j], y[j], x[k], y[k]), jk);
+            ik = vf_select(weak, kernel_edge_between(x[i], y[i], x[k], y[k]), ik);
+        }
+        sums[n] = kernel_tets_sums(t, face, ij, jk, ik, has_colour);
+    }
+    return kernel_tets_choose(hit, sums);
+}
+
+/* As above. is_one is made a constant, because one packet in some has such weights. */
+static __attribute__((noinline, cold)) kernel_ends kernel_tets_mend(const kernel_tets *t, vm rays,
+                                                                    const vf e[KERNEL_TET_EDGES], bool has_colour)
+{
+    const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
+    const kernel_tets several = {.own = t->own, .placed = t->placed};
+    return t->is_one ? kernel_tets_choose_exactly(&one, rays, e, has_colour)
+                     : kernel_tets_choose_exactly(&several, rays, e, false);
+}
+
+/* Computes where the rays enter and leave their tets, and the values there. It computes the sums of all four faces
+ * without branches, and selects those of the first and the last face that each ray crosses. */
+SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pencil, bool has_colour,
+                                      kernel_interval *out)
+{
+    vf e[KERNEL_TET_EDGES];
+    vm hit[4], weak[4];
+    kernel_sums sums[4];
+    kernel_tets_edges(t, rays, is_pencil, e);
+    kernel_tets_faces(rays, e, hit);
+    out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
+    out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
+    if (!vm_any(out->mask)) return;
+    for (int n = 0; n < 4; n++) {
+        const signed char *face = kernel_tet_face[n];
+        sums[n] = kernel_tets_sums(t, face, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]], has_colour);
+    }
+    kernel_ends ends = kernel_tets_choose(hit, sums);
+    if (is_pencil) {
+        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_weak(t, n, hit[n], sums[n].weight);
+        if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
+            kernel_lane_rays own;
+            const kernel_tets copy = kernel_tets_copy(t, &own);
+            ends = kernel_tets_mend(&copy, rays, e, has_colour);
+        }
+    }
+    kernel_ends_order(&ends, has_colour, out);
+}
+
+/* ---- packets and one tet ---- */
+
+SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, vm rays, vm hit[4])
+{
+    const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
+    vf e[KERNEL_TET_EDGES];
+    kernel_tets_edges(&tet, rays, p->is_pencil, e);
+    kernel_tets_faces(rays, e, hit);
+}
+
+SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+                                     kernel_interval *out)
+{
+    const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
+    kernel_tets_interval(&tet, rays, p->is_pencil, has_colour, out);
+}
+
+/* ---- rays with a tet each ---- */
+
+SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *placed, const kernel_lane_rays *r, kernel_interval *out)
+{
+    const kernel_tets tets = {.own = r, .placed = placed};
+    kernel_tets_interval(&tets, r->active, true, false, out);
+}
+
+#endif

@@ -1,0 +1,47 @@
+/* Queue of cells of one type, layer and part whose surface is to be traced. They are traced when SIMD_WIDTH are queued.
+ */
+#ifndef RENDER_KERNEL_SURFACE_CELLS_H
+#define RENDER_KERNEL_SURFACE_CELLS_H
+
+#include "grid.h"
+#include "kernel_arrays.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "simd.h"
+
+typedef struct kernel_surface_cells {
+    int type, count;
+    int layer, part;      /* -1: none yet */
+    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
+    uint32_t cell[SIMD_WIDTH];
+    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
+    float near[SIMD_WIDTH];
+    int value[SIMD_WIDTH];
+    double isovalue[SIMD_WIDTH];
+    int32_t vertex[8][SIMD_WIDTH];
+} kernel_surface_cells;
+
+/* Adds a cell of the current layer; the queue must not be full. */
+SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_surface_cells *own,
+                                          const kernel_tile_candidate *candidate, int value)
+{
+    const int n = own->count++;
+    own->cell[n] = candidate->cell;
+    own->blocks[n] = candidate->blocks;
+    own->box[n] = candidate->box;
+    own->near[n] = candidate->near;
+    own->value[n] = value;
+    own->isovalue[n] = t->surface->layer->values[value];
+    kernel_arrays_cells(&own->arrays, &candidate->cell, 1, grid_type_vertices(own->type), own->vertex, n);
+}
+
+/* Copies the first cell to the lanes that have none. */
+SIMD_INLINE void kernel_surface_cells_close(kernel_surface_cells *own)
+{
+    for (int n = own->count; n < SIMD_WIDTH; n++) {
+        for (int i = 0; i < 8; i++) own->vertex[i][n] = own->vertex[i][0];
+        own->isovalue[n] = own->isovalue[0];
+    }
+}
+
+#endif
