@@ -64,7 +64,7 @@ static void chord_cell(kernel_packet *p, const chord_state *state, const grid_fi
     if (c->type == GRID_TET)
         kernel_tet_interval(p, c, rays, false, &list[0]);
     else
-        intervals = kernel_curved_intervals(p, c, rays, false, list);
+        intervals = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < intervals; n++) chord_note(state, list[n].mask, list[n].t_in, list[n].t_out);
 }
 

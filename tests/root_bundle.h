@@ -63,7 +63,7 @@ static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CE
 {
     const kernel_beam beam = bundle_beam(&b->packet);
     kernel_curved_alone(&b->cell, &beam, curved);
-    return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, false, list);
+    return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, list);
 }
 
 /* First hits on all rays, and how many hits there are. */

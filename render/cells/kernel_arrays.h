@@ -342,15 +342,4 @@ SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const u
     kernel_numbers_take_raw(&p->values, vertex, out);
 }
 
-/* Returns the array's number at that index, as a double. */
-SIMD_INLINE double kernel_numbers_one(const kernel_numbers *c, int64_t index)
-{
-    double wide;
-    if (!c->data) return c->field ? grid_field_value(c->field, index) : grid_array_number(&c->array, index);
-    const float *at = c->data + index * c->stride;
-    if (!c->is_wide) return (double)*at;
-    memcpy(&wide, at, sizeof wide);
-    return wide;
-}
-
 #endif

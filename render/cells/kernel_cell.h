@@ -154,11 +154,10 @@ typedef struct kernel_cell {
     float normal[3]; /* for a tet: gradient from kernel_tet_normal(); valid if has_normal */
 } kernel_cell;
 
-/* Crossings of rays with a face: v is the value of f, w that of g, r the reference coordinates, which are not set for
- * tets. */
+/* The points where rays cross a face: v is the value of f, r the reference coordinates. */
 typedef struct kernel_crossing {
     vm mask;
-    vf t, v, w;
+    vf t, v;
     vf r[3];
 } kernel_crossing;
 
@@ -166,8 +165,9 @@ typedef struct kernel_crossing {
  * coordinates. */
 typedef struct kernel_interval {
     vm mask;
-    vf t_in, t_out, v_in, v_out, w_in, w_out;
-    vf r_in[3], r_out[3];
+    vf t_in, t_out, v_in, v_out;
+    vf w_in, w_out;       /* the colour field; set for tets and polyhedra only */
+    vf r_in[3], r_out[3]; /* reference coordinates; set for hexes, wedges and pyramids only */
 } kernel_interval;
 
 /* A cell's vertices projected along each ray: x, y in the ray's plane, with the ray at the origin. */
@@ -236,7 +236,8 @@ static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 
 /* Reads a cell's type, vertex indices and values, not yet its positions. For a polyhedron only the type is valid
  * (kernel_polyhedron.h). */
-SIMD_INLINE void kernel_cell_fetch(kernel_cell *c, const grid *g, const grid_field *field, uint32_t index)
+static __attribute__((noinline, unused)) void kernel_cell_fetch(kernel_cell *c, const grid *g, const grid_field *field,
+                                                                uint32_t index)
 {
     c->index = index;
     c->is_placed = false;
@@ -329,7 +330,7 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
 /* Puts a cell's vertices in their canonical order. The vertices of a tet, which is symmetric, are sorted by
  * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_turn(). Then nothing depends on
  * how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
-SIMD_INLINE void kernel_cell_order(kernel_cell *c)
+static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
     if (kernel_is_linear(c->type)) {
@@ -361,7 +362,8 @@ SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile,
 }
 
 /* Transforms the cell's vertices into tile space. They are not yet in canonical order, and have no edge functions. */
-SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
+static __attribute__((noinline, unused)) void kernel_cell_move(kernel_cell *c, const kernel_frame *f,
+                                                               const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);

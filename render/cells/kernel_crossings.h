@@ -219,7 +219,6 @@ typedef struct kernel_face_search {
     const kernel_projected *projected;
     const kernel_edges *edges;
     vm rays;
-    bool has_colour;
 } kernel_face_search;
 
 SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_crossing *out)
@@ -227,7 +226,6 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
     out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
-    out->w = s->has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
     for (int a = 0; a < 3; a++)
         out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
@@ -254,12 +252,11 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
-    vf f[4], g[4];
-    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(s->has_colour ? c->g[corner[i]] : 0);
+    vf f[4];
+    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]);
     out->mask = at->mask;
     out->t = at->t;
     out->v = kernel_bilinear(f, at->s, at->r);
-    out->w = s->has_colour ? kernel_bilinear(g, at->s, at->r) : vf_set(0);
     for (int a = 0; a < 3; a++) {
         const float base = shape->corners[corner[0]][a];
         out->r[a] =
@@ -349,13 +346,13 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
 
 /* Computes all crossings of rays with a cell that has quadrilateral faces. Returns how many entries of out are set;
  * each has the rays that it belongs to. */
-SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays,
                                         kernel_crossing out[KERNEL_MAX_CROSSINGS])
 {
     const kernel_shape *shape = kernel_cell_shape(c->type);
     kernel_projected q;
     kernel_edges edges;
-    const kernel_face_search s = {p, c, shape, &q, &edges, rays, has_colour};
+    const kernel_face_search s = {p, c, shape, &q, &edges, rays};
     for (int i = 0; i < c->count; i++) {
         q.x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
         q.y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
@@ -385,13 +382,12 @@ SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_cr
     vi taken = vi_set(-1);
     out->mask = vm_none();
     out->t = vf_set(INFINITY);
-    out->v = out->w = out->r[0] = out->r[1] = out->r[2] = vf_set(0);
+    out->v = out->r[0] = out->r[1] = out->r[2] = vf_set(0);
     for (int n = 0; n < count; n++) {
         const vm nearer = vm_and(list[n].mask, vf_lt(list[n].t, out->t));
         out->mask = vm_or(out->mask, nearer);
         out->t = vf_select(nearer, list[n].t, out->t);
         out->v = vf_select(nearer, list[n].v, out->v);
-        out->w = vf_select(nearer, list[n].w, out->w);
         for (int a = 0; a < 3; a++) out->r[a] = vf_select(nearer, list[n].r[a], out->r[a]);
         taken = (vi)vf_select(nearer, (vf)vi_set(n), (vf)taken);
     }
@@ -399,11 +395,13 @@ SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_cr
     return vm_any(out->mask);
 }
 
-SIMD_INLINE int kernel_curved_intervals(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
-                                        kernel_interval out[KERNEL_MAX_CELL_INTERVALS])
+/* Pairs the crossings up; returns how many intervals the rays have at most. */
+static __attribute__((noinline, unused)) int kernel_curved_intervals(const kernel_packet *p, const kernel_cell *c,
+                                                                     vm rays,
+                                                                     kernel_interval out[KERNEL_MAX_CELL_INTERVALS])
 {
     kernel_crossing list[KERNEL_MAX_CROSSINGS], in, next;
-    const int crossings = kernel_curved_crossings(p, c, rays, has_colour, list);
+    const int crossings = kernel_curved_crossings(p, c, rays, list);
     int n = 0;
     while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
            kernel_take_nearest(list, crossings, &next)) {
@@ -412,8 +410,6 @@ SIMD_INLINE int kernel_curved_intervals(const kernel_packet *p, const kernel_cel
         out[n].t_out = next.t;
         out[n].v_in = in.v;
         out[n].v_out = next.v;
-        out[n].w_in = in.w;
-        out[n].w_out = next.w;
         memcpy(out[n].r_in, in.r, sizeof in.r);
         memcpy(out[n].r_out, next.r, sizeof next.r);
         n++;

@@ -56,7 +56,7 @@ SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const 
     if (is_tet)
         kernel_tet_interval(p, c, rays, false, &list[0]);
     else
-        count = kernel_curved_intervals(p, c, rays, false, list);
+        count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm own = vm_andnot(vm_and(i->mask, vf_lt(probe->z, i->t_out)), vf_lt(probe->z, i->t_in));

@@ -102,7 +102,7 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
     kernel_curved_room room;
     kernel_curved curved = {.room = &room};
-    const int count = kernel_curved_intervals(p, c, rays, false, list);
+    const int count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm room_left = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));

@@ -272,7 +272,7 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const int count = kernel_curved_intervals(p, c, rays, false, list);
+    const int count = kernel_curved_intervals(p, c, rays, list);
     vm asked[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];

@@ -628,7 +628,7 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_span span = {.map = map, .cell = c};
-    const int intervals = kernel_curved_intervals(p, c, p->active, false, list);
+    const int intervals = kernel_curved_intervals(p, c, p->active, list);
     if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
     for (int k = 0; k < intervals; k++) {
         span.interval = &list[k];

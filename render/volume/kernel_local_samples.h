@@ -105,7 +105,7 @@ static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trac
     kernel_local_lanes *l = &b->lanes;
     if (!kernel_tile_ready_alone(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
-    const int intervals = kernel_curved_intervals(p, &cells->cell, ray, false, list);
+    const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
     for (int k = 0; k < intervals; k++)
         kernel_fill_some(p, &state, cells->cell.is_constant ? NULL : &cells->map, &list[k], number, number + 1);
 }

@@ -58,7 +58,7 @@ static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *
                                                                  const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const int intervals = kernel_curved_intervals(p, c, p->active, false, list);
+    const int intervals = kernel_curved_intervals(p, c, p->active, list);
     for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
 }
 
