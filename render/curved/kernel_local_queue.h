@@ -34,7 +34,21 @@ typedef struct kernel_local_queue {
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
-typedef struct kernel_local_lanes {
+typedef struct kernel_local_lanes kernel_local_lanes;
+
+/* Callbacks that process a vector of a queue's cells (kernel_local_run.h). */
+typedef struct kernel_local_stages {
+    bool is_pencil; /* the rays of cells that are processed alone are a pencil (kernel_packet.h) */
+    /* Transforms the fetched cells; returns the visible ones. *lanes: those of them that can be processed in lanes. */
+    unsigned (*place)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
+    /* Processes the listed pixels, and empties the list. */
+    void (*cast)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
+    /* Called when all pixels of the vector have been listed and processed. */
+    void (*finish)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
+} kernel_local_stages;
+
+struct kernel_local_lanes {
+    const kernel_local_stages *stages;
     kernel_tile_take *take; /* callback that traces cells that cannot be processed in lanes */
     int volume, part;
     kernel_arrays arrays; /* the arrays of the current mesh part */
@@ -46,10 +60,13 @@ typedef struct kernel_local_lanes {
      * (kernel_local_pixels()) */
     int32_t ends[4][SIMD_WIDTH];
     int alone; /* the lane whose cell is the tile's current cell, ready to be traced on its own; -1 if there is none */
-} kernel_local_lanes;
+    kernel_pixel_list rays;
+};
 
-SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume, kernel_tile_take *take)
+SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_local_stages *stages, int volume,
+                                          kernel_tile_take *take)
 {
+    l->stages = stages;
     l->take = take;
     l->volume = volume;
     l->part = -1;
@@ -162,8 +179,8 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
 /* Transforms the fetched cells into tile space. lists[0] to lists[2] get the vertices' positions, lists[3] the field;
  * all list_count rows are then sorted by the vertices' canonical order. Returns a mask of the visible cells. *lanes:
  * mask of those that can be processed in lanes. */
-SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, int type, vf (*lists)[8],
-                                        int list_count, float most_bent, unsigned *lanes)
+SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, vf (*lists)[8],
+                                        int list_count, float most_bent, unsigned *lanes, int type)
 {
     const int count = grid_type_vertices(type);
     const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);

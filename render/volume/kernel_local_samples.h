@@ -18,10 +18,12 @@
 #include "kernel_curved_rays.h"
 #include "kernel_local.h"
 #include "kernel_local_queue.h"
+#include "kernel_local_run.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_placed.h"
 #include "kernel_samples.h"
+#include "kernel_shapes.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -46,10 +48,9 @@ enum {
 };
 
 typedef struct kernel_local_batch {
+    kernel_local_lanes lanes;         /* must be the first member, as callbacks get it alone */
     kernel_tile_ray_samples *packets; /* packets of the tile */
-    kernel_local_lanes lanes;
-    int first, count; /* number of the window's first sample, and number of samples */
-    kernel_pixel_list rays;
+    int first, count;                 /* number of the window's first sample, and number of samples */
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
     /* By packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which the
@@ -63,31 +64,6 @@ typedef struct kernel_local_batch {
 SIMD_INLINE bool kernel_local_fits(const kernel_frame *f, int type)
 {
     return !f->surface_count && !f->job->separate_samples && kernel_local_queue_of(type) >= 0;
-}
-
-/* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */
-SIMD_INLINE void kernel_local_begin(const kernel_tile_trace *t, kernel_local_batch *b, kernel_tile_ray_samples *packets,
-                                    unsigned blocks, int volume, kernel_tile_take *take)
-{
-    b->packets = packets;
-    b->pad = 0;
-    kernel_local_lanes_begin(&b->lanes, volume, take);
-    for (int i = 0; i < KERNEL_TILE_PIXELS; i++) b->far[i] = -INFINITY;
-    for (; blocks; blocks &= blocks - 1) {
-        const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
-        for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
-            const kernel_packet *p = &t->packets[i];
-            const kernel_samples *s = &packets[i].samples;
-            vf_store(b->far + i * SIMD_WIDTH, vf_select(p->active, p->t_far, vf_set(-INFINITY)));
-            for (int n = 0; n < SIMD_WIDTH; n++) {
-                b->steps[2 * (i * SIMD_WIDTH + n)] = p->sample_base[n];
-                b->steps[2 * (i * SIMD_WIDTH + n) + 1] = p->sample_step[n];
-            }
-            b->pad = simd_max(s->pad, b->pad);
-            b->first = s->first;
-            b->count = s->count;
-        }
-    }
 }
 
 /* ---- samples ---- */
@@ -148,34 +124,20 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     }
 }
 
-static __attribute__((noinline)) void kernel_local_fill_hexes(kernel_tile_trace *t, kernel_local_batch *b)
+SIMD_INLINE void kernel_local_fill_all(kernel_tile_trace *t, kernel_local_batch *b, int type)
 {
-    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH)
-        kernel_local_fill_lanes(t, b, &b->lanes.queues[0], GRID_HEX, n);
+    const kernel_local_queue *q = &b->lanes.queues[kernel_shape_number(type)];
+    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH) kernel_local_fill_lanes(t, b, q, type, n);
 }
 
-static __attribute__((noinline)) void kernel_local_fill_wedges(kernel_tile_trace *t, kernel_local_batch *b)
+/* Computes the listed samples, and empties the list. */
+static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
-    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH)
-        kernel_local_fill_lanes(t, b, &b->lanes.queues[1], GRID_WEDGE, n);
-}
-
-static __attribute__((noinline)) void kernel_local_fill_pyramids(kernel_tile_trace *t, kernel_local_batch *b)
-{
-    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH)
-        kernel_local_fill_lanes(t, b, &b->lanes.queues[2], GRID_PYRAMID, n);
-}
-
-SIMD_INLINE void kernel_local_fill(kernel_tile_trace *t, kernel_local_batch *b, int type)
-{
+    kernel_local_batch *b = (kernel_local_batch *)l;
+    if (!b->sample_count) return;
     vf_store(b->bits + b->sample_count, vf_set(0));
     vf_store(b->t + b->sample_count, vf_set(0));
-    if (kernel_is_box(type))
-        kernel_local_fill_hexes(t, b);
-    else if (kernel_is_prism(type))
-        kernel_local_fill_wedges(t, b);
-    else
-        kernel_local_fill_pyramids(t, b);
+    KERNEL_OF_TYPE(type, kernel_local_fill_all, t, b);
     b->sample_count = 0;
 }
 
@@ -192,12 +154,12 @@ SIMD_INLINE vf kernel_local_first(const kernel_local_batch *b, vf negated)
 /* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
 SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batch *b, int type, int n)
 {
-    const int left = b->rays.count - n;
+    const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_bytes(b->rays.pixel + n);
+    const vi pixel = kernel_bytes(b->lanes.rays.pixel + n);
     kernel_lane_rays rays;
     vf base, step, near, far;
-    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->rays.lane + n));
+    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->lanes.rays.lane + n));
     const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
     kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
@@ -207,7 +169,7 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     const vf last = vf_min(vf_floor((end * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
     for (vm more = vm_and(active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
-        if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, b, type);
+        if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, &b->lanes, type);
         const vi whole = vi_from_vf(number);
         const vf place = base + step * vf_from_vi(whole + b->first);
         vf_compress(b->bits + b->sample_count, more, vf_from_bits(key | whole << KERNEL_LOCAL_NUMBER));
@@ -216,73 +178,49 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     }
 }
 
-static __attribute__((noinline)) void kernel_local_cast(kernel_tile_trace *t, kernel_local_batch *b, int type)
+static __attribute__((noinline)) void kernel_local_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
-    kernel_pixel_list_close(&b->rays);
-    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_cast_lanes(t, b, type, n);
-    b->rays.count = 0;
+    kernel_pixel_list_close(&l->rays);
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_cast_lanes(t, (kernel_local_batch *)l, type, n);
+    l->rays.count = 0;
 }
 
 /* ---- cells ---- */
 
-static __attribute__((noinline)) unsigned kernel_local_place_any(kernel_tile_trace *t, kernel_local_batch *b, int type,
-                                                                 unsigned *lanes)
+static unsigned kernel_local_place_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
 {
     vf lists[4][8];
-    if (kernel_is_box(type)) return kernel_local_place(t, &b->lanes, GRID_HEX, lists, 4, KERNEL_LOCAL_BENT, lanes);
-    if (kernel_is_prism(type)) return kernel_local_place(t, &b->lanes, GRID_WEDGE, lists, 4, KERNEL_LOCAL_BENT, lanes);
-    return kernel_local_place(t, &b->lanes, GRID_PYRAMID, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    return KERNEL_OF_TYPE(type, kernel_local_place, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
-static __attribute__((noinline)) unsigned kernel_local_fetch_any(kernel_local_batch *b, kernel_local_queue *q, int type)
-{
-    return KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
-}
+static const kernel_local_stages kernel_sample_stages = {true, kernel_local_place_lanes, kernel_local_cast,
+                                                         kernel_local_fill};
 
-/* Processes the first vector of cells of a queue: transforms them, and samples them in lanes or, if that is not
- * possible, one by one. */
-static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_batch *b, int queue)
+/* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */
+SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_local_batch *b,
+                                            kernel_tile_ray_samples *packets, unsigned blocks, int volume,
+                                            kernel_tile_take *take)
 {
-    kernel_local_queue *q = &b->lanes.queues[queue];
-    unsigned placed;
-    const unsigned all = kernel_local_fetch_any(b, q, kernel_curved_types[queue]);
-    const unsigned showing = kernel_local_place_any(t, b, kernel_curved_types[queue], &placed) & all;
-    placed &= all;
-    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~placed));
-    b->sample_count = b->rays.count = 0;
-    for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes);
-        unsigned box = q->box[n];
-        if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
-        kernel_pixel_list_add_box(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_cast(t, b, kernel_curved_types[queue]);
+    b->packets = packets;
+    b->pad = 0;
+    b->sample_count = 0;
+    kernel_local_lanes_begin(&b->lanes, &kernel_sample_stages, volume, take);
+    for (int i = 0; i < KERNEL_TILE_PIXELS; i++) b->far[i] = -INFINITY;
+    for (; blocks; blocks &= blocks - 1) {
+        const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
+        for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
+            const kernel_packet *p = &t->packets[i];
+            const kernel_samples *s = &packets[i].samples;
+            vf_store(b->far + i * SIMD_WIDTH, vf_select(p->active, p->t_far, vf_set(-INFINITY)));
+            for (int n = 0; n < SIMD_WIDTH; n++) {
+                b->steps[2 * (i * SIMD_WIDTH + n)] = p->sample_base[n];
+                b->steps[2 * (i * SIMD_WIDTH + n) + 1] = p->sample_step[n];
+            }
+            b->pad = simd_max(s->pad, b->pad);
+            b->first = s->first;
+            b->count = s->count;
+        }
     }
-    kernel_local_cast(t, b, kernel_curved_types[queue]);
-    if (b->sample_count) kernel_local_fill(t, b, kernel_curved_types[queue]);
-    for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes);
-        kernel_tile_meet_cell(t, b->lanes.volume, b->lanes.part, q->cell[n], true, q->blocks[n], b->lanes.take);
-    }
-    kernel_local_pop(q);
-}
-
-SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_batch *b)
-{
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++)
-        while (b->lanes.queues[i].count) kernel_local_run(t, b, i);
-}
-
-/* Queues a cell of a type for which kernel_local_fits() is true. */
-SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_batch *b, int part, int type, uint32_t cell,
-                                   unsigned blocks, unsigned box)
-{
-    const int queue = kernel_local_queue_of(type);
-    kernel_local_queue *q = &b->lanes.queues[queue];
-    if (part != b->lanes.part) {
-        kernel_local_end(t, b);
-        kernel_local_lanes_turn(t, &b->lanes, part);
-    }
-    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes.arrays, q, cell, blocks, box)) kernel_local_run(t, b, queue);
 }
 
 #endif

@@ -14,6 +14,7 @@
 #include "kernel_local_deviation.h"
 #include "kernel_local_crossings.h"
 #include "kernel_local_queue.h"
+#include "kernel_local_run.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_preintegral.h"
@@ -49,15 +50,12 @@ typedef struct kernel_local_list {
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
 typedef struct kernel_local_stretches {
+    kernel_local_lanes lanes;          /* must be the first member, as callbacks get it alone */
     kernel_tile_ray_segments *packets; /* packets of the tile */
     unsigned blocks;                   /* blocks of the current window */
     kernel_ray_segments_take *alone;   /* callback that processes rays in a single cell */
-    kernel_local_lanes lanes;
     kernel_local_faces faces;
     kernel_local_budget budget;
-    kernel_pixel_list rays;
-    /* rays that may meet their cells, and rays that cross two faces; crossed[1] has those whose first face is a
-     * triangle */
     kernel_local_list met, crossed[2];
     /* By packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
@@ -67,37 +65,6 @@ typedef struct kernel_local_stretches {
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
     return kernel_segments_fit(f) && f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
-}
-
-/* Copies the packets' windows and the limits of their rays into arrays per pixel. */
-static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
-                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
-                                        kernel_ray_segments_take *alone)
-{
-    b->packets = packets;
-    b->alone = alone;
-    b->budget.pieces = &t->frame->pieces[0];
-    b->budget.allowance = t->frame->allowance;
-    b->budget.reach = t->frame->reach[0];
-    b->blocks = blocks;
-    kernel_local_lanes_begin(&b->lanes, 0, take);
-    for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
-    for (; blocks; blocks &= blocks - 1) {
-        const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
-        for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
-            const kernel_packet *p = &t->packets[i];
-            const kernel_segments *list = &packets[i].list;
-            const vf from = vf_select(p->active, list->t_begin, vf_set(INFINITY));
-            vf_store(b->budget.per_t + i * SIMD_WIDTH, list->per_t);
-            for (int n = 0; n < SIMD_WIDTH; n++) {
-                const int at = 2 * (i * SIMD_WIDTH + n);
-                b->window[at] = from[n];
-                b->window[at + 1] = list->t_end[n];
-                b->reach[at] = p->t_near[n];
-                b->reach[at + 1] = p->t_far[n];
-            }
-        }
-    }
 }
 
 /* Adds a segment to the list of the ray at `at`, if it begins before the window's end. It must not begin before the
@@ -344,9 +311,9 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
 /* Lists those of the rays from index n on that may meet their cells within the window. */
 SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
 {
-    const int left = b->rays.count - n;
+    const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_bytes(b->rays.pixel + n), lane = kernel_bytes(b->rays.lane + n);
+    const vi pixel = kernel_bytes(b->lanes.rays.pixel + n), lane = kernel_bytes(b->lanes.rays.lane + n);
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
@@ -367,37 +334,14 @@ SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_st
             kernel_local_segments_lanes(t, b, q, &b->crossed[i], type, n);
 }
 
-static __attribute__((noinline)) void kernel_local_segments_hexes(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                  const kernel_local_queue *q)
+static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
-    kernel_local_segments_met(t, b, q, GRID_HEX);
-}
-
-static __attribute__((noinline)) void kernel_local_segments_wedges(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                   const kernel_local_queue *q)
-{
-    kernel_local_segments_met(t, b, q, GRID_WEDGE);
-}
-
-static __attribute__((noinline)) void kernel_local_segments_pyramids(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                     const kernel_local_queue *q)
-{
-    kernel_local_segments_met(t, b, q, GRID_PYRAMID);
-}
-
-static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                 const kernel_local_queue *q, int type)
-{
-    kernel_pixel_list_close(&b->rays);
+    kernel_local_stretches *b = (kernel_local_stretches *)l;
+    kernel_pixel_list_close(&l->rays);
     b->met.count = 0;
-    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
-    if (kernel_is_box(type))
-        kernel_local_segments_hexes(t, b, q);
-    else if (kernel_is_prism(type))
-        kernel_local_segments_wedges(t, b, q);
-    else
-        kernel_local_segments_pyramids(t, b, q);
-    b->rays.count = 0;
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
+    KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b, &l->queues[kernel_shape_number(type)]);
+    l->rays.count = 0;
 }
 
 /* ---- batches ---- */
@@ -409,7 +353,7 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
 {
     vf lists[5][8];
     kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, grid_type_vertices(type), lists[4]);
-    const unsigned showing = kernel_local_place(t, &b->lanes, type, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes);
+    const unsigned showing = kernel_local_place(t, &b->lanes, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
     kernel_local_faces_of(&t->tile, lists, b->lanes.ends, type, &b->faces);
     kernel_local_nonlinear_of(&b->lanes.cells, type, &b->budget.nonlinear);
     return showing;
@@ -424,12 +368,11 @@ SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
     return vm_or(kernel_span_is_steep(&state, low, high, false), kernel_span_steps(&state, &all, low, high));
 }
 
-static __attribute__((noinline)) unsigned kernel_local_segments_place(const kernel_tile_trace *t,
-                                                                      kernel_local_stretches *b, int type, unsigned all,
-                                                                      unsigned *lanes)
+static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_tile_trace *t, kernel_local_lanes *l,
+                                                                      int type, unsigned *lanes)
 {
-    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes) & all;
-    *lanes &= all;
+    kernel_local_stretches *b = (kernel_local_stretches *)l;
+    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes);
     const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
     KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values);
     *lanes &= ~vm_bits(kernel_local_is_steep(&b->budget));
@@ -464,51 +407,44 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
     }
 }
 
-/* Processes the first vector of cells of a queue: transforms them, and adds their segments in lanes or, if that is not
- * possible, one by one. */
-static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                int queue)
+static void kernel_local_segments_finish(kernel_tile_trace *t, kernel_local_lanes *l, int unused)
 {
-    const int type = kernel_curved_types[queue];
-    kernel_local_queue *q = &b->lanes.queues[queue];
-    unsigned placed;
-    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, &b->lanes, q);
-    const unsigned showing = kernel_local_segments_place(t, b, type, all, &placed);
-    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~placed));
-    b->rays.count = 0;
-    for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes);
-        unsigned box = q->box[n];
-        if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
-        kernel_pixel_list_add_box(&b->rays, box, n);
-        if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_local_segments_cast(t, b, q, type);
-    }
-    kernel_local_segments_cast(t, b, q, type);
-    for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes);
-        kernel_tile_meet_cell(t, 0, b->lanes.part, q->cell[n], false, q->blocks[n], b->lanes.take);
-    }
-    kernel_local_pop(q);
-    kernel_local_segments_shorten(t, b);
+    (void)unused;
+    kernel_local_segments_shorten(t, (kernel_local_stretches *)l);
 }
 
-SIMD_INLINE void kernel_local_segments_end(kernel_tile_trace *t, kernel_local_stretches *b)
-{
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++)
-        while (b->lanes.queues[i].count) kernel_local_segments_run(t, b, i);
-}
+static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_place,
+                                                          kernel_local_segments_cast, kernel_local_segments_finish};
 
-/* Queues a cell of a type for which kernel_local_segments_fit() is true. */
-SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_stretches *b, int part, int type,
-                                            uint32_t cell, unsigned blocks, unsigned box)
+/* Copies the packets' windows and the limits of their rays into arrays per pixel. */
+static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
+                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
+                                        kernel_ray_segments_take *alone)
 {
-    const int queue = kernel_local_queue_of(type);
-    if (part != b->lanes.part) {
-        kernel_local_segments_end(t, b);
-        kernel_local_lanes_turn(t, &b->lanes, part);
+    b->packets = packets;
+    b->alone = alone;
+    b->budget.pieces = &t->frame->pieces[0];
+    b->budget.allowance = t->frame->allowance;
+    b->budget.reach = t->frame->reach[0];
+    b->blocks = blocks;
+    kernel_local_lanes_begin(&b->lanes, &kernel_segment_stages, 0, take);
+    for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
+    for (; blocks; blocks &= blocks - 1) {
+        const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
+        for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
+            const kernel_packet *p = &t->packets[i];
+            const kernel_segments *list = &packets[i].list;
+            const vf from = vf_select(p->active, list->t_begin, vf_set(INFINITY));
+            vf_store(b->budget.per_t + i * SIMD_WIDTH, list->per_t);
+            for (int n = 0; n < SIMD_WIDTH; n++) {
+                const int at = 2 * (i * SIMD_WIDTH + n);
+                b->window[at] = from[n];
+                b->window[at + 1] = list->t_end[n];
+                b->reach[at] = p->t_near[n];
+                b->reach[at + 1] = p->t_far[n];
+            }
+        }
     }
-    if (KERNEL_OF_TYPE(type, kernel_local_push, &b->lanes.arrays, &b->lanes.queues[queue], cell, blocks, box))
-        kernel_local_segments_run(t, b, queue);
 }
 
 #endif

@@ -17,8 +17,7 @@ _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vecto
 
 /* Lists the pixels of the given lanes' pending tets whose bounding boxes have at most `most` pixels; skips tets that
  * lie between pixels. Returns the lanes of the larger tets. */
-static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lanes, int most, kernel_local_lanes *l,
-                                       kernel_pixel_list *rays)
+static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lanes, int most, kernel_local_lanes *l)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     vf places[3][8];
@@ -26,7 +25,7 @@ static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lane
     for (int a = 0; a < 3; a++)
         for (int i = 0; i < 4; i++) places[a][i] = cells->placed.at[a][i];
     kernel_local_pixels(t, 4, (const vf(*)[8])places, l->ends);
-    rays->count = 0;
+    l->rays.count = 0;
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = cells->tets.box[n];
@@ -34,9 +33,9 @@ static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lane
         if (kernel_box_pixels(box) > most)
             others |= 1u << n;
         else
-            kernel_pixel_list_add_box(rays, box, n);
+            kernel_pixel_list_add_box(&l->rays, box, n);
     }
-    kernel_pixel_list_close(rays);
+    kernel_pixel_list_close(&l->rays);
     return others;
 }
 

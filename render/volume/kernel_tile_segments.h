@@ -26,6 +26,7 @@
 #include "kernel_double.h"
 #include "kernel_exact.h"
 #include "kernel_local_queue.h"
+#include "kernel_local_run.h"
 #include "kernel_local_segments.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -84,8 +85,8 @@ static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell,
     const grid *g = t->frame->job->parts[part].cells;
     const int type = grid_cell_type(g, cell);
     if (!kernel_arrays_fit(g) || !kernel_local_segments_fit(t->frame, type)) return false;
-    kernel_local_stretches *b = &t->thread->tile_segments->stretches;
-    kernel_local_segments_wait(t, b, part, type, cell, blocks, kernel_tile_box(blocks, box));
+    kernel_local_lanes *l = &t->thread->tile_segments->stretches.lanes;
+    kernel_local_wait(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
 }
 
@@ -134,12 +135,12 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     kernel_local_stretches *b = &s->stretches;
-    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes, &b->rays);
-    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
+    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes);
+    for (int n = 0; n < b->lanes.rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
         vf begin, end, near, far;
-        kernel_lane_rays_begin(&r, t, &b->rays, n);
+        kernel_lane_rays_begin(&r, t, &b->lanes.rays, n);
         const vi at = r.at;
         vf_gather_pair(b->window, 2 * at, &begin, &end);
         r.active = vm_and(r.active, vf_lt(begin, end));
@@ -153,7 +154,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         if (vm_any(own)) kernel_local_put_all(b, at, own, ends);
         if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
     }
-    b->rays.count = 0;
+    b->lanes.rays.count = 0;
     kernel_local_segments_shorten(t, b);
     return others;
 }
@@ -219,7 +220,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         kernel_visit_open(t, &kernel_segments_visitor, blocks);
     else
         kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
-    kernel_local_segments_end(t, &s->stretches);
+    kernel_local_end(t, &s->stretches.lanes);
 }
 
 /* Chooses the next window's depth from the lengths of this window's lists, so that the fullest list will be three

@@ -23,6 +23,7 @@
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
 #include "kernel_crossings.h"
+#include "kernel_local_run.h"
 #include "kernel_local_samples.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -87,7 +88,7 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
     const grid *g = t->frame->job->parts[part].cells;
     const int type = grid_cell_type(g, cell);
     if (!kernel_arrays_fit(g) || !kernel_local_fits(t->frame, type)) return false;
-    kernel_local_wait(t, &t->thread->tile_volume->batch, part, type, cell, blocks, kernel_tile_box(blocks, box));
+    kernel_local_wait(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
 }
 
@@ -159,17 +160,17 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
 static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_local_batch *b = &t->thread->tile_volume->batch;
-    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_SAMPLE_PIXELS, &b->lanes, &b->rays);
-    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) {
+    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_SAMPLE_PIXELS, &b->lanes);
+    for (int n = 0; n < b->lanes.rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
-        kernel_lane_rays_begin(&r, t, &b->rays, n);
+        kernel_lane_rays_begin(&r, t, &b->lanes.rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
         kernel_tet_rays_interval(&t->thread->tile_cells->placed, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
-    b->rays.count = 0;
+    b->lanes.rays.count = 0;
     return others;
 }
 
@@ -240,12 +241,12 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     }
     if (!is_lit) return false;
     for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
-        kernel_local_begin(t, &v->batch, v->packets, blocks, v->volume, kernel_tile_samples);
+        kernel_local_samples_begin(t, &v->batch, v->packets, blocks, v->volume, kernel_tile_samples);
         if (t->frame->volume_candidates)
             kernel_visit_open(t, &kernel_samples_visitor, blocks);
         else
             kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
-        kernel_local_end(t, &v->batch);
+        kernel_local_end(t, &v->batch.lanes);
     }
     return true;
 }
