@@ -42,7 +42,8 @@ SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
     t->cell->part = part;
     kernel_cell_order(t->cell);
     kernel_cell_lines(t->cell, t->frame, &t->tile);
-    if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);
+    if (t->surface->layer->colour_map)
+        kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
 }
 
 static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part, int value,

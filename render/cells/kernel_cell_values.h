@@ -1,4 +1,4 @@
-/* A cell's values as layers need them: beside an isovalue, in the domain of a transfer function, as colours. */
+/* A cell's values as layers need them: relative to an isovalue, in the domain of a transfer function, as colours. */
 #ifndef RENDER_KERNEL_CELL_VALUES_H
 #define RENDER_KERNEL_CELL_VALUES_H
 
@@ -11,12 +11,13 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
+/* Returns whether some values are below the isovalue and some are not. */
+SIMD_INLINE bool kernel_values_straddle(const double *values, int count, double isovalue)
 {
     bool below = false, above = false;
-    for (int i = 0; i < c->count; i++) {
-        below = below || c->values[i] < value;
-        above = above || c->values[i] >= value;
+    for (int i = 0; i < count; i++) {
+        below = below || values[i] < isovalue;
+        above = above || values[i] >= isovalue;
     }
     return below && above;
 }
@@ -35,26 +36,37 @@ SIMD_INLINE double kernel_mirrored_power(double largest)
     return scale;
 }
 
-/* Sets f to the values minus the isovalue, times a power of two that scales the largest to near 1. */
-SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
+/* Subtracts the isovalue, and scales the values by a power of two, which it returns, so that the largest is near 1. */
+SIMD_INLINE double kernel_values_relative(const double *values, int count, double isovalue, float *out)
 {
     double largest = 0;
-    for (int i = 0; i < c->count; i++) {
-        const double size = fabs(c->values[i] - value);
+    for (int i = 0; i < count; i++) {
+        const double size = fabs(values[i] - isovalue);
         largest = size > largest ? size : largest;
     }
     const double scale = kernel_mirrored_power(largest);
-    for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
+    for (int i = 0; i < count; i++) out[i] = (float)((values[i] - isovalue) * scale);
+    return scale;
 }
 
-/* Sets g to the colour field in the domain of its transfer function. Cells keep the field's order of vertices. */
-SIMD_INLINE void kernel_cell_colours(kernel_cell *c, const kernel_surface *s, int part)
+SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double isovalue)
+{
+    kernel_values_relative(c->values, c->count, isovalue, c->f);
+}
+
+/* Converts the colour field at a cell's vertices to its transfer's domain; returns the mean. */
+SIMD_INLINE double kernel_values_colours(const kernel_surface *s, int part, uint32_t cell, const int64_t *vertices,
+                                         int count, float *out)
 {
     const grid_field *field = &s->layer->colour_field.fields[part];
-    for (int i = 0; i < c->count; i++) {
-        const double v = grid_field_value(field, field->is_cell_centred ? c->index : c->vertices[i]);
-        c->g[i] = (float)((v - s->colour.low) * s->colour.inverse_width);
+    double mean = 0;
+    for (int i = 0; i < count; i++) {
+        const double v = grid_field_value(field, field->is_cell_centred ? cell : vertices[i]);
+        const double place = (v - s->colour.low) * s->colour.inverse_width;
+        out[i] = (float)place;
+        mean += place / count;
     }
+    return mean;
 }
 
 /* Returns v clamped to the interval [-limit, limit] and rounded to float32. */

@@ -272,7 +272,7 @@ static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel
 /* Adds the fetched cell to the candidates if the isovalue crosses it. */
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
 {
-    if (c->is_finite && kernel_cell_straddles(c, s->surface->layer->values[value]))
+    if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
         kernel_find_whole(s, c, s->source + (uint32_t)value);
 }
 

@@ -87,7 +87,7 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace 
     if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_placed_exactly(&b->tets, n, c);
     if (!layer->colour_map && !layer->lines) return;
     for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
-    if (layer->colour_map) kernel_cell_colours(c, t->surface, b->own->part);
+    if (layer->colour_map) kernel_values_colours(t->surface, c->part, c->index, c->vertices, 4, c->g);
 }
 
 /* ---- lanes are pixels ---- */

@@ -151,9 +151,9 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
     c->has_slopes = c->is_placed = false;
     o->world = c->world;
     o->vertex_count = c->vertex_count;
-    if (!kernel_polyhedron_straddles(c, value)) return;
+    if (!kernel_values_straddle(c->values, c->vertex_count, value)) return;
     kernel_polyhedron_place(c, p);
-    kernel_polyhedron_relative(c, value);
+    c->scale = kernel_values_relative(c->values, c->vertex_count + 1, value, c->f);
     kernel_occlusion_polyhedron(p, o, c, p->active);
 }
 

@@ -326,40 +326,6 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *sta
  * range, but trees and the session's plan assume that only isovalues between vertex values have a surface in the
  * cell. */
 
-SIMD_INLINE bool kernel_polyhedron_straddles(const polyhedron *c, double value)
-{
-    bool below = false, above = false;
-    for (int i = 0; i < c->vertex_count; i++) {
-        below = below || c->values[i] < value;
-        above = above || c->values[i] >= value;
-    }
-    return below && above;
-}
-
-SIMD_INLINE void kernel_polyhedron_relative(polyhedron *c, double value)
-{
-    double largest = 0;
-    for (int i = 0; i < c->vertex_count; i++) {
-        const double size = fabs(c->values[i] - value);
-        largest = size > largest ? size : largest;
-    }
-    c->scale = kernel_mirrored_power(largest);
-    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = (float)((c->values[i] - value) * c->scale);
-}
-
-static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, int part)
-{
-    const grid_field *field = &s->layer->colour_field.fields[part];
-    double sum = 0;
-    for (int i = 0; i < c->vertex_count; i++) {
-        const double v = grid_field_value(field, field->is_cell_centred ? c->index : c->vertices[i]);
-        const double place = (v - s->colour.low) * s->colour.inverse_width;
-        c->g[i] = (float)place;
-        sum += place / c->vertex_count;
-    }
-    c->g[c->vertex_count] = (float)sum;
-}
-
 /* Computes the gradient of the field in the tet of a surface triangle, in camera axes and in double. */
 static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
 {
@@ -714,13 +680,16 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
     if (!c) p->thread->out_of_memory = true;
     if (!c || !c->is_finite) return;
     for (int value = 0; value < layer->value_count; value++) {
-        if (!kernel_polyhedron_straddles(c, layer->values[value])) continue;
+        if (!kernel_values_straddle(c->values, c->vertex_count, layer->values[value])) continue;
         const bool is_fresh = !c->is_placed;
         if (is_fresh) {
             kernel_polyhedron_place(c, p);
-            if (layer->colour_map) kernel_polyhedron_colours(c, state->surface, part);
+            if (layer->colour_map)
+                c->g[c->vertex_count] =
+                    (float)kernel_values_colours(state->surface, part, c->index, c->vertices, c->vertex_count, c->g);
         }
-        if (is_fresh || layer->value_count > 1) kernel_polyhedron_relative(c, layer->values[value]);
+        if (is_fresh || layer->value_count > 1)
+            c->scale = kernel_values_relative(c->values, c->vertex_count + 1, layer->values[value], c->f);
         kernel_polyhedron_surface(p, state, c, value, rays);
     }
 }
