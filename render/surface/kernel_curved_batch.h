@@ -378,24 +378,32 @@ SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curve
     return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
 }
 
-/* Refines the roots of the rays in `found` by Newton's method and accepts those that are visible. Returns the mask of
- * blocks with a nearer hit. */
-SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
+/* Polishes the roots that are found, and takes those that are visible. is_contracted: the roots come from
+ * kernel_curved_batch_contract(), which knows them so well that they need no bracket. */
+SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, bool is_contracted,
+                                                int type)
 {
+    const kernel_curved_ends *found = &h->found_ends;
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
         kernel_map map;
         kernel_point ends[2], at;
+        vm open = vm_none();
         kernel_lane_rays_begin(&p, t, &h->found, n);
         p.far = kernel_batch_far(t, p.at);
-        for (int e = 0; e < 2; e++) {
-            ends[e].t = vf_load(h->found_ends.t[e] + n);
-            ends[e].value = vf_load(h->found_ends.v[e] + n);
-            for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(h->found_ends.r[e][a] + n);
+        for (int e = 0; e < (is_contracted ? 1 : 2); e++) {
+            ends[e].t = vf_load(found->t[e] + n);
+            ends[e].value = vf_load(found->v[e] + n);
+            for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(found->r[e][a] + n);
         }
         kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, p.lane, &map, type);
-        const vm open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
+        if (is_contracted) {
+            at = ends[0];
+            kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
+        } else {
+            open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
+        }
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
             nearer |= kernel_curved_batch_alone(t, h, &h->found, n, p.at, vm_bits(open));
@@ -406,33 +414,12 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
 
 static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h);
-}
-
-/* Refines the crossings found by contraction by one step and accepts those that are visible. Returns the mask of blocks
- * with a nearer hit. */
-SIMD_INLINE unsigned kernel_curved_batch_known_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
-{
-    unsigned nearer = 0;
-    for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
-        kernel_lane_rays p;
-        kernel_map map;
-        kernel_point at;
-        kernel_lane_rays_begin(&p, t, &h->found, n);
-        p.far = kernel_batch_far(t, p.at);
-        at.t = vf_load(h->found_ends.t[0] + n);
-        for (int a = 0; a < 3; a++) at.r[a] = vf_load(h->found_ends.r[0][a] + n);
-        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, p.lane, &map, type);
-        kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
-        const vm hit = vm_and(p.active, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        if (vm_any(hit)) nearer |= kernel_curved_batch_take(t, h, n, &p, &map, &at, hit);
-    }
-    return nearer;
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
 static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_known_of, t, h);
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, true);
 }
 
 /* Searches the rays of `others` from index n on for their first visible root, and accepts it. Returns the mask of
