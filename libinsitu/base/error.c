@@ -7,7 +7,7 @@
 
 /* Returns the number of bytes of the control character at which the text begins, or 0 if it begins with none. Control
  * characters are those of ASCII, and those of Latin 1's second block in UTF-8. */
-static size_t control_bytes(const unsigned char *text)
+static size_t count_control_bytes(const unsigned char *text)
 {
     if (text[0] < ' ' || text[0] == 0x7f) return 1;
     return text[0] == 0xc2 && text[1] >= 0x80 && text[1] < 0xa0 ? 2 : 0;
@@ -16,7 +16,7 @@ static size_t control_bytes(const unsigned char *text)
 static bool has_control(const char *text)
 {
     for (; *text; text++)
-        if (control_bytes((const unsigned char *)text)) return true;
+        if (count_control_bytes((const unsigned char *)text)) return true;
     return false;
 }
 
@@ -28,7 +28,7 @@ void base_escape(char *text, size_t capacity)
     size_t size = 0;
     const unsigned char *c = (const unsigned char *)text;
     while (*c && size + 1 < room) {
-        const size_t bytes = control_bytes(c);
+        const size_t bytes = count_control_bytes(c);
         if (bytes == 0)
             escaped[size++] = (char)*c++;
         else

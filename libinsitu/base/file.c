@@ -14,7 +14,7 @@
 
 /* ---- failures -------------------------------------------------------------------------------------------------- */
 
-static bool fail(file_failure *failure, int code)
+static bool fail_with_errno(file_failure *failure, int code)
 {
     *failure = (file_failure){.is_missing = code == ENOENT, .is_memory = code == ENOMEM};
     snprintf(failure->reason, sizeof failure->reason, "%s", strerror(code));
@@ -42,10 +42,10 @@ static bool fail_size(file_failure *failure, size_t limit)
 /* ---- opening --------------------------------------------------------------------------------------------------- */
 
 /* Gets the status of the path. Anything other than a regular file is a failure. */
-static bool look(const char *path, int flags, struct stat *stamp, file_failure *failure)
+static bool find_file_status(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
     const int look_flags = flags & O_NOFOLLOW ? AT_SYMLINK_NOFOLLOW : 0;
-    if (fstatat(AT_FDCWD, path, stamp, look_flags) != 0) return fail(failure, errno);
+    if (fstatat(AT_FDCWD, path, stamp, look_flags) != 0) return fail_with_errno(failure, errno);
     return S_ISREG(stamp->st_mode) || fail_kind(failure, stamp->st_mode);
 }
 
@@ -54,10 +54,10 @@ static bool look(const char *path, int flags, struct stat *stamp, file_failure *
  * place in between. */
 static int open_regular(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
-    if (!look(path, flags, stamp, failure)) return -1;
+    if (!find_file_status(path, flags, stamp, failure)) return -1;
     const int file = open(path, flags | O_NONBLOCK | O_CLOEXEC);
     if (file < 0) {
-        fail(failure, errno);
+        fail_with_errno(failure, errno);
         return -1;
     }
     const bool is_known = fstat(file, stamp) == 0;
@@ -65,7 +65,7 @@ static int open_regular(const char *path, int flags, struct stat *stamp, file_fa
     if (is_known)
         fail_kind(failure, stamp->st_mode);
     else
-        fail(failure, errno);
+        fail_with_errno(failure, errno);
     close(file);
     return -1;
 }
@@ -92,12 +92,12 @@ static bool read_all(int file, size_t limit, file_content *out, file_failure *fa
         if (!out->text || out->size == capacity) {
             if (out->text) capacity += capacity / 2 + 4096;
             char *more = base_realloc(out->text, capacity + 1);
-            if (!more) return fail(failure, ENOMEM);
+            if (!more) return fail_with_errno(failure, ENOMEM);
             out->text = more;
         }
         const ssize_t count = read(file, out->text + out->size, capacity - out->size);
         if (count < 0 && errno == EINTR) continue;
-        if (count < 0) return fail(failure, errno);
+        if (count < 0) return fail_with_errno(failure, errno);
         out->text[out->size += (size_t)count] = '\0';
         if (count == 0) return true;
     }
@@ -155,7 +155,7 @@ bool file_append(const char *path, const char *bytes, size_t size, file_failure 
         is_written = false;
         code = errno;
     }
-    return is_written || fail(failure, code);
+    return is_written || fail_with_errno(failure, code);
 }
 
 static bool make_folders(char *path)
@@ -182,7 +182,7 @@ static bool check_place(const file_place *place, file_failure *failure)
     struct stat found;
     if (*place->name == '\0') return fail_kind(failure, S_IFDIR);
     if (fstatat(place->folder, place->name, &found, AT_SYMLINK_NOFOLLOW) != 0)
-        return errno == ENOENT || fail(failure, errno);
+        return errno == ENOENT || fail_with_errno(failure, errno);
     return S_ISREG(found.st_mode) || S_ISLNK(found.st_mode) || fail_kind(failure, found.st_mode);
 }
 
@@ -190,14 +190,14 @@ static bool open_place(const char *path, file_place *place, file_failure *failur
 {
     place->folder = -1;
     place->path = base_strdup(path);
-    if (!place->path) return fail(failure, ENOMEM);
+    if (!place->path) return fail_with_errno(failure, ENOMEM);
     char *slash = strrchr(place->path, '/');
     place->name = slash ? slash + 1 : place->path;
-    if (slash && !make_folders(place->path)) return fail(failure, errno);
+    if (slash && !make_folders(place->path)) return fail_with_errno(failure, errno);
     if (slash) *slash = '\0';
     const char *folder = !slash ? "." : slash == place->path ? "/" : place->path;
     place->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
-    return (place->folder >= 0 || fail(failure, errno)) && check_place(place, failure);
+    return (place->folder >= 0 || fail_with_errno(failure, errno)) && check_place(place, failure);
 }
 
 enum { TEMPORARY_NAME = 40, TRIES = 8 };
@@ -224,23 +224,23 @@ static bool try_to_replace(const file_place *place, const char *temporary, const
 
 /* Replaces the file; tries again if another process has deleted the temporary file because it took it for one that a
  * killed run has left. */
-static bool replace(const file_place *place, const char *bytes, size_t size, file_failure *failure)
+static bool replace_file(const file_place *place, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {
         uint64_t random;
         char temporary[TEMPORARY_NAME];
-        if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) return fail(failure, errno);
+        if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) return fail_with_errno(failure, errno);
         snprintf(temporary, sizeof temporary, ".insitu-%016llx.part", (unsigned long long)random);
         if (try_to_replace(place, temporary, bytes, size)) return true;
         if (errno != ENOENT && errno != EEXIST) break;
     }
-    return fail(failure, errno);
+    return fail_with_errno(failure, errno);
 }
 
 bool file_replace(const char *path, const char *bytes, size_t size, file_failure *failure)
 {
     file_place place;
-    const bool is_replaced = open_place(path, &place, failure) && replace(&place, bytes, size, failure);
+    const bool is_replaced = open_place(path, &place, failure) && replace_file(&place, bytes, size, failure);
     if (place.folder >= 0) close(place.folder);
     base_free(place.path);
     return is_replaced;

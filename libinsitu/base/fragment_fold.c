@@ -5,7 +5,7 @@
 /* ---- the binary tree of an interval
  * ------------------------------------------------------------------------------- */
 
-static void put_behind(fragment *front, const fragment *behind)
+static void blend_behind(fragment *front, const fragment *behind)
 {
     for (int c = 0; c < 3; c++) front->colour[c] += front->transmittance * behind->colour[c];
     front->transmittance *= behind->transmittance;
@@ -13,7 +13,7 @@ static void put_behind(fragment *front, const fragment *behind)
 }
 
 /* Returns the height above the leaves of the lowest node that contains both leaves. */
-static int height_of(int32_t a, int32_t b)
+static int find_common_height(int32_t a, int32_t b)
 {
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
@@ -28,17 +28,17 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
     open[0] = sorted[0];
     for (int64_t i = 1; i < count; i++) {
         const int32_t next = fragment_leaf(sorted[i].t_in);
-        const int height = height_of(leaf, next);
+        const int height = find_common_height(leaf, next);
         leaf = next;
         if (height == 0) {
-            put_behind(&open[depth - 1], &sorted[i]);
+            blend_behind(&open[depth - 1], &sorted[i]);
             continue;
         }
-        for (; depth > 1 && heights[depth - 1] < height; depth--) put_behind(&open[depth - 2], &open[depth - 1]);
+        for (; depth > 1 && heights[depth - 1] < height; depth--) blend_behind(&open[depth - 2], &open[depth - 1]);
         open[depth] = sorted[i];
         heights[depth++] = height;
     }
-    for (; depth > 1; depth--) put_behind(&open[depth - 2], &open[depth - 1]);
+    for (; depth > 1; depth--) blend_behind(&open[depth - 2], &open[depth - 1]);
     return open[0];
 }
 
@@ -52,14 +52,15 @@ typedef struct fold_part {
 } fold_part;
 
 /* Returns the t at which a leaf begins. The result is exact, because it is a product with a power of two. */
-static double begin_of(int32_t leaf)
+static double find_leaf_begin(int32_t leaf)
 {
     return (double)leaf / (FRAGMENT_STRETCHES << FRAGMENT_HALVINGS);
 }
 
 static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
 {
-    return (double)part->begin <= begin_of(first_leaf) && begin_of(first_leaf + (1 << height)) <= (double)part->end;
+    return (double)part->begin <= find_leaf_begin(first_leaf) &&
+           find_leaf_begin(first_leaf + (1 << height)) <= (double)part->end;
 }
 
 /* Appends the fragments of a node to out, and folds every node of which the rank has all fragments. */

@@ -48,17 +48,17 @@ size_t closed_faces_lay_out(closed_faces *c, char *room)
 
 /* ---- reading -------------------------------------------------------------------------------------------------- */
 
-static size_t hash_of(uint64_t a, uint64_t b)
+static size_t hash_pair(uint64_t a, uint64_t b)
 {
     uint64_t h = (a * 0x9e3779b97f4a7c15u) ^ (b * 0xc2b2ae3d27d4eb4fu);
     h ^= h >> 29;
     return (size_t)((h * 0x9e3779b97f4a7c15u) >> 20);
 }
 
-static int number_of(closed_faces *c, int64_t vertex)
+static int find_vertex_number(closed_faces *c, int64_t vertex)
 {
     const size_t last = (size_t)(c->table_size - 1);
-    size_t at = hash_of((uint64_t)vertex, 1) & last;
+    size_t at = hash_pair((uint64_t)vertex, 1) & last;
     while (c->seen[at] >= 0 && c->seen[at] != vertex) at = (at + 1) & last;
     if (c->seen[at] == vertex) return c->seen_number[at];
     c->seen[at] = vertex;
@@ -83,7 +83,7 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
             const int64_t vertex = grid_array_index(&g->face_connectivity, i);
             if (vertex == before) continue;
             c->face_of[entry] = face;
-            c->entry[entry++] = number_of(c, vertex);
+            c->entry[entry++] = find_vertex_number(c, vertex);
             before = vertex;
         }
     }
@@ -92,7 +92,7 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
 
 /* ---- consistent orientation -------------------------------------------------------------------------------------- */
 
-static int side_end(const closed_faces *c, int side)
+static int find_side_end(const closed_faces *c, int side)
 {
     const int face = c->face_of[side];
     return c->entry[side + 1 < c->first[face + 1] ? side + 1 : c->first[face]];
@@ -102,7 +102,7 @@ int closed_edges_find(closed_faces *c, int a, int b)
 {
     const int low = a < b ? a : b, high = a < b ? b : a;
     const size_t last = 2 * (size_t)c->table_size - 1;
-    size_t at = hash_of((uint64_t)low, (uint64_t)high) & last;
+    size_t at = hash_pair((uint64_t)low, (uint64_t)high) & last;
     while (c->edges[at].low >= 0 && (c->edges[at].low != low || c->edges[at].high != high)) at = (at + 1) & last;
     if (c->edges[at].low < 0) c->edges[at] = (closed_edge){low, high, {-1, -1}};
     return (int)at;
@@ -114,7 +114,7 @@ void closed_edges_empty(closed_faces *c)
 }
 
 /* Orients the faces that can be reached across edges from the first face consistently with it. */
-static void turn_piece(closed_faces *c, int first)
+static void orient_piece(closed_faces *c, int first)
 {
     int height = 0;
     c->stack[height++] = first;
@@ -140,7 +140,7 @@ void closed_faces_turn(closed_faces *c)
     closed_edges_empty(c);
     c->piece_count = 0;
     for (int side = 0; side < c->entry_count; side++) {
-        const int at = closed_edges_find(c, c->entry[side], side_end(c, side));
+        const int at = closed_edges_find(c, c->entry[side], find_side_end(c, side));
         closed_edge *edge = &c->edges[at];
         c->edge_of[side] = at;
         if (edge->side[0] < 0)
@@ -150,7 +150,7 @@ void closed_faces_turn(closed_faces *c)
     }
     memset(c->turn, 0, (size_t)c->face_count * sizeof(int));
     for (int face = 0; face < c->face_count; face++)
-        if (!c->turn[face]) turn_piece(c, face);
+        if (!c->turn[face]) orient_piece(c, face);
 }
 
 static void swap_pair(closed_triangle *t, int i, int j)
@@ -207,7 +207,7 @@ static double tet_volume(const double (*p)[3], const int *v, const double *centr
 
 /* Returns whether the ray from p in the negative x direction crosses the triangle. A corner at the same height as p
  * counts as above it. If the projection of the triangle is a line, the ray does not cross it. */
-static bool crosses_below(const double *const t[3], const double *p)
+static bool is_crossed_below(const double *const t[3], const double *p)
 {
     bool inside = false;
     for (int i = 0; i < 3; i++) {
@@ -239,7 +239,7 @@ static bool is_cavity(const closed_faces *c, const double (*positions)[3], int p
     for (int i = 0; i < c->triangle_count; i++) {
         const closed_triangle *t = &c->triangles[i];
         const double *const corners[3] = {positions[t->vertex[0]], positions[t->vertex[1]], positions[t->vertex[2]]};
-        if (c->piece[t->face] != piece && crosses_below(corners, positions[smallest])) inside = !inside;
+        if (c->piece[t->face] != piece && is_crossed_below(corners, positions[smallest])) inside = !inside;
     }
     return inside;
 }

@@ -32,7 +32,7 @@ size_t polygon_room(int count)
     return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int) + 1) + 8;
 }
 
-static polygon_work lay_out(int count, char *room, int (*triangles)[3])
+static polygon_work divide_work(int count, char *room, int (*triangles)[3])
 {
     const size_t n = (size_t)count;
     polygon_work w = {.count = count, .triangles = triangles};
@@ -48,14 +48,14 @@ static polygon_work lay_out(int count, char *room, int (*triangles)[3])
 /* ---- the order of corners
  * ----------------------------------------------------------------------------------------- */
 
-static int compare_places(const double a[3], const double b[3])
+static int compare_positions(const double a[3], const double b[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
     return 0;
 }
 
-static int at(int start, int step, int i, int count)
+static int cyclic_index(int start, int step, int i, int count)
 {
     return (start + (step > 0 ? i : count - i)) % count;
 }
@@ -63,7 +63,8 @@ static int at(int start, int step, int i, int count)
 static bool is_less(const double (*p)[3], int count, const int one[2], const int other[2])
 {
     for (int i = 0; i < count; i++) {
-        const int sign = compare_places(p[at(one[0], one[1], i, count)], p[at(other[0], other[1], i, count)]);
+        const int sign =
+            compare_positions(p[cyclic_index(one[0], one[1], i, count)], p[cyclic_index(other[0], other[1], i, count)]);
         if (sign) return sign < 0;
     }
     return false;
@@ -73,17 +74,17 @@ static void find_order(polygon_work *w, const double (*p)[3])
 {
     int best[2] = {0, 1};
     for (int i = 0; i < w->count; i++) {
-        if (compare_places(p[i], p[best[0]]) > 0) continue;
+        if (compare_positions(p[i], p[best[0]]) > 0) continue;
         for (int step = 1; step >= -1; step -= 2)
             if (is_less(p, w->count, (const int[2]){i, step}, best)) best[0] = i, best[1] = step;
     }
-    for (int i = 0; i < w->count; i++) w->order[i] = at(best[0], best[1], i, w->count);
+    for (int i = 0; i < w->count; i++) w->order[i] = cyclic_index(best[0], best[1], i, w->count);
     w->step = best[1];
 }
 
 /* Computes the scaled positions. The scale is a power of two, so that scaling is exact. Returns false if all corners
  * have the same position. */
-static bool find_places(polygon_work *w, const double (*p)[3])
+static bool scale_positions(polygon_work *w, const double (*p)[3])
 {
     double widest = 0;
     int exponent;
@@ -149,7 +150,7 @@ static void add_fan(polygon_work *w, int first)
 
 /* ---- ears ----------------------------------------------------------------------------------------------------- */
 
-static void flatten(polygon_work *w, const double normal[3])
+static void project_to_plane(polygon_work *w, const double normal[3])
 {
     const double size = sqrt(vector3_dot(normal, normal));
     double up[3], right[3], across[3] = {0, 0, 0};
@@ -168,13 +169,13 @@ static void flatten(polygon_work *w, const double normal[3])
 }
 
 /* Returns twice the area of a triangle, which is positive if the triangle runs counterclockwise. */
-static double area_of(const polygon_work *w, int a, int b, int c)
+static double triangle_area(const polygon_work *w, int a, int b, int c)
 {
     const double *p = w->flat[a], *q = w->flat[b], *r = w->flat[c];
     return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
 }
 
-static bool are_together(const polygon_work *w, int a, int b)
+static bool are_coincident(const polygon_work *w, int a, int b)
 {
     const double *p = w->places[a], *q = w->places[b];
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
@@ -186,22 +187,23 @@ static bool enters_corner(const polygon_work *w, int a, int tip, int c, int agai
 {
     const int ends[2] = {w->before[again], w->next[again]};
     for (int i = 0; i < 2; i++)
-        if (area_of(w, a, tip, ends[i]) > line_slack && area_of(w, tip, c, ends[i]) > line_slack) return true;
+        if (triangle_area(w, a, tip, ends[i]) > line_slack && triangle_area(w, tip, c, ends[i]) > line_slack)
+            return true;
     return false;
 }
 
 static bool is_blocked(const polygon_work *w, int a, int tip, int c, int by)
 {
-    if (are_together(w, by, a) || are_together(w, by, c)) return false;
-    if (are_together(w, by, tip)) return enters_corner(w, a, tip, c, by);
-    return area_of(w, a, tip, by) >= -line_slack && area_of(w, tip, c, by) >= -line_slack &&
-           area_of(w, c, a, by) >= -line_slack;
+    if (are_coincident(w, by, a) || are_coincident(w, by, c)) return false;
+    if (are_coincident(w, by, tip)) return enters_corner(w, a, tip, c, by);
+    return triangle_area(w, a, tip, by) >= -line_slack && triangle_area(w, tip, c, by) >= -line_slack &&
+           triangle_area(w, c, a, by) >= -line_slack;
 }
 
 static bool is_ear(const polygon_work *w, int tip)
 {
     const int a = w->before[tip], c = w->next[tip];
-    if (!(area_of(w, a, tip, c) > line_slack)) return false;
+    if (!(triangle_area(w, a, tip, c) > line_slack)) return false;
     for (int by = w->next[c]; by != a; by = w->next[by])
         if (is_blocked(w, a, tip, c, by)) return false;
     return true;
@@ -234,7 +236,7 @@ static int find_straight(const polygon_work *w, int first)
     int i = first;
     do {
         i = w->next[i];
-        if (fabs(area_of(w, w->before[i], i, w->next[i])) <= line_slack) return i;
+        if (fabs(triangle_area(w, w->before[i], i, w->next[i])) <= line_slack) return i;
     } while (i != first);
     return -1;
 }
@@ -261,26 +263,26 @@ static void cut_ears(polygon_work *w)
 
 void polygon_cut(const double (*corners)[3], int count, void *room, int (*triangles)[3])
 {
-    polygon_work w = lay_out(count, room, triangles);
+    polygon_work w = divide_work(count, room, triangles);
     double normal[3];
     find_order(&w, corners);
     for (int i = 0; i < count; i++) {
         w.next[i] = (i + 1) % count;
         w.before[i] = (i + count - 1) % count;
     }
-    const bool may_be_concave = count > 3 && find_places(&w, corners) && (count > 4 || is_concave_quad(&w));
+    const bool may_be_concave = count > 3 && scale_positions(&w, corners) && (count > 4 || is_concave_quad(&w));
     if (!may_be_concave || is_fan(&w, normal)) {
         add_fan(&w, 0);
         return;
     }
-    flatten(&w, normal);
+    project_to_plane(&w, normal);
     cut_ears(&w);
 }
 
 bool polygon_is_concave_quad(const double (*corners)[3])
 {
     double room[4 * 8];
-    polygon_work w = lay_out(4, (char *)room, NULL);
+    polygon_work w = divide_work(4, (char *)room, NULL);
     find_order(&w, corners);
-    return find_places(&w, corners) && is_concave_quad(&w);
+    return scale_positions(&w, corners) && is_concave_quad(&w);
 }
