@@ -8,7 +8,7 @@
 
 enum { BLOCK_VALUES = 1 << 14, LANES = 4 };
 
-static uint64_t mix(uint64_t sum, uint64_t bits)
+static uint64_t mix_bits(uint64_t sum, uint64_t bits)
 {
     const uint64_t product = (sum ^ bits) * 0x9e3779b97f4a7c15u;
     return product ^ product >> 29;
@@ -21,12 +21,12 @@ static uint64_t sum_words(const char *data, int64_t bytes)
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
     for (; bytes >= (int64_t)sizeof words; bytes -= (int64_t)sizeof words, data += sizeof words) {
         memcpy(words, data, sizeof words);
-        for (int i = 0; i < LANES; i++) lanes[i] = mix(lanes[i], words[i]);
+        for (int i = 0; i < LANES; i++) lanes[i] = mix_bits(lanes[i], words[i]);
     }
     memset(words, 0, sizeof words);
     memcpy(words, data, (size_t)bytes);
-    for (int i = 0; i < LANES; i++) lanes[i] = mix(lanes[i], words[i]);
-    return mix(mix(lanes[0], lanes[1]), mix(lanes[2], lanes[3]));
+    for (int i = 0; i < LANES; i++) lanes[i] = mix_bits(lanes[i], words[i]);
+    return mix_bits(mix_bits(lanes[0], lanes[1]), mix_bits(lanes[2], lanes[3]));
 }
 
 static uint64_t sum_strided(const char *data, int64_t stride, size_t size, int64_t count)
@@ -35,7 +35,7 @@ static uint64_t sum_strided(const char *data, int64_t stride, size_t size, int64
     for (int64_t i = 0; i < count; i++) {
         uint64_t bits = 0;
         memcpy(&bits, data + i * stride, size);
-        sum = mix(sum, bits);
+        sum = mix_bits(sum, bits);
     }
     return sum;
 }
@@ -54,7 +54,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
             const char *data = a->data + first * a->stride;
             const uint64_t own =
                 a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
-            sum += mix(own, (uint64_t)block); /* the order in which blocks are added does not affect the sum */
+            sum += mix_bits(own, (uint64_t)block); /* the order in which blocks are added does not affect the sum */
         }
         region_leave();
     }
@@ -68,14 +68,14 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     const int end = field->component < 0 ? field->component_count : first + 1;
     for (int component = first; component < end && field->values.data; component++) {
         const grid_array a = grid_field_component(field, component);
-        sum = mix(sum, sum_array(&a, count, threads));
+        sum = mix_bits(sum, sum_array(&a, count, threads));
     }
     return sum;
 }
 
 /* Returns the checksum of a scalar. It includes the cells' own values, because if some of these become NaN, the means
  * at their vertices may remain the same. */
-static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
+static uint64_t find_checksum(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_scalar_field(mesh, scalar);
     const uint64_t sum = sum_field(0, mesh, &field, threads);
@@ -91,12 +91,12 @@ static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_
         const double value = grid_field_value(field, i);
         uint64_t bits;
         memcpy(&bits, &value, sizeof bits);
-        sum = mix(sum, bits);
+        sum = mix_bits(sum, bits);
     }
     return sum;
 }
 
-static uint64_t sample_of(const session_mesh *mesh, const session_scalar *scalar)
+static uint64_t find_sample(const session_mesh *mesh, const session_scalar *scalar)
 {
     const grid_field field = session_scalar_field(mesh, scalar);
     const uint64_t sum = sample_field(1, mesh, &field);
@@ -110,7 +110,7 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
     if (session_is_distance(scalar)) return;
     const char *field = session_scalar_name(mesh, scalar);
     const session_warning warning = {WARNING_UNSAID, field, mesh->label, scalar->component};
-    const bool has_changed = !scalar->is_suspect && scalar->has_checksum && scalar->sample != sample_of(mesh, scalar);
+    const bool has_changed = !scalar->is_suspect && scalar->has_checksum && scalar->sample != find_sample(mesh, scalar);
     session_warn_own(
         report, &warning, has_changed,
         "mesh \"%s\": field \"%s\" has other values than in the last picture, but was not set again, or with "
@@ -121,11 +121,11 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
 
 /* Computes the checksum of the values and compares it with that of the last picture. Returns whether they are equal;
  * otherwise the data that depends on the values is marked as stale. */
-static bool compare(const session_mesh *mesh, session_scalar *scalar, int threads)
+static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, int threads)
 {
-    const uint64_t checksum = checksum_of(mesh, scalar, threads);
+    const uint64_t checksum = find_checksum(mesh, scalar, threads);
     scalar->is_suspect = false;
-    scalar->sample = sample_of(mesh, scalar);
+    scalar->sample = find_sample(mesh, scalar);
     if (scalar->has_checksum && scalar->checksum == checksum) return true;
     scalar->has_checksum = true;
     scalar->checksum = checksum;
@@ -136,7 +136,8 @@ static bool compare(const session_mesh *mesh, session_scalar *scalar, int thread
 }
 
 /* Reports that a field has the values of the last picture. Fields of blocks are only counted, in *blocks. */
-static void tell_same(const session_mesh *mesh, const session_scalar *scalar, int64_t *blocks, session_report *report)
+static void report_unchanged(const session_mesh *mesh, const session_scalar *scalar, int64_t *blocks,
+                             session_report *report)
 {
     if (mesh->block != SESSION_WHOLE)
         (*blocks)++;
@@ -153,8 +154,8 @@ static void compare_parts(const session_parts *parts, int threads, session_repor
         for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
             session_scalar *scalar = &mesh->scalars[k];
             if (scalar->is_used) warn_of_change(mesh, scalar, report);
-            if (scalar->is_used && scalar->is_suspect && compare(mesh, scalar, threads))
-                tell_same(mesh, scalar, &blocks, report);
+            if (scalar->is_used && scalar->is_suspect && compare_checksum(mesh, scalar, threads))
+                report_unchanged(mesh, scalar, &blocks, report);
         }
     }
     if (blocks)

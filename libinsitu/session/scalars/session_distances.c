@@ -10,7 +10,7 @@
 
 /* ---- planes -------------------------------------------------------------------------------------------------- */
 
-static void move_along(const double from[3], const double normal[3], double offset, double out[3])
+static void offset_point(const double from[3], const double normal[3], double offset, double out[3])
 {
     for (int axis = 0; axis < 3; axis++) out[axis] = from[axis] + offset * normal[axis];
 }
@@ -22,26 +22,26 @@ void session_find_plane_point(const scene_plane *plane, const session_extent *ex
         middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
         half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);
     }
-    move_along(plane->has_point ? plane->point : middle, plane->normal, plane->offset + plane->share * half, point);
+    offset_point(plane->has_point ? plane->point : middle, plane->normal, plane->offset + plane->share * half, point);
 }
 
 static session_plane plane_of_scene(const scene_plane *in)
 {
     session_plane out = {.is_central = !in->has_point, .offset = in->offset, .share = in->share};
     memcpy(out.normal, in->normal, sizeof out.normal);
-    move_along(in->point, in->normal, in->offset, out.point);
+    offset_point(in->point, in->normal, in->offset, out.point);
     return out;
 }
 
-static bool are_equal(const double a[3], const double b[3])
+static bool are_equal_vectors(const double a[3], const double b[3])
 {
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
 static bool is_same_plane(const session_plane *a, const session_plane *b)
 {
-    if (a->is_central != b->is_central || !are_equal(a->normal, b->normal)) return false;
-    return a->is_central ? a->offset == b->offset && a->share == b->share : are_equal(a->point, b->point);
+    if (a->is_central != b->is_central || !are_equal_vectors(a->normal, b->normal)) return false;
+    return a->is_central ? a->offset == b->offset && a->share == b->share : are_equal_vectors(a->point, b->point);
 }
 
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)
@@ -65,11 +65,11 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
 }
 
 /* Moves a plane that passes through the centre of the data, if the bounds have changed. */
-static void follow_data(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
+static void recentre_plane(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
 {
     double point[3];
     session_find_plane_point(plane, extent, point);
-    if (are_equal(point, scalar->plane.point)) return;
+    if (are_equal_vectors(point, scalar->plane.point)) return;
     memcpy(scalar->plane.point, point, sizeof point);
     scalar->are_values_stale = true;
 }
@@ -81,7 +81,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
     if (!scalar) scalar = add_distance(mesh, plane);
     *marked = scalar;
     if (!scalar) return false;
-    follow_data(scalar, plane, extent);
+    recentre_plane(scalar, plane, extent);
     scalar->is_used = scalar->wants_ranges = true;
     mesh->is_needed = true;
     return true;
@@ -89,7 +89,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 
 /* ---- distances ----------------------------------------------------------------------------------------------- */
 
-static void compute(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
+static void compute_distances(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
 {
     const double *n = plane->normal, *p = plane->point;
 #pragma omp parallel num_threads(session_region_threads(threads, mesh->cells.vertex_count))
@@ -110,7 +110,7 @@ static bool update_distance(const session_mesh *mesh, session_scalar *scalar, in
     if (!scalar->distances)
         scalar->distances = base_alloc((size_t)mesh->cells.vertex_count * sizeof *scalar->distances);
     if (!scalar->distances) return false;
-    compute(mesh, &scalar->plane, threads, scalar->distances);
+    compute_distances(mesh, &scalar->plane, threads, scalar->distances);
     scalar->are_values_stale = false;
     scalar->are_ranges_stale = true;
     session_forget_extents(scalar);

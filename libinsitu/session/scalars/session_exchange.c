@@ -60,7 +60,7 @@ static insitu_status start_sends(delivery *d, const session_mail *out, base_erro
     return error->status;
 }
 
-static letter *letter_create(delivery *d, int from, int64_t count)
+static letter *message_create(delivery *d, int from, int64_t count)
 {
     letter *l = base_alloc(sizeof *l + (size_t)count * sizeof *l->words);
     if (!l) return NULL;
@@ -72,11 +72,11 @@ static letter *letter_create(delivery *d, int from, int64_t count)
 
 /* Receives a message. If memory runs out, it is received with length 0 and its data is lost, so that the sender's call
  * can complete. */
-static void receive(delivery *d, const MPI_Status *found, base_error *error)
+static void receive_message(delivery *d, const MPI_Status *found, base_error *error)
 {
     int count = 0;
     MPI_Get_count(found, MPI_UINT64_T, &count);
-    letter *l = error->status ? NULL : letter_create(d, found->MPI_SOURCE, count);
+    letter *l = error->status ? NULL : message_create(d, found->MPI_SOURCE, count);
     const int code = MPI_Recv(l ? l->words : NULL, l ? count : 0, MPI_UINT64_T, found->MPI_SOURCE, d->tag, d->comm,
                               MPI_STATUS_IGNORE);
     if (l)
@@ -97,7 +97,7 @@ static insitu_status receive_all(delivery *d, int *failed, base_error *error)
         MPI_Status found;
         int has_come = 0;
         status = session_mpi(error, MPI_Iprobe(MPI_ANY_SOURCE, d->tag, d->comm, &has_come, &found), "MPI_Iprobe");
-        if (!status && has_come) receive(d, &found, &lost);
+        if (!status && has_come) receive_message(d, &found, &lost);
         if (has_come || status) continue;
         if (has_joined) {
             status = session_mpi(error, MPI_Test(&all, &is_over, MPI_STATUS_IGNORE), "MPI_Test");
@@ -114,13 +114,13 @@ static insitu_status receive_all(delivery *d, int *failed, base_error *error)
 }
 
 /* Adds the words that this rank sends to itself, as if they were a received message. */
-static void keep_own(delivery *d, const session_mail *out, base_error *error)
+static void copy_own_words(delivery *d, const session_mail *out, base_error *error)
 {
     const uint64_t *words = out->words;
     for (int r = 0; r < d->rank; r++) words += out->counts[r];
     const int64_t count = out->counts[d->rank];
     if (!count) return;
-    letter *l = letter_create(d, d->rank, count);
+    letter *l = message_create(d, d->rank, count);
     if (l)
         memcpy(l->words, words, (size_t)count * sizeof *words);
     else
@@ -128,7 +128,7 @@ static void keep_own(delivery *d, const session_mail *out, base_error *error)
 }
 
 /* Concatenates the messages in the order of the ranks that sent them. */
-static void open_letters(const delivery *d, session_mail *in, base_error *error)
+static void concatenate_messages(const delivery *d, session_mail *in, base_error *error)
 {
     int64_t *starts = base_calloc((size_t)d->ranks + 1, sizeof *starts);
     in->counts = base_calloc((size_t)d->ranks, sizeof *in->counts);
@@ -165,10 +165,10 @@ insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const se
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
     if (!error->status) start_sends(&d, out, error);
-    if (!error->status) keep_own(&d, out, error);
+    if (!error->status) copy_own_words(&d, out, error);
     insitu_status status = receive_all(&d, &failed, error);
     if (!status && failed < d.ranks) status = session_agree(comm, error);
-    if (!status) open_letters(&d, in, error);
+    if (!status) concatenate_messages(&d, in, error);
     free_delivery(&d);
     if (status) session_mail_free(in);
     return status;

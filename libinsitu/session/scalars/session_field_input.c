@@ -35,7 +35,7 @@ int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
     return (mesh->cell_count - 1) * field->corner_row + session_cell_nodes(mesh);
 }
 
-static const char *place_words(insitu_centring centring)
+static const char *describe_centring(insitu_centring centring)
 {
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
@@ -48,7 +48,7 @@ static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 }
 
 /* Checks a field each of whose components is given as a separate array. */
-static insitu_status check_apart(const insitu_field *field, int64_t count, base_error *error)
+static insitu_status check_component_arrays(const insitu_field *field, int64_t count, base_error *error)
 {
     if (field->values.data)
         return base_fail(error, INSITU_ERROR_FIELD, "values and components are given: values are given by one of them");
@@ -67,12 +67,13 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
     const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
     if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
-                         (long long)places, place_words(field->centring), has_rows ? ", rows' rests counted" : "");
+                         (long long)places, describe_centring(field->centring),
+                         has_rows ? ", rows' rests counted" : "");
     const session_array_rule values = {"values", has_index && !places ? 0 : field->count,
                                        SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY, field->component_count};
     const session_array_rule index = {"entries of index", places, SESSION_ALLOW_INTEGERS | SESSION_IS_OPTIONAL, 1};
     insitu_status status = session_check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
-    if (!status && field->components) return check_apart(field, values.count, error);
+    if (!status && field->components) return check_component_arrays(field, values.count, error);
     if (!status) status = session_check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
     if (status) return status;
     return session_check_components(&field->values, field->component_count, field->component_stride_bytes, true,
@@ -276,7 +277,7 @@ static bool copy_tables(session_field *field, const insitu_field *given, base_er
 }
 
 /* Sets the array from which the values are read. Its elements are the first components of all tuples. */
-static void read_array(session_field *field, const insitu_field *given)
+static void set_value_array(session_field *field, const insitu_field *given)
 {
     const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
     insitu_array values = given->values;
@@ -293,8 +294,8 @@ static void read_array(session_field *field, const insitu_field *given)
 
 /* Sets the arrays of values, and stores whether their copy must be computed again. The tables must have been copied
  * before. */
-static void read_values(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
-                        bool is_stale)
+static void set_value_arrays(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
+                             bool is_stale)
 {
     const bool has_index = is_by_index(mesh, given), was_apart = field->given.components != NULL;
     if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
@@ -307,12 +308,12 @@ static void read_values(const session_mesh *mesh, session_field *field, const in
     field->given.name = name;
     field->given.patches = field->patches;
     field->given.components = field->components;
-    read_array(field, given);
+    set_value_array(field, given);
 }
 
 /* Stores a field's description. The tables must have been copied before, unless all values are read from the same
  * addresses as before (is_same). */
-static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
+static void store_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
     const bool is_other = (!field->values.data && !field->given.fill) || field->given.centring != given->centring ||
@@ -326,7 +327,7 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
     } else if (is_stale) {
         session_spoil_scalars(mesh, index);
     }
-    read_values(mesh, field, given, is_other, is_stale);
+    set_value_arrays(mesh, field, given, is_other, is_stale);
     field->problem = (base_error){0};
 }
 
@@ -348,7 +349,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     if (check_field(mesh, given, &what) == INSITU_OK) {
         const bool is_same = is_same_place(&field->given, given);
         if (is_same || copy_tables(field, given, &what)) {
-            take_field(meshes, mesh, index, given, is_same);
+            store_field(meshes, mesh, index, given, is_same);
             return INSITU_OK;
         }
     }
@@ -372,8 +373,8 @@ static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, co
 
 /* Reports that the mesh or block does not exist. The message depends on whether the name belongs to a mesh of the other
  * kind. */
-static void refuse_missing(const session_meshes *meshes, const char *name, int64_t block, const char *field,
-                           base_error *error)
+static void refuse_missing_mesh(const session_meshes *meshes, const char *name, int64_t block, const char *field,
+                                base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, name);
     if (parts.count && block == SESSION_WHOLE)
@@ -399,7 +400,7 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
     if (!name || !field_name || !*field_name)
         base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no mesh, no field, or a field without a name", call);
     else if (!mesh)
-        refuse_missing(meshes, name, block, field_name, error);
+        refuse_missing_mesh(meshes, name, block, field_name, error);
     else if (!mesh->is_given)
         return refuse_field(meshes, mesh, field_name, error);
     else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
@@ -428,7 +429,7 @@ insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_fi
     base_error what = {0};
     if (check_filled(mesh, &promised, filled, &what) || !copy_tables(field, filled, &what))
         return session_place_error(error, mesh->label, promised.name, &what);
-    read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
+    set_value_arrays(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
     /* Scalars may refer to the previous table of components. */

@@ -59,7 +59,7 @@ typedef struct target {
 
 /* Returns the power of two with which numbers up to `largest` are scaled to HIGH_BITS bits. If there is none it returns
  * 0, so that all scaled numbers are 0. */
-static double unit_of(double largest)
+static double find_power_of_two(double largest)
 {
     int exponent = 0;
     frexp(largest, &exponent);
@@ -67,13 +67,13 @@ static double unit_of(double largest)
     return largest > 0 && isfinite(unit) ? unit : 0;
 }
 
-static void find_units(const session_gradient_bounds *bounds, double units[2])
+static void find_rounding_units(const session_gradient_bounds *bounds, double units[2])
 {
-    units[0] = unit_of(bounds->rise * bounds->sharpness);
-    units[1] = unit_of(0.2 * sqrt(bounds->sharpness));
+    units[0] = find_power_of_two(bounds->rise * bounds->sharpness);
+    units[1] = find_power_of_two(0.2 * sqrt(bounds->sharpness));
 }
 
-static inline word_pair words_of(number_pair whole_with_shift)
+static inline word_pair words_from_numbers(number_pair whole_with_shift)
 {
     word_pair words, shift;
     const number_pair shifts = {ROUNDING_SHIFT, ROUNDING_SHIFT};
@@ -82,7 +82,7 @@ static inline word_pair words_of(number_pair whole_with_shift)
     return words - shift;
 }
 
-static void add_shared(int64_t *to, word_pair words)
+static void add_atomically(int64_t *to, word_pair words)
 {
     for (int i = 0; i < 2; i++) {
 #pragma omp atomic
@@ -100,7 +100,7 @@ static inline __attribute__((always_inline)) void add_numbers(const target *to, 
     for (int i = 0; i < pairs; i++) {
         const number_pair scaled = numbers[i] * to->units[i], high = scaled + shift;
         const number_pair low = (scaled - (high - shift)) * low_unit + shift;
-        word_pair of_high = words_of(high), of_low = words_of(low);
+        word_pair of_high = words_from_numbers(high), of_low = words_from_numbers(low);
         if (is_own) {
             word_pair words[2];
             memcpy(&words[0], sum + 2 * i, sizeof of_high);
@@ -110,8 +110,8 @@ static inline __attribute__((always_inline)) void add_numbers(const target *to, 
             memcpy(sum + 2 * i, &words[0], sizeof of_high);
             memcpy(sum + 2 * (pairs + i), &words[1], sizeof of_low);
         } else {
-            add_shared(sum + 2 * i, of_high);
-            add_shared(sum + 2 * (pairs + i), of_low);
+            add_atomically(sum + 2 * i, of_high);
+            add_atomically(sum + 2 * (pairs + i), of_low);
         }
     }
 }
@@ -121,7 +121,7 @@ void session_mean_gradients(const int64_t *sum, int field_count, const session_g
 {
     const int count = session_sum_numbers(field_count);
     double units[2], numbers[MOST_NUMBERS];
-    find_units(bounds, units);
+    find_rounding_units(bounds, units);
     for (int i = 0; i < count; i++) numbers[i] = (double)sum[i] * LOW_UNIT + (double)sum[count + i];
     const double weight = numbers[3 * field_count];
     const double scale = units[0] > 0 ? units[1] / units[0] / length : 0;
@@ -150,8 +150,9 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
 /* Adds the contribution of a corner, given by its three sorted edges and the differences of the fields along them. If
  * the order of the edges is mirrored, the signs of both the sum and the determinant change, so that the gradient
  * remains the same. */
-static inline __attribute__((always_inline)) void give_edges(target *to, int64_t vertex, const double edge[3][3],
-                                                             const double rise[3][SESSION_GRADIENTS], int field_count)
+static inline __attribute__((always_inline)) void add_edge_gradient(target *to, int64_t vertex, const double edge[3][3],
+                                                                    const double rise[3][SESSION_GRADIENTS],
+                                                                    int field_count)
 {
     const int pairs = session_sum_numbers(field_count) / 2;
     double normal[3][3], squares = 0;
@@ -178,8 +179,8 @@ static inline __attribute__((always_inline)) void give_edges(target *to, int64_t
     if (out.numbers[3 * field_count] > 0 && isfinite(sum)) add_numbers(to, entry, out.pairs, pairs);
 }
 
-static inline __attribute__((always_inline)) void give_corner(target *to, const node *corner, const node *p,
-                                                              const node *q, const node *r, int field_count)
+static inline __attribute__((always_inline)) void add_corner(target *to, const node *corner, const node *p,
+                                                             const node *q, const node *r, int field_count)
 {
     const node *swap, *ends[3] = {p, q, r};
     double edge[3][3], rise[3][SESSION_GRADIENTS];
@@ -190,12 +191,13 @@ static inline __attribute__((always_inline)) void give_corner(target *to, const 
         for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
         for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->at[a] - corner->at[a];
     }
-    give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
+    add_edge_gradient(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise,
+                      field_count);
 }
 
 /* Adds the contribution of a corner of a shell. The third edge is the normal, with the length of the other edges and
  * with either sign. */
-static void give_shell_corner(target *to, const node *corner, const node *p, const node *q)
+static void add_shell_corner(target *to, const node *corner, const node *p, const node *q)
 {
     const int field_count = to->basis->field_count;
     const bool is_swapped = is_before(q, p);
@@ -208,11 +210,12 @@ static void give_shell_corner(target *to, const node *corner, const node *p, con
     vector3_cross(edge[0], edge[1], edge[2]);
     const double area = sqrt(vector3_dot(edge[2], edge[2])), scale = 1 / sqrt(area);
     for (int a = 0; a < 3; a++) edge[2][a] *= scale;
-    give_edges(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise, field_count);
+    add_edge_gradient(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise,
+                      field_count);
 }
 
 /* Reads a vertex's position, multiplied by `scale`, and its values. Returns false if a value is not finite. */
-static inline __attribute__((always_inline)) bool take_node(const session_gradient_basis *basis, int64_t vertex,
+static inline __attribute__((always_inline)) bool read_node(const session_gradient_basis *basis, int64_t vertex,
                                                             double scale, int field_count, node *out)
 {
     double sum = 0;
@@ -233,7 +236,7 @@ static const signed char pyramid_corners[][4] = {{0, 1, 3, 4}, {1, 0, 2, 4}, {2,
                                                  {4, 0, 1, 2}, {4, 1, 2, 3}, {4, 2, 3, 0}, {4, 3, 0, 1}};
 
 static inline __attribute__((always_inline)) void
-give_cell(target *to, int64_t cell, int type, const signed char (*corners)[4], int corner_count, int field_count)
+add_cell_corners(target *to, int64_t cell, int type, const signed char (*corners)[4], int corner_count, int field_count)
 {
     const session_gradient_basis *basis = to->basis;
     const int count = grid_type_vertices(type);
@@ -242,31 +245,32 @@ give_cell(target *to, int64_t cell, int type, const signed char (*corners)[4], i
     bool is_finite = true;
     grid_cell_vertices(basis->cells, cell, vertices);
     for (int i = 0; i < count; i++)
-        is_finite = take_node(basis, vertices[i], to->scale, field_count, &nodes[i]) && is_finite;
+        is_finite = read_node(basis, vertices[i], to->scale, field_count, &nodes[i]) && is_finite;
     for (int i = 0; i < corner_count && is_finite; i++)
-        give_corner(to, &nodes[corners[i][0]], &nodes[corners[i][1]], &nodes[corners[i][2]], &nodes[corners[i][3]],
-                    field_count);
+        add_corner(to, &nodes[corners[i][0]], &nodes[corners[i][1]], &nodes[corners[i][2]], &nodes[corners[i][3]],
+                   field_count);
 }
 
-#define GIVE(type, corners) give_cell(to, cell, type, corners, sizeof corners / sizeof *corners, field_count)
+#define ADD_CELL_CORNERS(type, corners)                                                                                \
+    add_cell_corners(to, cell, type, corners, sizeof corners / sizeof *corners, field_count)
 
-static inline __attribute__((always_inline)) void give_typed(target *to, int64_t cell, int type, int field_count)
+static inline __attribute__((always_inline)) void add_typed_cell(target *to, int64_t cell, int type, int field_count)
 {
     switch (type) {
-    case GRID_TET: GIVE(GRID_TET, tet_corners); break;
-    case GRID_HEX: GIVE(GRID_HEX, hex_corners); break;
-    case GRID_WEDGE: GIVE(GRID_WEDGE, wedge_corners); break;
-    default: GIVE(GRID_PYRAMID, pyramid_corners); break;
+    case GRID_TET: ADD_CELL_CORNERS(GRID_TET, tet_corners); break;
+    case GRID_HEX: ADD_CELL_CORNERS(GRID_HEX, hex_corners); break;
+    case GRID_WEDGE: ADD_CELL_CORNERS(GRID_WEDGE, wedge_corners); break;
+    default: ADD_CELL_CORNERS(GRID_PYRAMID, pyramid_corners); break;
     }
 }
 
 /* Adds the contributions of all corners of a cell that has a fixed number of vertices. */
-static void give_solid(target *to, int64_t cell, int type)
+static void add_solid_cell(target *to, int64_t cell, int type)
 {
     switch (to->basis->field_count) {
-    case 1: give_typed(to, cell, type, 1); break;
-    case 2: give_typed(to, cell, type, 2); break;
-    default: give_typed(to, cell, type, 3); break;
+    case 1: add_typed_cell(to, cell, type, 1); break;
+    case 2: add_typed_cell(to, cell, type, 2); break;
+    default: add_typed_cell(to, cell, type, 3); break;
     }
 }
 
@@ -279,7 +283,7 @@ typedef struct node_list {
     bool is_out_of_memory;
 } node_list;
 
-static int by_place(const void *a, const void *b)
+static int compare_nodes(const void *a, const void *b)
 {
     const node *x = a, *y = b;
     if (is_before(x, y)) return -1;
@@ -299,7 +303,7 @@ static bool add_node(node_list *list, target *to, int64_t vertex)
         list->nodes = nodes;
         list->capacity = capacity;
     }
-    return take_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
+    return read_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
 }
 
 /* Lists the vertices of the cell in the order in which the cell has them. Returns false if a value is not finite, or if
@@ -315,11 +319,11 @@ static bool list_nodes(node_list *list, target *to, int64_t cell)
 }
 
 /* Returns the mean of the vertices, each counted once. They are summed in the order of their coordinates. */
-static node centre_of(node_list *list, int field_count)
+static node find_centre(node_list *list, int field_count)
 {
     node centre = {.vertex = -1};
     int64_t count = 0;
-    qsort(list->nodes, (size_t)list->count, sizeof *list->nodes, by_place);
+    qsort(list->nodes, (size_t)list->count, sizeof *list->nodes, compare_nodes);
     for (int64_t i = 0; i < list->count; i++)
         if (count == 0 || list->nodes[i].vertex != list->nodes[count - 1].vertex) list->nodes[count++] = list->nodes[i];
     list->count = count;
@@ -330,13 +334,13 @@ static node centre_of(node_list *list, int field_count)
     return centre;
 }
 
-static void give_polyhedron(target *to, int64_t cell, node_list *list)
+static void add_polyhedron(target *to, int64_t cell, node_list *list)
 {
     const session_gradient_basis *basis = to->basis;
     const grid *g = basis->cells;
     int64_t first, end, from, until;
     if (!list_nodes(list, to, cell)) return;
-    const node centre = centre_of(list, basis->field_count);
+    const node centre = find_centre(list, basis->field_count);
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) {
         grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &until);
@@ -344,19 +348,19 @@ static void give_polyhedron(target *to, int64_t cell, node_list *list)
         for (int64_t n = 0; n < count; n++) {
             node nodes[3]; /* the vertex before the corner, the corner itself, and the vertex after it */
             for (int k = 0; k < 3; k++)
-                take_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
+                read_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
                           basis->field_count, &nodes[k]);
-            give_corner(to, &nodes[1], &nodes[0], &nodes[2], &centre, basis->field_count);
+            add_corner(to, &nodes[1], &nodes[0], &nodes[2], &centre, basis->field_count);
         }
     }
 }
 
-static void give_shell(target *to, int64_t cell, node_list *list)
+static void add_shell(target *to, int64_t cell, node_list *list)
 {
     if (!list_nodes(list, to, cell)) return;
     for (int64_t n = 0; n < list->count; n++)
-        give_shell_corner(to, &list->nodes[n], &list->nodes[(n + list->count - 1) % list->count],
-                          &list->nodes[(n + 1) % list->count]);
+        add_shell_corner(to, &list->nodes[n], &list->nodes[(n + list->count - 1) % list->count],
+                         &list->nodes[(n + 1) % list->count]);
 }
 
 /* ---- all cells ----------------------------------------------------------------------------------------------- */
@@ -426,22 +430,22 @@ done:
 
 /* ---- all cells of a grid --------------------------------------------------------------------------------------- */
 
-static void give_any(target *to, int64_t cell, node_list *room)
+static void add_cell(target *to, int64_t cell, node_list *room)
 {
     const int type = grid_cell_type(to->basis->cells, cell);
     if (type == GRID_POLYHEDRON)
-        give_polyhedron(to, cell, room);
+        add_polyhedron(to, cell, room);
     else if (to->basis->of_shells)
-        give_shell(to, cell, room);
+        add_shell(to, cell, room);
     else
-        give_solid(to, cell, type);
+        add_solid_cell(to, cell, type);
 }
 
 enum { NO_OWNER = 254, SHARED = 255 };
 
 /* Records that this thread adds to the sums of the cell's vertices. If no other thread adds to a sum, the additions
  * need not be atomic. */
-static void own_sums(const target *to, int64_t cell)
+static void claim_sums(const target *to, int64_t cell)
 {
     const session_gradient_basis *basis = to->basis;
     grid_walk walk = grid_walk_cell(basis->cells, cell);
@@ -458,7 +462,7 @@ static void own_sums(const target *to, int64_t cell)
 }
 
 /* Adds the contributions of all cells. Both loops distribute the cells among the threads in the same way. */
-static bool give_all(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
+static bool add_all_cells(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
     const int threads = session_region_threads(like->basis->threads, list->count);
     double rise = 0, sharpness = 0;
@@ -471,10 +475,10 @@ static bool give_all(const target *like, const session_cell_list *list, session_
         node_list nodes = {0};
         if (to.owners && omp_get_num_threads() < NO_OWNER) {
 #pragma omp for schedule(static)
-            for (int64_t i = 0; i < list->count; i++) own_sums(&to, list->cells[i]);
+            for (int64_t i = 0; i < list->count; i++) claim_sums(&to, list->cells[i]);
         }
 #pragma omp for schedule(static)
-        for (int64_t i = 0; i < list->count; i++) give_any(&to, list->cells[i], &nodes);
+        for (int64_t i = 0; i < list->count; i++) add_cell(&to, list->cells[i], &nodes);
         rise = to.bounds.rise;
         sharpness = to.bounds.sharpness;
         is_out_of_memory = nodes.is_out_of_memory;
@@ -489,7 +493,7 @@ bool session_bound_gradients(const session_gradient_basis *basis, const session_
                              session_gradient_bounds *out)
 {
     const target to = {.basis = basis, .scale = 1 / basis->length};
-    return give_all(&to, list, out);
+    return add_all_cells(&to, list, out);
 }
 
 unsigned char *session_sum_owners(int64_t sum_count, int threads)
@@ -508,8 +512,8 @@ bool session_add_gradients(const session_gradient_basis *basis, const session_ce
     double units[2];
     session_gradient_bounds unused;
     if (basis->threads > 1) to.owners = owners;
-    find_units(bounds, units);
+    find_rounding_units(bounds, units);
     for (int i = 0; i < MOST_NUMBERS; i++)
         to.units[i / 2][i % 2] = i < 3 * basis->field_count ? units[0] : i == 3 * basis->field_count ? units[1] : 0;
-    return give_all(&to, list, &unused);
+    return add_all_cells(&to, list, &unused);
 }

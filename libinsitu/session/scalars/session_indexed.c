@@ -32,7 +32,7 @@ typedef struct indexed_values {
     bool is_plain;         /* set if values are copied in their own type; otherwise they are converted to double */
 } indexed_values;
 
-static indexed_values values_of(const session_mesh *mesh, const session_field *field)
+static indexed_values make_indexed_values(const session_mesh *mesh, const session_field *field)
 {
     const insitu_field *given = &field->given;
     indexed_values out = {.index = session_grid_array(&given->index),
@@ -58,7 +58,7 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
 
 /* Returns the index in the caller's arrays of the value at a position: the number of the vertex, the cell, or the
  * corner. */
-static int64_t entry_of(const indexed_values *v, int64_t place)
+static int64_t find_value_entry(const indexed_values *v, int64_t place)
 {
     if (v->mesh) return session_torn_origin(v->mesh, place);
     if (v->parents) return v->parents[place];
@@ -68,7 +68,7 @@ static int64_t entry_of(const indexed_values *v, int64_t place)
 /* Copies one tuple. Returns false if the index is out of range. */
 static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
 {
-    const int64_t entry = entry_of(v, place);
+    const int64_t entry = find_value_entry(v, place);
     const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
     if (at < 0 || at >= v->count) return false;
     const int count = v->values.component_count;
@@ -92,7 +92,7 @@ static insitu_status describe_fault(const session_mesh *mesh, const session_fiel
 {
     static const char *const words[] = {"vertex", "cell", "corner"};
     const insitu_centring centring = field->given.centring;
-    const int64_t entry = entry_of(v, place);
+    const int64_t entry = find_value_entry(v, place);
     const long long base = v->index.base, number = centring == INSITU_VERTEX ? entry + base : entry;
     return base_fail(error, INSITU_ERROR_FIELD,
                      "mesh \"%s\": field \"%s\": the index of %s %lld is %lld, outside %lld..%lld (index_base is "
@@ -103,7 +103,7 @@ static insitu_status describe_fault(const session_mesh *mesh, const session_fiel
 
 static insitu_status copy_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
 {
-    const indexed_values v = values_of(mesh, field);
+    const indexed_values v = make_indexed_values(mesh, field);
     const int64_t bytes = v.places * v.values.component_count * (!v.is_plain || v.values.values.is_wide ? 8 : 4);
     int64_t bad = v.places;
     if (!field->copy) field->copy = base_alloc((size_t)(bytes ? bytes : 1));
@@ -149,7 +149,7 @@ insitu_status session_copy_wanted(const session_meshes *meshes, int threads, bas
     return status;
 }
 
-static void copy_used(session_mesh *mesh, int index, int threads, base_error *error)
+static void copy_used_values(session_mesh *mesh, int index, int threads, base_error *error)
 {
     base_error own = {.status = INSITU_OK};
     if (mesh->fields[index].problem.status) return;
@@ -162,10 +162,10 @@ insitu_status session_copy_used(const session_meshes *meshes, int threads, base_
         session_mesh *mesh = meshes->items[m];
         for (int i = 0; i < mesh->scalar_count; i++) {
             const session_scalar *scalar = &mesh->scalars[i];
-            if (scalar->is_used && !session_is_distance(scalar)) copy_used(mesh, scalar->field, threads, error);
+            if (scalar->is_used && !session_is_distance(scalar)) copy_used_values(mesh, scalar->field, threads, error);
         }
         for (int f = 0; f < mesh->field_count; f++)
-            if (mesh->fields[f].is_source) copy_used(mesh, f, threads, error);
+            if (mesh->fields[f].is_source) copy_used_values(mesh, f, threads, error);
     }
     return error->status;
 }

@@ -23,7 +23,7 @@ const char *session_scalar_name(const session_mesh *mesh, const session_scalar *
     return session_is_distance(scalar) ? "distance from a slice" : mesh->fields[scalar->field].given.name;
 }
 
-static uint64_t joined_on(const session_mesh *mesh, const scene_field *field)
+static uint64_t find_joint_name(const session_mesh *mesh, const scene_field *field)
 {
     return mesh->apart ? mesh->apart : field->joined;
 }
@@ -82,7 +82,7 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, session_resolve_component(field, given->component_count),
-                       session_is_recentred(field, given->centring, mesh->is_refined), joined_on(mesh, field));
+                       session_is_recentred(field, given->centring, mesh->is_refined), find_joint_name(mesh, field));
 }
 
 grid_field session_given_field(const session_mesh *mesh, int index, int component)
@@ -155,7 +155,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         scalar->field = index;
         scalar->component = session_resolve_component(field, given->component_count);
         scalar->is_recentred = session_is_recentred(field, given->centring, mesh->is_refined);
-        scalar->joined = joined_on(mesh, field);
+        scalar->joined = find_joint_name(mesh, field);
     }
     scalar->is_used = true;
     scalar->own = session_given_field(mesh, index, scalar->component);
@@ -174,7 +174,7 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
 
 /* Returns whether the extent includes shells. For distances from planes it does not, because planes do not cut
  * shells. */
-static bool has_shells(const session_scalar *scalar, session_extent_kind kind)
+static bool includes_shells(const session_scalar *scalar, session_extent_kind kind)
 {
     return kind != SESSION_SOLID && !scalar->distances;
 }
@@ -206,7 +206,7 @@ void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int
     session_extremes *known = &scalar->extremes[is_same ? SESSION_SEEN : kind];
     if (!known->is_known) {
         const grid_field field = session_scalar_field(mesh, scalar);
-        *known = find_extent(&mesh->cells, &field, threads, has_shells(scalar, kind), kind == SESSION_POSITIVE);
+        *known = find_extent(&mesh->cells, &field, threads, includes_shells(scalar, kind), kind == SESSION_POSITIVE);
     }
     *low = known->low;
     *high = known->high;

@@ -28,7 +28,7 @@ static bool is_in_image(const session_mesh *mesh, const scene_image *image)
     return is_in;
 }
 
-static bool is_named(const session_mesh *mesh, const scene *scene)
+static bool is_named_in_scene(const session_mesh *mesh, const scene *scene)
 {
     bool is_in = false;
     for (int i = 0; i < scene->statistics_count; i++) is_in = is_in || is_of_corners(mesh, &scene->statistics[i].field);
@@ -109,7 +109,7 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
     return INSITU_OK;
 }
 
-static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
+static insitu_status tear_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     session_torn torn = {.is_torn = true, .corner_count = session_corner_count(&mesh->given)};
     insitu_status status = refuse_polyhedra(mesh, error);
@@ -128,7 +128,7 @@ static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
 }
 
 /* Frees arrays that were computed for other vertices. */
-static void forget_vertices(session_meshes *meshes, session_mesh *mesh)
+static void drop_vertex_data(session_meshes *meshes, session_mesh *mesh)
 {
     mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
     session_drop_outers(mesh, true);
@@ -137,15 +137,16 @@ static void forget_vertices(session_meshes *meshes, session_mesh *mesh)
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
 }
 
-static insitu_status update(session_meshes *meshes, session_mesh *mesh, bool is_torn, int threads, base_error *error)
+static insitu_status update_torn_mesh(session_meshes *meshes, session_mesh *mesh, bool is_torn, int threads,
+                                      base_error *error)
 {
     const bool was_torn = mesh->torn.is_torn;
     if (!is_torn && was_torn) {
         session_drop_torn(&mesh->torn);
         session_read_topology(mesh);
     }
-    if (is_torn != was_torn) forget_vertices(meshes, mesh);
-    return is_torn && !mesh->torn.is_made ? tear(mesh, threads, error) : INSITU_OK;
+    if (is_torn != was_torn) drop_vertex_data(meshes, mesh);
+    return is_torn && !mesh->torn.is_made ? tear_mesh(mesh, threads, error) : INSITU_OK;
 }
 
 /* ---- all meshes ------------------------------------------------------------------------------------------------ */
@@ -163,7 +164,7 @@ insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogu
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        if (mesh->is_given) update(meshes, mesh, is_named(mesh, scene), team->threads, error);
+        if (mesh->is_given) update_torn_mesh(meshes, mesh, is_named_in_scene(mesh, scene), team->threads, error);
     }
     return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
 }
