@@ -4,7 +4,7 @@
 #include "grid.h"
 #include "session_mesh.h"
 
-static bool is_allowed(insitu_type type, int allowed)
+static bool is_allowed_type(insitu_type type, int allowed)
 {
     switch (type) {
     case INSITU_FLOAT32:
@@ -21,7 +21,7 @@ static bool is_allowed(insitu_type type, int allowed)
     return false;
 }
 
-static const char *allowed_words(int kind)
+static const char *describe_allowed_types(int kind)
 {
     switch (kind & (SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS | SESSION_ALLOW_ANY)) {
     case SESSION_ALLOW_INTEGERS: return "int32 or int64";
@@ -65,9 +65,9 @@ insitu_status session_check_array(const insitu_array *array, const session_array
         if (rule->count == 0 || rule->kind & SESSION_IS_OPTIONAL) return INSITU_OK;
         return base_fail(error, bad, "%s are not given", rule->name);
     }
-    if (!is_allowed(array->type, rule->kind))
+    if (!is_allowed_type(array->type, rule->kind))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
-                         (int)array->type, allowed_words(rule->kind));
+                         (int)array->type, describe_allowed_types(rule->kind));
     const int64_t size = session_type_size(array->type), count = rule->count + (rule->kind & SESSION_HAS_END ? 1 : 0);
     const bool is_anywhere = rule->kind & SESSION_ALLOW_ANY;
     const insitu_status status = is_anywhere ? INSITU_OK : check_place(array->data, rule->name, size, bad, error);
@@ -88,9 +88,9 @@ insitu_status session_check_pointers(const insitu_array *array, const session_ar
                                      base_error *error)
 {
     const int64_t size = sizeof(void *);
-    if (!is_allowed(array->type, rule->kind))
+    if (!is_allowed_type(array->type, rule->kind))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
-                         (int)array->type, allowed_words(rule->kind));
+                         (int)array->type, describe_allowed_types(rule->kind));
     const insitu_status status = check_place(array->data, rule->name, size, bad, error);
     if (status) return status;
     return check_stride(array->data, rule->name, rule->count, array->stride_bytes ? array->stride_bytes : size, size,

@@ -38,7 +38,7 @@ typedef struct part_summary {
 } part_summary;
 
 /* Summarizes the parts of a mesh. Its vertices have ids if all parts with cells have ids, and there is at least one. */
-static part_summary summarize(const session_parts *parts)
+static part_summary summarize_parts(const session_parts *parts)
 {
     part_summary out = {.has_ids = true};
     bool has_any = false;
@@ -56,27 +56,27 @@ static part_summary summarize(const session_parts *parts)
     return out;
 }
 
-static const session_field *find_given(const session_mesh *part, const char *name)
+static const session_field *find_set_field(const session_mesh *part, const char *name)
 {
     const int index = session_find_field(part, name);
     return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
 }
 
 /* Returns whether no earlier part has the field. The field is then listed with this part. */
-static bool is_first_with(const session_parts *parts, int part, const session_field *field)
+static bool is_first_part_with(const session_parts *parts, int part, const session_field *field)
 {
     for (int i = 0; i < part; i++)
-        if (find_given(parts->items[i], field->given.name)) return false;
+        if (find_set_field(parts->items[i], field->given.name)) return false;
     return true;
 }
 
 /* Finds an error of a field on any part: its description is invalid, or it is not the same on all blocks. */
-static void find_problem(const session_parts *parts, const session_field *first, base_error *problem)
+static void find_field_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;
     for (int i = 0; i < parts->count && !problem->status; i++) {
         const session_mesh *part = parts->items[i];
-        const session_field *field = find_given(part, as->name);
+        const session_field *field = find_set_field(part, as->name);
         if (field && field->problem.status) {
             *problem = field->problem;
         } else if (!field && part->given.cell_count > 0) {
@@ -97,13 +97,13 @@ typedef struct field_visit {
     int part, next;
 } field_visit;
 
-static const session_field *next_given(field_visit *visit)
+static const session_field *next_set_field(field_visit *visit)
 {
     for (; visit->part < visit->parts->count; visit->part++, visit->next = 0) {
         const session_mesh *part = visit->parts->items[visit->part];
         while (visit->next < part->field_count) {
             const session_field *field = &part->fields[visit->next++];
-            if (!field->is_derived && is_first_with(visit->parts, visit->part, field)) return field;
+            if (!field->is_derived && is_first_part_with(visit->parts, visit->part, field)) return field;
         }
     }
     return NULL;
@@ -111,14 +111,14 @@ static const session_field *next_given(field_visit *visit)
 
 static size_t append_parts(char *text, size_t capacity, size_t at, const session_parts *parts)
 {
-    const part_summary of = summarize(parts);
+    const part_summary of = summarize_parts(parts);
     if (!of.is_given) return at;
     at = append_line(text, capacity, at, 'm', of.has_cells, of.has_ids | 2 * of.is_refined, parts->items[0]->name);
     if (of.problem) at = append_fault(text, capacity, at, of.problem);
     field_visit visit = {.parts = parts};
-    for (const session_field *field; (field = next_given(&visit)) != NULL;) {
+    for (const session_field *field; (field = next_set_field(&visit)) != NULL;) {
         base_error problem = {.status = INSITU_OK};
-        find_problem(parts, field, &problem);
+        find_field_problem(parts, field, &problem);
         at = append_line(text, capacity, at, 'f', field->given.component_count, (int)field->given.centring,
                          field->given.name);
         at = append_fault(text, capacity, at, &problem);
@@ -144,16 +144,16 @@ static size_t write_table(const session_meshes *meshes, char *text, size_t capac
 
 static void hash_parts(const session_parts *parts, uint64_t *hash)
 {
-    const part_summary of = summarize(parts);
+    const part_summary of = summarize_parts(parts);
     if (!of.is_given) return;
     const int head[] = {0, of.has_cells, of.has_ids, of.is_refined};
     session_hash_bytes(hash, head, sizeof head);
     session_hash_text(hash, parts->items[0]->name);
     field_visit visit = {.parts = parts};
-    for (const session_field *field; (field = next_given(&visit)) != NULL;) {
+    for (const session_field *field; (field = next_set_field(&visit)) != NULL;) {
         const int tail[] = {1, field->given.component_count, (int)field->given.centring};
         base_error problem = {.status = INSITU_OK};
-        find_problem(parts, field, &problem);
+        find_field_problem(parts, field, &problem);
         session_hash_bytes(hash, tail, sizeof tail);
         session_hash_text(hash, field->given.name);
         if (problem.status) session_hash_text(hash, problem.message);
@@ -249,12 +249,12 @@ void session_catalogue_free(session_catalogue *catalogue)
     *catalogue = (session_catalogue){0};
 }
 
-static int by_text(const void *a, const void *b)
+static int compare_texts(const void *a, const void *b)
 {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-static int by_mesh_name(const void *a, const void *b)
+static int compare_mesh_names(const void *a, const void *b)
 {
     return strcmp(((const session_catalogue_mesh *)a)->name, ((const session_catalogue_mesh *)b)->name);
 }
@@ -262,7 +262,7 @@ static int by_mesh_name(const void *a, const void *b)
 static session_catalogue_mesh *find_mesh(const session_catalogue *catalogue, const char *name)
 {
     const session_catalogue_mesh key = {.name = (char *)(uintptr_t)name};
-    return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, by_mesh_name);
+    return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, compare_mesh_names);
 }
 
 /* Stores the names of the meshes in the text, if names is not NULL. Returns their number. */
@@ -290,7 +290,7 @@ static bool add_meshes(session_catalogue *catalogue, const char *text, size_t si
     bool has_memory = names && catalogue->meshes;
     if (has_memory) {
         list_names(text, size, names);
-        qsort(names, count, sizeof *names, by_text);
+        qsort(names, count, sizeof *names, compare_texts);
     }
     for (size_t i = 0; i < count && has_memory; i++) {
         if (i > 0 && strcmp(names[i], names[i - 1]) == 0) continue;
@@ -322,8 +322,8 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
     return field;
 }
 
-static session_catalogue_field *take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components,
-                                           insitu_centring centring, const char *name)
+static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components,
+                                             insitu_centring centring, const char *name)
 {
     session_catalogue_field *field = add_field(mesh, name);
     if (!field) return NULL;
@@ -339,7 +339,7 @@ static session_catalogue_field *take_field(session_catalogue_mesh *mesh, bool ha
 }
 
 /* Ends a rank's table of a mesh: records the fields that were missing from it. */
-static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
+static void record_missing_fields(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;
     if (mesh->first_rank < 0) mesh->first_rank = rank;
@@ -350,7 +350,7 @@ static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_id
     }
 }
 
-static bool keep_fault(base_error **fault, int rank, insitu_status status, const char *message)
+static bool store_fault(base_error **fault, int rank, insitu_status status, const char *message)
 {
     if (*fault) return true;
     *fault = base_calloc(1, sizeof **fault);
@@ -361,16 +361,16 @@ static bool keep_fault(base_error **fault, int rank, insitu_status status, const
 /* Records a fault of the rank. field: NULL if the mesh has the fault; mesh: NULL if its owner is unknown. Lack of
  * memory is also recorded for the catalogue, because callers then mostly skip the data that they would have passed
  * next. */
-static bool take_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
-                       int rank, insitu_status status, const char *message)
+static bool record_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
+                         int rank, insitu_status status, const char *message)
 {
     base_error **fault = field ? &field->fault : mesh ? &mesh->fault : &catalogue->fault;
     catalogue->has_faults = true;
-    return keep_fault(fault, rank, status, message) &&
-           (status != INSITU_ERROR_MEMORY || keep_fault(&catalogue->fault, rank, status, message));
+    return store_fault(fault, rank, status, message) &&
+           (status != INSITU_ERROR_MEMORY || store_fault(&catalogue->fault, rank, status, message));
 }
 
-static bool take_table(session_catalogue *catalogue, const char *text, size_t size, int rank)
+static bool read_table(session_catalogue *catalogue, const char *text, size_t size, int rank)
 {
     session_catalogue_mesh *mesh = NULL;
     session_catalogue_field *field = NULL;
@@ -381,20 +381,20 @@ static bool take_table(session_catalogue *catalogue, const char *text, size_t si
         const long b = strtol(end, &end, 10);
         const char *name = end + 1;
         if (line[0] == 'm') {
-            close_mesh(mesh, has_cells, has_ids, rank);
+            record_missing_fields(mesh, has_cells, has_ids, rank);
             mesh = find_mesh(catalogue, name);
             field = NULL;
             has_cells = a != 0;
             has_ids = b & 1;
             if (mesh && b & 2) mesh->is_refined = true;
         } else if (line[0] == 'e') {
-            if (!take_fault(catalogue, mesh, field, rank, (insitu_status)a, name)) return false;
+            if (!record_fault(catalogue, mesh, field, rank, (insitu_status)a, name)) return false;
         } else {
-            field = take_field(mesh, has_cells, rank, (int)a, (insitu_centring)b, name);
+            field = record_field(mesh, has_cells, rank, (int)a, (insitu_centring)b, name);
             if (!field) return false;
         }
     }
-    close_mesh(mesh, has_cells, has_ids, rank);
+    record_missing_fields(mesh, has_cells, has_ids, rank);
     return true;
 }
 
@@ -405,7 +405,7 @@ const session_catalogue_field *session_catalogue_find(const session_catalogue_me
     return NULL;
 }
 
-static int by_field_name(const void *a, const void *b)
+static int compare_field_names(const void *a, const void *b)
 {
     return strcmp(((const session_catalogue_field *)a)->name, ((const session_catalogue_field *)b)->name);
 }
@@ -414,7 +414,8 @@ static void sort_fields(const session_catalogue *catalogue)
 {
     for (int i = 0; i < catalogue->mesh_count; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
-        if (mesh->field_count) qsort(mesh->fields, (size_t)mesh->field_count, sizeof *mesh->fields, by_field_name);
+        if (mesh->field_count)
+            qsort(mesh->fields, (size_t)mesh->field_count, sizeof *mesh->fields, compare_field_names);
     }
 }
 
@@ -465,7 +466,8 @@ static void free_tables(gathered_tables *tables)
     base_free(tables->places);
 }
 
-static insitu_status write_mine(const session_meshes *meshes, gathered_tables *tables, int *size, base_error *error)
+static insitu_status write_own_table(const session_meshes *meshes, gathered_tables *tables, int *size,
+                                     base_error *error)
 {
     const size_t bytes = write_table(meshes, NULL, 0);
     if (bytes > INT32_MAX / 2) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
@@ -476,7 +478,7 @@ static insitu_status write_mine(const session_meshes *meshes, gathered_tables *t
     return INSITU_OK;
 }
 
-static insitu_status place_tables(int ranks, gathered_tables *tables, base_error *error)
+static insitu_status compute_table_offsets(int ranks, gathered_tables *tables, base_error *error)
 {
     tables->total = 0;
     for (int rank = 0; rank < ranks; rank++) {
@@ -492,7 +494,7 @@ static insitu_status gather_tables(const session_meshes *meshes, const session_t
                                    base_error *error)
 {
     int size = 0;
-    write_mine(meshes, tables, &size, error);
+    write_own_table(meshes, tables, &size, error);
     tables->sizes = base_calloc((size_t)team->ranks, sizeof(int));
     tables->places = base_calloc((size_t)team->ranks, sizeof(int));
     if (!tables->sizes || !tables->places) session_no_memory(error, 8 * (int64_t)team->ranks, "counts");
@@ -501,7 +503,7 @@ static insitu_status gather_tables(const session_meshes *meshes, const session_t
     status =
         session_mpi(error, MPI_Allgather(&size, 1, MPI_INT, tables->sizes, 1, MPI_INT, team->comm), "MPI_Allgather");
     if (status) return status;
-    place_tables(team->ranks, tables, error);
+    compute_table_offsets(team->ranks, tables, error);
     status = session_agree(team->comm, error);
     if (status) return status;
     return session_mpi(
@@ -510,11 +512,11 @@ static insitu_status gather_tables(const session_meshes *meshes, const session_t
         "MPI_Allgatherv");
 }
 
-static bool take_tables(int ranks, const gathered_tables *tables, session_catalogue *out)
+static bool read_tables(int ranks, const gathered_tables *tables, session_catalogue *out)
 {
     if (!add_meshes(out, tables->all, (size_t)tables->total)) return false;
     for (int rank = 0; rank < ranks; rank++)
-        if (!take_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank)) return false;
+        if (!read_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank)) return false;
     return true;
 }
 
@@ -535,12 +537,12 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     insitu_status status = INSITU_OK;
     if (is_shared) {
         int size = 0;
-        if (write_mine(meshes, &tables, &size, error) == INSITU_OK &&
-            !(add_meshes(&found, tables.mine, (size_t)size) && take_table(&found, tables.mine, (size_t)size, 0)))
+        if (write_own_table(meshes, &tables, &size, error) == INSITU_OK &&
+            !(add_meshes(&found, tables.mine, (size_t)size) && read_table(&found, tables.mine, (size_t)size, 0)))
             session_no_memory(error, size, "the catalogue of meshes and fields");
     } else {
         status = gather_tables(meshes, team, &tables, error);
-        if (status == INSITU_OK && !take_tables(team->ranks, &tables, &found))
+        if (status == INSITU_OK && !read_tables(team->ranks, &tables, &found))
             session_no_memory(error, tables.total, "the catalogue of meshes and fields");
     }
     if (status == INSITU_OK) status = session_agree(team->comm, error);

@@ -40,13 +40,13 @@ typedef struct cell_rows {
     int64_t count, row, used; /* number of entries, entries of each row, and how many of these are read */
 } cell_rows;
 
-static int64_t entry_of(const cell_rows *rows, int64_t i)
+static int64_t read_entry(const cell_rows *rows, int64_t i)
 {
     return grid_array_index(rows->connectivity,
                             rows->row == rows->used ? i : i / rows->used * rows->row + i % rows->used);
 }
 
-static cell_rows rows_of(const session_mesh *mesh)
+static cell_rows make_cell_rows(const session_mesh *mesh)
 {
     const insitu_mesh *given = &mesh->given;
     cell_rows rows = {&mesh->cells.connectivity, given->connectivity_count, 1, 1};
@@ -59,7 +59,7 @@ static cell_rows rows_of(const session_mesh *mesh)
 
 /* Returns whether all entries fit into 4 bytes. If one does not although there are few vertices, it is a bad index;
  * entries are then copied with 8 bytes, so that it is reported with its value. */
-static bool fit_narrow(const cell_rows *rows, int threads)
+static bool fit_in_32_bits(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;
 #pragma omp parallel num_threads(threads)
@@ -67,7 +67,7 @@ static bool fit_narrow(const cell_rows *rows, int threads)
         region_enter();
 #pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
         for (int64_t i = 0; i < rows->count; i++) {
-            const int64_t entry = entry_of(rows, i);
+            const int64_t entry = read_entry(rows, i);
             least = entry < least ? entry : least;
             most = entry > most ? entry : most;
         }
@@ -77,7 +77,7 @@ static bool fit_narrow(const cell_rows *rows, int threads)
 }
 
 /* Computes the cell's position in the copy; returns false if its offsets are bad. */
-static bool place_of(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
+static bool locate_cell(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
 {
     *first = cell * count;
     if (!g->offsets.data) return true;
@@ -85,12 +85,12 @@ static bool place_of(const grid *g, int64_t cell, int count, int64_t entries, in
     return *first >= 0 && *first <= entries - count && grid_offset_end(&g->offsets, cell) - *first == count;
 }
 
-static void turn_cell(const session_mesh *mesh, int64_t cell, int64_t entries, const grid_array *out)
+static void reorder_cell(const session_mesh *mesh, int64_t cell, int64_t entries, const grid_array *out)
 {
     const int type = grid_cell_type(&mesh->cells, cell), count = grid_type_vertices(type);
     const signed char *turn = session_vertex_turn(mesh->given.vertex_order, type);
     int64_t vertices[GRID_MAX_CELL_VERTICES], first;
-    if (!turn || !place_of(&mesh->cells, cell, count, entries, &first)) return;
+    if (!turn || !locate_cell(&mesh->cells, cell, count, entries, &first)) return;
     for (int i = 0; i < count; i++) vertices[i] = grid_array_index(out, first + turn[i]);
     for (int i = 0; i < count; i++) session_put_index(out, first + i, vertices[i]);
 }
@@ -101,7 +101,7 @@ void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, 
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) turn_cell(mesh, cell, entries, out);
+        for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) reorder_cell(mesh, cell, entries, out);
         region_leave();
     }
 }
@@ -109,16 +109,16 @@ void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, 
 insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;
-    const cell_rows rows = rows_of(mesh);
+    const cell_rows rows = make_cell_rows(mesh);
     if (mesh->cells.cell_types && !has_turned_cells(mesh)) return INSITU_OK;
-    const int64_t largest = fit_narrow(&rows, threads) ? 0 : INT64_MAX;
+    const int64_t largest = fit_in_32_bits(&rows, threads) ? 0 : INT64_MAX;
     if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
         return error->status;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, entry_of(&rows, i));
+        for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, read_entry(&rows, i));
         region_leave();
     }
     session_turn_cells(mesh, rows.count, threads, &t->connectivity);

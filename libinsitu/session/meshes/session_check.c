@@ -58,13 +58,13 @@ typedef struct face_place {
     double position[3];
 } face_place;
 
-static void free_room(face_room *room)
+static void free_edge_buffer(face_room *room)
 {
     base_free(room->edges);
     *room = (face_room){0};
 }
 
-static bool make_room(face_room *room, int64_t count)
+static bool reserve_edges(face_room *room, int64_t count)
 {
     if (count <= room->capacity) return true;
     const int64_t capacity = count + count / 2 + 64;
@@ -143,7 +143,7 @@ static face_fault check_faces(const session_mesh *mesh, int64_t cell, face_room 
         place->face = grid_array_index(&g->connectivity, i);
         const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), place);
         if (fault) return fault;
-        if (!make_room(room, edges + place->next - place->first)) return FACES_NO_MEMORY;
+        if (!reserve_edges(room, edges + place->next - place->first)) return FACES_NO_MEMORY;
         edges = add_edges(g, place, room->edges, edges);
     }
     return check_edges(room->edges, edges, place);
@@ -278,7 +278,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
 }
 
 /* Returns the type as stored in the caller's array, which may contain integers of 64 bits. */
-static long long given_type(const session_mesh *mesh, int64_t cell)
+static long long original_type(const session_mesh *mesh, int64_t cell)
 {
     const grid *g = &mesh->cells;
     if (mesh->conformed.types) {
@@ -316,7 +316,7 @@ static const char *type_name(int type)
 }
 
 /* Returns the name of the type that the caller gave, since a polyhedron may be read as another type. */
-static const char *given_name(const session_mesh *mesh, int64_t cell)
+static const char *original_type_name(const session_mesh *mesh, int64_t cell)
 {
     return type_name(session_given_type(mesh, cell));
 }
@@ -357,9 +357,9 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     fault_place place = {0};
     face_room room = {0};
     const cell_fault fault = check_cell(mesh, cell, &room, &place);
-    free_room(&room);
+    free_edge_buffer(&room);
     const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = place.vertex + base;
-    const char *type = given_name(mesh, cell);
+    const char *type = original_type_name(mesh, cell);
     switch (fault) {
     case BAD_FACES: return describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
     case BAD_TYPE:
@@ -370,7 +370,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
             error, INSITU_ERROR_MESH,
             "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
             "triangle, 9 quad, 7 polygon)",
-            mesh->label, at, given_type(mesh, cell));
+            mesh->label, at, original_type(mesh, cell));
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
@@ -386,7 +386,8 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
 }
 
 /* Checks cells of any layout one by one. */
-static int64_t check_each(const session_mesh *mesh, int64_t begin, int64_t end, face_room *room, mesh_tally *tally)
+static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, int64_t end, face_room *room,
+                                      mesh_tally *tally)
 {
     mesh_tally own = tally_empty();
     fault_place place;
@@ -416,10 +417,10 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
             /* The fast check ends at a bad cell, or at a polygon, which it cannot check; the cells after that are
              * checked one by one. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
-            if (at < end) at = check_each(mesh, at, end, &room, &mine);
+            if (at < end) at = check_cells_one_by_one(mesh, at, end, &room, &mine);
             if (at < end) first_bad = at;
         }
-        free_room(&room);
+        free_edge_buffer(&room);
 #pragma omp critical(session_check_tally)
         tally_merge(tally, &mine);
         region_leave();
@@ -457,7 +458,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
                     error, INSITU_ERROR_MESH,
                     "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
                     "are supported",
-                    mesh->label, (long long)session_given_cell(mesh, cell), given_name(mesh, cell),
+                    mesh->label, (long long)session_given_cell(mesh, cell), original_type_name(mesh, cell),
                     (long long)vertex + mesh->given.index_base, p[0], p[1], p[2], largest_coordinate);
         }
     }
@@ -476,10 +477,10 @@ static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tal
         error, INSITU_ERROR_MESH,
         "mesh \"%s\": z coordinates are not given, but cell %lld (%s) needs them: only triangles, quads and "
         "polygons go without",
-        mesh->label, (long long)session_given_cell(mesh, cell), given_name(mesh, cell));
+        mesh->label, (long long)session_given_cell(mesh, cell), original_type_name(mesh, cell));
 }
 
-static bool is_far(const mesh_tally *tally)
+static bool has_far_coordinates(const mesh_tally *tally)
 {
     bool far = false;
     for (int axis = 0; axis < 3 && tally->drawn; axis++)
@@ -487,7 +488,7 @@ static bool is_far(const mesh_tally *tally)
     return far;
 }
 
-static void find_flat(const grid *g, int threads, uint64_t *flat)
+static void find_flat_cells(const grid *g, int threads, uint64_t *flat)
 {
     const int64_t words = (g->cell_count + 63) / 64;
 #pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
@@ -504,14 +505,14 @@ static void find_flat(const grid *g, int threads, uint64_t *flat)
 }
 
 /* Finds the cells without volume, which are omitted from trees. If these cells have changed, the tree is dropped. */
-static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads, base_error *error)
+static insitu_status update_flat_cells(session_mesh *mesh, int64_t count, int threads, base_error *error)
 {
     const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat;
     uint64_t *flat = NULL;
     if (count) {
         flat = base_calloc(bytes, 1);
         if (!flat) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %zu bytes of flat cells", bytes);
-        find_flat(&mesh->cells, threads, flat);
+        find_flat_cells(&mesh->cells, threads, flat);
     }
     const bool is_same = !flat == !mesh->flat && (!flat || memcmp(flat, mesh->flat, bytes) == 0);
     if (!is_same) session_drop_tree(mesh);
@@ -525,9 +526,10 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
     if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
-    insitu_status status = is_far(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
+    insitu_status status =
+        has_far_coordinates(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
     if (!status) status = check_plane(mesh, &tally, error);
-    if (!status) status = update_flat(mesh, tally.flat, threads, error);
+    if (!status) status = update_flat_cells(mesh, tally.flat, threads, error);
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
         mesh->lower[axis] = tally.lower[axis];

@@ -21,7 +21,7 @@ typedef struct conform_array {
     int64_t below; /* an upper bound of valid indices, if the array contains indices */
 } conform_array;
 
-static conform_array array_of(insitu_mesh *m, int number)
+static conform_array find_array(insitu_mesh *m, int number)
 {
     const int64_t open = m->open_offsets ? 0 : 1,
                   most = m->vertex_count > m->face_count ? m->vertex_count : m->face_count;
@@ -67,7 +67,7 @@ static insitu_type read_type(const conform_array *of, bool has_map, bool *is_cop
 
 /* ---- filling ------------------------------------------------------------------------------------------------- */
 
-static int64_t integer_at(insitu_type type, const char *p)
+static int64_t read_integer(insitu_type type, const char *p)
 {
     int8_t i8;
     uint8_t u8;
@@ -94,8 +94,8 @@ static unsigned char mapped_type(const session_conformed *conformed, int64_t num
     return conformed->types[number];
 }
 
-static void fill_element(const session_conformed *conformed, const conform_array *of, insitu_type as,
-                         const grid_array *from, int64_t i, char *out)
+static void convert_element(const session_conformed *conformed, const conform_array *of, insitu_type as,
+                            const grid_array *from, int64_t i, char *out)
 {
     const char *p = from->data + i * from->stride;
     const insitu_type type = of->array->type;
@@ -105,7 +105,7 @@ static void fill_element(const session_conformed *conformed, const conform_array
         const double number = grid_array_number(from, i);
         memcpy(out, &number, sizeof number);
     } else {
-        const int64_t whole = integer_at(type, p);
+        const int64_t whole = read_integer(type, p);
         const int32_t narrow = (int32_t)whole;
         if (of->role == OF_FLAGS)
             *out = whole != 0;
@@ -118,8 +118,8 @@ static void fill_element(const session_conformed *conformed, const conform_array
     }
 }
 
-static void fill_array(const session_conformed *conformed, const conform_array *of, insitu_type as, int threads,
-                       char *out)
+static void convert_array(const session_conformed *conformed, const conform_array *of, insitu_type as, int threads,
+                          char *out)
 {
     const grid_array from = session_grid_array(of->array);
     const int64_t size = session_type_size(as), count = of->count;
@@ -127,7 +127,7 @@ static void fill_array(const session_conformed *conformed, const conform_array *
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t i = 0; i < count; i++) fill_element(conformed, of, as, &from, i, out + i * size);
+        for (int64_t i = 0; i < count; i++) convert_element(conformed, of, as, &from, i, out + i * size);
         region_leave();
     }
 }
@@ -137,9 +137,9 @@ void session_fill_conformed(session_mesh *mesh, int threads)
     for (int i = 0; i < SESSION_CONFORMED; i++) {
         if (!mesh->conformed.copies[i]) continue;
         bool is_copied;
-        const conform_array of = array_of(&mesh->original, i);
+        const conform_array of = find_array(&mesh->original, i);
         const insitu_type as = read_type(&of, mesh->conformed.types != NULL, &is_copied);
-        fill_array(&mesh->conformed, &of, as, threads, mesh->conformed.copies[i]);
+        convert_array(&mesh->conformed, &of, as, threads, mesh->conformed.copies[i]);
     }
 }
 
@@ -171,9 +171,9 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
 
 /* Makes the description refer to the copy of an array, if it needs one. The copy is taken over from the last
  * description if is_kept, and is otherwise allocated. Returns false if memory runs out. */
-static bool place_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
+static bool refer_to_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
 {
-    const conform_array of = array_of(given, number);
+    const conform_array of = find_array(given, number);
     bool is_copied;
     if (!of.array->data) return true;
     const insitu_type as = read_type(&of, out->types != NULL, &is_copied);
@@ -200,7 +200,7 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     bool is_made = copy_map(original, &made);
     for (int i = 0; i < SESSION_CONFORMED && is_made; i++) {
         const unsigned part = i < 3 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_TOPOLOGY;
-        is_made = place_copy(&mesh->conformed, !(changed & part), i, &given, &made);
+        is_made = refer_to_copy(&mesh->conformed, !(changed & part), i, &given, &made);
     }
     if (!is_made) {
         const int64_t bytes = made.bytes;

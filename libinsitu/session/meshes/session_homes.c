@@ -35,7 +35,7 @@ static int compare_ids(const void *a, const void *b)
 
 /* Returns one of this rank's ids, namely the quantile of this rank in a sample of its ids. Any evenly chosen sample
  * suffices, as all ranks receive the result. */
-static int64_t quantile(const session_mesh *mesh, const session_team *team)
+static int64_t sample_quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);
     const int64_t vertices = mesh->given.vertex_count, count = vertices < MOST_SAMPLES ? vertices : MOST_SAMPLES;
@@ -53,10 +53,10 @@ static void add_part(rank_part *part, const session_mesh *mesh, bool by_id, doub
         part->box.upper[axis] = fmax(part->box.upper[axis], mesh->upper[axis] + margin);
     }
     part->has_ids = by_id && mesh->given.vertex_count > 0;
-    if (part->has_ids) part->first = quantile(mesh, team);
+    if (part->has_ids) part->first = sample_quantile(mesh, team);
 }
 
-static bool do_boxes_meet(const session_box *a, const session_box *b)
+static bool do_boxes_intersect(const session_box *a, const session_box *b)
 {
     for (int axis = 0; axis < 3; axis++)
         if (!(a->lower[axis] <= b->upper[axis] && b->lower[axis] <= a->upper[axis])) return false;
@@ -70,15 +70,15 @@ bool session_is_in_box(const session_box *box, const double point[3])
     return true;
 }
 
-static bool keep_near(session_homes *homes, const rank_part *parts, int ranks)
+static bool store_near_ranks(session_homes *homes, const rank_part *parts, int ranks)
 {
     const session_box *own = &parts[homes->rank].box;
-    for (int rank = 0; rank < ranks; rank++) homes->near_count += do_boxes_meet(&parts[rank].box, own);
+    for (int rank = 0; rank < ranks; rank++) homes->near_count += do_boxes_intersect(&parts[rank].box, own);
     homes->near = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->near);
     homes->boxes = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->boxes);
     if (!homes->near || !homes->boxes) return false;
     for (int rank = 0, at = 0; rank < ranks; rank++) {
-        if (!do_boxes_meet(&parts[rank].box, own)) continue;
+        if (!do_boxes_intersect(&parts[rank].box, own)) continue;
         homes->near[at] = rank;
         homes->boxes[at++] = parts[rank].box;
     }
@@ -97,7 +97,7 @@ static int compare_shares(const void *a, const void *b)
     return (x->owner > y->owner) - (x->owner < y->owner);
 }
 
-static bool divide_ids(session_homes *homes, const rank_part *parts, int ranks)
+static bool assign_id_ranges(session_homes *homes, const rank_part *parts, int ranks)
 {
     id_share *shares = base_alloc((size_t)ranks * sizeof *shares);
     homes->firsts = base_alloc((size_t)ranks * sizeof *homes->firsts);
@@ -126,7 +126,8 @@ insitu_status session_homes_find(session_homes *homes, const session_mesh *const
     if (!status)
         status = session_mpi(error, MPI_Allgather(&own, sizeof own, MPI_BYTE, parts, sizeof own, MPI_BYTE, team->comm),
                              "MPI_Allgather");
-    if (!status && (!keep_near(&found, parts, team->ranks) || (by_id && !divide_ids(&found, parts, team->ranks))))
+    if (!status &&
+        (!store_near_ranks(&found, parts, team->ranks) || (by_id && !assign_id_ranges(&found, parts, team->ranks))))
         session_no_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
     base_free(parts);
     if (!status) status = session_agree(team->comm, error);

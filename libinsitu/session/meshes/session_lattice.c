@@ -13,17 +13,17 @@ static const char axis_name[3] = {'i', 'j', 'k'};
 
 /* ---- descriptions -------------------------------------------------------------------------------------------- */
 
-static int64_t vertices_along(const insitu_lattice *l, int axis)
+static int64_t count_vertices_along(const insitu_lattice *l, int axis)
 {
     return l->cells[axis] + 1;
 }
 
-static int64_t cells_along(const insitu_lattice *l, int axis)
+static int64_t count_cells_along(const insitu_lattice *l, int axis)
 {
     return l->cells[axis] ? l->cells[axis] : 1;
 }
 
-static bool are_zero(const int64_t values[3])
+static bool are_all_zero(const int64_t values[3])
 {
     return !values[0] && !values[1] && !values[2];
 }
@@ -104,7 +104,7 @@ static insitu_status check_strides(const char *what, const int64_t strides[3], c
 
 /* Computes packed strides for these counts, with the first index fastest. The last stride cannot overflow if counts
  * have been checked. */
-static void packed_strides(const int64_t counts[3], int64_t out[3])
+static void compute_packed_strides(const int64_t counts[3], int64_t out[3])
 {
     out[0] = 1;
     out[1] = counts[0];
@@ -116,27 +116,27 @@ static insitu_status check_numbers(const insitu_mesh *mesh, base_error *error)
     const insitu_lattice *l = mesh->lattice;
     int64_t vertices[3], cells[3], packed[3];
     for (int axis = 0; axis < 3; axis++) {
-        vertices[axis] = vertices_along(l, axis);
-        cells[axis] = cells_along(l, axis);
+        vertices[axis] = count_vertices_along(l, axis);
+        cells[axis] = count_cells_along(l, axis);
     }
     if (vertices[0] > INT64_MAX / 32 / vertices[1])
         return base_fail(error, INSITU_ERROR_MESH, "lattice: %lld x %lld cells along i and j are too many",
                          (long long)l->cells[0], (long long)l->cells[1]);
-    packed_strides(vertices, packed);
-    insitu_status status = check_strides("vertices", are_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices,
-                                         mesh->vertex_count, error);
-    packed_strides(cells, packed);
+    compute_packed_strides(vertices, packed);
+    insitu_status status = check_strides("vertices", are_all_zero(l->vertex_strides) ? packed : l->vertex_strides,
+                                         vertices, mesh->vertex_count, error);
+    compute_packed_strides(cells, packed);
     if (!status)
-        status = check_strides("cells", are_zero(l->cell_strides) ? packed : l->cell_strides, cells, mesh->cell_count,
-                               error);
+        status = check_strides("cells", are_all_zero(l->cell_strides) ? packed : l->cell_strides, cells,
+                               mesh->cell_count, error);
     return status;
 }
 
 static insitu_status check_interior(const insitu_lattice *l, base_error *error)
 {
-    if (are_zero(l->interior_first) && are_zero(l->interior_end)) return INSITU_OK;
+    if (are_all_zero(l->interior_first) && are_all_zero(l->interior_end)) return INSITU_OK;
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t first = l->interior_first[axis], end = l->interior_end[axis], most = cells_along(l, axis);
+        const int64_t first = l->interior_first[axis], end = l->interior_end[axis], most = count_cells_along(l, axis);
         if (first < 0 || end < first || end > most)
             return base_fail(error, INSITU_ERROR_MESH,
                              "lattice: the interior along %c is %lld..%lld, expected a range within 0..%lld",
@@ -153,7 +153,7 @@ static const int64_t largest_refined_first = (int64_t)1 << 40, largest_refinemen
 
 static insitu_status check_refinement(const insitu_lattice *l, base_error *error)
 {
-    if (are_zero(l->refinement)) return INSITU_OK;
+    if (are_all_zero(l->refinement)) return INSITU_OK;
     for (int axis = 0; axis < 3; axis++) {
         if (!l->cells[axis]) continue;
         if (l->refinement[axis] < 1 || l->refinement[axis] > largest_refinement)
@@ -190,7 +190,7 @@ static insitu_status check_axes(const insitu_lattice *l, base_error *error)
     static const char *const names[3] = {"coordinates along i", "coordinates along j", "coordinates along k"};
     for (int axis = 0; axis < 3; axis++) {
         const int optional = l->cells[axis] ? 0 : SESSION_IS_OPTIONAL;
-        const session_array_rule rule = {names[axis], vertices_along(l, axis),
+        const session_array_rule rule = {names[axis], count_vertices_along(l, axis),
                                          SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY | optional, 1};
         const insitu_status status = session_check_array(&l->axes[axis], &rule, INSITU_ERROR_MESH, error);
         if (status) return status;
@@ -222,8 +222,8 @@ insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error)
     const insitu_lattice *l = mesh->lattice;
     insitu_status status = check_others(mesh, error);
     if (!status) status = check_cells(l, error);
-    if (status || (are_zero(l->cells) && !mesh->cell_count)) return status;
-    if (are_zero(l->cells))
+    if (status || (are_all_zero(l->cells) && !mesh->cell_count)) return status;
+    if (are_all_zero(l->cells))
         return base_fail(error, INSITU_ERROR_MESH,
                          "lattice: there are no cells along i, j and k, and cell_count is %lld",
                          (long long)mesh->cell_count);
@@ -255,7 +255,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
         memcmp(a->interior_end, b->interior_end, sizeof a->interior_end) != 0)
         changes |= INSITU_CHANGED_TOPOLOGY;
     const bool is_moved = memcmp(a->first, b->first, sizeof a->first) != 0;
-    if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_zero(a->refinement)))
+    if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_all_zero(a->refinement)))
         changes |= INSITU_CHANGED_TOPOLOGY; /* other cells are then covered by finer blocks, or cover coarser ones */
     for (int axis = 0; axis < 3; axis++)
         if (a->origin[axis] != b->origin[axis] || a->spacing[axis] != b->spacing[axis] ||
@@ -266,7 +266,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
 
 /* ---- the grid ------------------------------------------------------------------------------------------------ */
 
-static grid_numbering number(const int64_t strides[3], const int64_t counts[3])
+static grid_numbering make_numbering(const int64_t strides[3], const int64_t counts[3])
 {
     grid_numbering out = {{0}, {0}, {0}, {0}};
     int order[3], above = -1;
@@ -288,7 +288,7 @@ static grid_numbering number(const int64_t strides[3], const int64_t counts[3])
 void session_take_lattice(session_mesh *mesh)
 {
     session_lattice *own = &mesh->lattice;
-    const bool is_given = mesh->given.lattice && !are_zero(mesh->given.lattice->cells);
+    const bool is_given = mesh->given.lattice && !are_all_zero(mesh->given.lattice->cells);
     if (!mesh->given.lattice) return;
     own->given = *mesh->given.lattice;
     mesh->given.lattice = &own->given;
@@ -298,25 +298,25 @@ void session_take_lattice(session_mesh *mesh)
     const insitu_lattice *l = &own->given;
     grid_lattice *out = &own->cells;
     int64_t vertices[3], cells[3], packed[3];
-    const bool has_all = are_zero(l->interior_first) && are_zero(l->interior_end);
+    const bool has_all = are_all_zero(l->interior_first) && are_all_zero(l->interior_end);
     for (int axis = 0; axis < 3; axis++) {
-        vertices[axis] = vertices_along(l, axis);
-        cells[axis] = cells_along(l, axis);
+        vertices[axis] = count_vertices_along(l, axis);
+        cells[axis] = count_cells_along(l, axis);
         out->cells[axis] = l->cells[axis];
         out->drawn_first[axis] = has_all ? 0 : l->interior_first[axis];
         out->drawn_end[axis] = has_all ? cells[axis] : l->interior_end[axis];
         out->axes[axis] = (grid_axis){own->places[axis], vertices[axis], &out->by_vertex, axis};
     }
-    packed_strides(vertices, packed);
-    out->by_vertex = number(are_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
+    compute_packed_strides(vertices, packed);
+    out->by_vertex = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
     /* The axis without cells comes last, so that the first four corners are a quad's. */
     const int last = l->cells[0] ? l->cells[1] ? 2 : 1 : 0, axes[3] = {last == 0, last == 2 ? 1 : 2, last};
     for (int i = 0; i < 8; i++) {
         out->corner[i] = 0;
         for (int n = 0; n < 3; n++) out->corner[i] += hex[i][n] * out->by_vertex.stride[axes[n]];
     }
-    packed_strides(cells, packed);
-    out->by_cell = number(are_zero(l->cell_strides) ? packed : l->cell_strides, cells);
+    compute_packed_strides(cells, packed);
+    out->by_cell = make_numbering(are_all_zero(l->cell_strides) ? packed : l->cell_strides, cells);
     out->cell_count = cells[0] * cells[1] * cells[2];
     out->has_ghosts = !has_all || out->cell_count != mesh->given.cell_count;
 }
@@ -324,7 +324,7 @@ void session_take_lattice(session_mesh *mesh)
 void session_read_lattice(session_mesh *mesh, grid *g)
 {
     const insitu_lattice *l = mesh->given.lattice;
-    if (!l || are_zero(l->cells)) return;
+    if (!l || are_all_zero(l->cells)) return;
     g->lattice = &mesh->lattice.cells;
     g->cell_type = session_is_plane(l) ? GRID_QUAD : GRID_HEX;
     for (int axis = 0; axis < 3 && session_has_axes(&mesh->given); axis++)
@@ -334,7 +334,7 @@ void session_read_lattice(session_mesh *mesh, grid *g)
 static void fill_axis(const insitu_lattice *l, int axis, double *out)
 {
     const grid_array given = session_grid_array(&l->axes[axis]);
-    for (int64_t n = 0; n < vertices_along(l, axis); n++) {
+    for (int64_t n = 0; n < count_vertices_along(l, axis); n++) {
         out[n] = 0;
         if (is_uniform(l)) out[n] = l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + n);
         if (given.data) out[n] = grid_array_number(&given, n);
@@ -348,7 +348,7 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
     if (!mesh->cells.lattice || !mesh->cells.coordinates[0].axis) return INSITU_OK;
     const insitu_lattice *l = &own->given;
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t count = vertices_along(l, axis);
+        const int64_t count = count_vertices_along(l, axis);
         double *places = base_alloc((size_t)count * sizeof *places);
         if (!places)
             return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",

@@ -13,7 +13,7 @@ bool session_is_aligned(const insitu_array *array)
     return array->stride_bytes % size == 0 && (uintptr_t)array->data % (uintptr_t)size == 0;
 }
 
-static grid_odd odd_of(const insitu_array *array)
+static grid_odd find_odd_type(const insitu_array *array)
 {
     const bool is_aligned = session_is_aligned(array);
     switch (array->type) {
@@ -38,7 +38,7 @@ grid_array session_grid_array(const insitu_array *array)
     out.data = array->data;
     out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
     out.is_wide = session_type_size(array->type) == 8;
-    out.odd = (unsigned char)odd_of(array);
+    out.odd = (unsigned char)find_odd_type(array);
     out.is_integer = out.odd || array->type == INSITU_INT32 || array->type == INSITU_INT64;
     return out;
 }
@@ -317,7 +317,7 @@ bool session_next_part(session_part_walk *walk)
 }
 
 /* Frees the data that is derived from the cells. */
-static void drop_made(session_mesh *mesh)
+static void drop_derived_data(session_mesh *mesh)
 {
     session_drop_outers(mesh, true);
     session_drop_scalars(mesh);
@@ -330,7 +330,7 @@ static void drop_made(session_mesh *mesh)
 
 void session_renew_cells(session_meshes *meshes, session_mesh *mesh)
 {
-    drop_made(mesh);
+    drop_derived_data(mesh);
     mesh->rent = 0;
     mesh->is_topology_stale = mesh->is_geometry_stale = mesh->is_check_stale = true;
     mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
@@ -339,7 +339,7 @@ void session_renew_cells(session_meshes *meshes, session_mesh *mesh)
 
 static void drop_cells(session_mesh *mesh)
 {
-    drop_made(mesh);
+    drop_derived_data(mesh);
     session_drop_axes(&mesh->lattice);
     session_drop_conformed(&mesh->conformed);
     base_free(mesh->covered);
@@ -379,7 +379,7 @@ static void free_mesh(session_mesh *mesh)
 }
 
 /* Returns the number of meshes that precede the block or, if is_end, all meshes up to the last block of that name. */
-static int count_before(const session_meshes *meshes, const char *name, int64_t block, bool is_end)
+static int count_preceding_meshes(const session_meshes *meshes, const char *name, int64_t block, bool is_end)
 {
     int low = 0, high = meshes->count;
     while (low < high) {
@@ -395,33 +395,33 @@ static int count_before(const session_meshes *meshes, const char *name, int64_t 
 }
 
 /* Returns the index of the block among the meshes, or the index at which it would be inserted. */
-static int mesh_position(const session_meshes *meshes, const char *name, int64_t block)
+static int find_mesh_index(const session_meshes *meshes, const char *name, int64_t block)
 {
-    return count_before(meshes, name, block, false);
+    return count_preceding_meshes(meshes, name, block, false);
 }
 
 session_parts session_parts_at(const session_meshes *meshes, int first)
 {
     const char *name = meshes->items[first]->name;
     const bool has_more = first + 1 < meshes->count && strcmp(meshes->items[first + 1]->name, name) == 0;
-    return (session_parts){has_more ? count_before(meshes, name, 0, true) - first : 1, meshes->items + first};
+    return (session_parts){has_more ? count_preceding_meshes(meshes, name, 0, true) - first : 1, meshes->items + first};
 }
 
 session_parts session_find_parts(const session_meshes *meshes, const char *name)
 {
-    const int first = mesh_position(meshes, name, INT64_MIN), end = count_before(meshes, name, 0, true);
+    const int first = find_mesh_index(meshes, name, INT64_MIN), end = count_preceding_meshes(meshes, name, 0, true);
     return (session_parts){end - first, meshes->items + first};
 }
 
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block)
 {
-    const int at = mesh_position(meshes, name, block);
+    const int at = find_mesh_index(meshes, name, block);
     session_mesh *mesh = at < meshes->count ? meshes->items[at] : NULL;
     return mesh && mesh->block == block && strcmp(mesh->name, name) == 0 ? mesh : NULL;
 }
 
 /* Ensures that there is space for one more mesh. Returns false if memory runs out. */
-static bool make_room(session_meshes *meshes)
+static bool reserve_mesh(session_meshes *meshes)
 {
     if (meshes->count < meshes->capacity) return true;
     const int capacity = meshes->capacity ? 2 * meshes->capacity : 8;
@@ -441,7 +441,7 @@ void session_keep_problem(session_field *field, const base_error *problem, base_
 
 static void insert_mesh(session_meshes *meshes, session_mesh *mesh)
 {
-    const int at = mesh_position(meshes, mesh->name, mesh->block);
+    const int at = find_mesh_index(meshes, mesh->name, mesh->block);
     memmove(meshes->items + at + 1, meshes->items + at, (size_t)(meshes->count - at) * sizeof *meshes->items);
     meshes->items[at] = mesh;
     meshes->count++;
@@ -465,7 +465,7 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t
         mesh->label = make_label(name, block);
         mesh->block = block;
     }
-    if (!mesh || !mesh->name || !mesh->label || !make_room(meshes)) {
+    if (!mesh || !mesh->name || !mesh->label || !reserve_mesh(meshes)) {
         session_no_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
         free_mesh(mesh);
         return NULL;
@@ -490,7 +490,7 @@ static void remove_meshes(session_meshes *meshes, int first, int count)
 
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block)
 {
-    if (session_find_block(meshes, name, block)) remove_meshes(meshes, mesh_position(meshes, name, block), 1);
+    if (session_find_block(meshes, name, block)) remove_meshes(meshes, find_mesh_index(meshes, name, block), 1);
 }
 
 void session_remove_mesh(session_meshes *meshes, const char *name)

@@ -143,7 +143,7 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
 
 /* Checks a description of faces by owners and neighbours; such a mesh must not describe its cells in another way
  * too. */
-static insitu_status check_owner(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_face_owners(const insitu_mesh *mesh, base_error *error)
 {
     if (!session_has_owners(mesh)) {
         if (mesh->halo_cell_count)
@@ -198,7 +198,7 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
 }
 
 /* Checks that cells given in rows are not described in another way as well. */
-static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = session_cell_nodes(mesh);
     if (row == 0 || mesh->cell_count == 0) return INSITU_OK;
@@ -221,7 +221,7 @@ static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 }
 
 /* order is for cells of one Lagrange type that no other array describes. */
-static insitu_status check_order(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *error)
 {
     const int type = (int)mesh->cell_type;
     if (mesh->order == 0) return INSITU_OK;
@@ -307,10 +307,10 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_arrays(mesh, error);
     if (!status) status = check_choices(mesh, error);
     if (!status) status = check_face_lists(mesh, error);
-    if (!status) status = check_owner(mesh, error);
-    if (!status) status = check_order(mesh, error);
+    if (!status) status = check_face_owners(mesh, error);
+    if (!status) status = check_lagrange_order(mesh, error);
     if (!status) status = check_shape(mesh, error);
-    if (!status) status = check_rows(mesh, error);
+    if (!status) status = check_cell_rows(mesh, error);
     return status;
 }
 
@@ -333,7 +333,7 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 
 /* Returns the INSITU_CHANGED_* bits of the changes between two descriptions with equal numbers of cells and vertices:
  * arrays that have another address or layout have not been checked yet. */
-static unsigned seen_changes(const session_mesh *mesh, const insitu_mesh *b)
+static unsigned find_description_changes(const session_mesh *mesh, const insitu_mesh *b)
 {
     const insitu_mesh *a = &mesh->original;
     bool has_same_cells =
@@ -358,13 +358,13 @@ static unsigned seen_changes(const session_mesh *mesh, const insitu_mesh *b)
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
 /* Stores a description in the table. An error can only be lack of memory; the caller must then refuse the mesh. */
-static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
+static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
 {
     unsigned changed = given->changed;
     if (!mesh->is_given || has_other_shape(&mesh->original, given)) changed = INSITU_CHANGED_ALL;
     const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
     const bool had_ids = mesh->given.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
-    changed |= seen_changes(mesh, given);
+    changed |= find_description_changes(mesh, given);
     if (changed & INSITU_CHANGED_GEOMETRY && mesh->topology.follows_places) changed |= INSITU_CHANGED_TOPOLOGY;
     if (session_conform_mesh(mesh, given, changed, error)) return;
     if (drops_fields) {
@@ -403,7 +403,7 @@ insitu_status session_place_error(base_error *error, const char *mesh, const cha
 }
 
 /* Removes the other kind of mesh with this name: a mesh is either a whole or consists of blocks. */
-static void remove_others(session_meshes *meshes, const char *name, int64_t block)
+static void remove_other_kind(session_meshes *meshes, const char *name, int64_t block)
 {
     const session_parts parts = session_find_parts(meshes, name);
     if (parts.count && (parts.items[0]->block == SESSION_WHOLE) != (block == SESSION_WHOLE))
@@ -416,13 +416,13 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t 
     if (!given && block == SESSION_WHOLE) session_remove_mesh(meshes, name);
     if (!given) session_remove_block(meshes, name, block);
     if (!given) return INSITU_OK;
-    remove_others(meshes, name, block);
+    remove_other_kind(meshes, name, block);
     session_mesh *mesh = session_find_block(meshes, name, block);
     if (!mesh) mesh = session_add_mesh(meshes, name, block, error);
     if (!mesh) return INSITU_ERROR_MEMORY;
     base_error what = {0};
     const bool had_levels = session_has_levels(&mesh->given);
-    if (check_mesh(given, &what) == INSITU_OK) take_mesh(meshes, mesh, given, &what);
+    if (check_mesh(given, &what) == INSITU_OK) store_mesh(meshes, mesh, given, &what);
     if (!what.status) return INSITU_OK;
     meshes->are_levels_changed = meshes->are_levels_changed || had_levels;
     session_refuse_mesh(mesh);

@@ -33,7 +33,7 @@ int session_corner_type(int type)
     return is_lagrange(type) ? lagrange_types[type - INSITU_LAGRANGE_TRIANGLE] : GRID_NO_TYPE;
 }
 
-static int64_t complete_count(int corner_type, int64_t p)
+static int64_t count_complete_nodes(int corner_type, int64_t p)
 {
     switch (corner_type) {
     case GRID_TRIANGLE: return (p + 1) * (p + 2) / 2;
@@ -51,7 +51,7 @@ int64_t session_node_count(int type, int order)
     for (int i = 0; i < QUADRATIC_TYPES; i++)
         if (quadratic_types[i].type == type) return order == 0 || order == 2 ? quadratic_types[i].count : 0;
     if (!is_lagrange(type) || order < 1 || order > NODES_MOST_ORDER) return 0;
-    return complete_count(session_corner_type(type), order);
+    return count_complete_nodes(session_corner_type(type), order);
 }
 
 bool session_nodes_of(int type, int64_t count, session_nodes *out)
@@ -60,7 +60,8 @@ bool session_nodes_of(int type, int64_t count, session_nodes *out)
     if (corners == GRID_NO_TYPE) return false;
     for (int order = is_lagrange(type) ? 1 : 2; order <= NODES_MOST_ORDER; order++) {
         if (session_node_count(type, order) != count) continue;
-        *out = (session_nodes){corners, order, (int)count, complete_count(corners, order) == count, is_lagrange(type)};
+        *out = (session_nodes){corners, order, (int)count, count_complete_nodes(corners, order) == count,
+                               is_lagrange(type)};
         return true;
     }
     return false;
@@ -92,37 +93,38 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
 /* ---- VTK's order ----------------------------------------------------------------------------------------------- */
 
 /* Returns the number of a quad's corner; i and j are set if it is at the far end of the axis. */
-static int quad_corner(bool i, bool j)
+static int number_quad_corner(bool i, bool j)
 {
     return i ? (j ? 2 : 1) : (j ? 3 : 0);
 }
 
-static int quad_place(int p, int i, int j)
+static int number_quad_node(int p, int i, int j)
 {
     const int inner = p - 1;
     const bool at_i = i == 0 || i == p, at_j = j == 0 || j == p;
-    if (at_i && at_j) return quad_corner(i, j);
+    if (at_i && at_j) return number_quad_corner(i, j);
     if (at_j) return 4 + i - 1 + (j ? 2 * inner : 0);
     if (at_i) return 4 + j - 1 + (i ? inner : 3 * inner);
     return 4 + 4 * inner + i - 1 + inner * (j - 1);
 }
 
-static int hex_place(int p, bool is_old, int i, int j, int k)
+static int number_hex_node(int p, bool is_old, int i, int j, int k)
 {
     const int r = p - 1;
     const bool at_i = i == 0 || i == p, at_j = j == 0 || j == p, at_k = k == 0 || k == p;
     const int edges = 8, faces = edges + 12 * r, inside = faces + 6 * r * r;
-    if (at_i && at_j && at_k) return quad_corner(i, j) + (k ? 4 : 0);
+    if (at_i && at_j && at_k) return number_quad_corner(i, j) + (k ? 4 : 0);
     if (at_j && at_k) return edges + i - 1 + (j ? 2 * r : 0) + (k ? 4 * r : 0);
     if (at_i && at_k) return edges + j - 1 + (i ? r : 3 * r) + (k ? 4 * r : 0);
-    if (at_i && at_j) return edges + 8 * r + k - 1 + r * (is_old ? (i ? 1 : 0) + (j ? 2 : 0) : quad_corner(i, j));
+    if (at_i && at_j)
+        return edges + 8 * r + k - 1 + r * (is_old ? (i ? 1 : 0) + (j ? 2 : 0) : number_quad_corner(i, j));
     if (at_i) return faces + j - 1 + r * (k - 1) + (i ? r * r : 0);
     if (at_j) return faces + 2 * r * r + i - 1 + r * (k - 1) + (j ? r * r : 0);
     if (at_k) return faces + 4 * r * r + i - 1 + r * (j - 1) + (k ? r * r : 0);
     return inside + i - 1 + r * (j - 1 + r * (k - 1));
 }
 
-static int least(const int *b, int count)
+static int find_least(const int *b, int count)
 {
     int out = b[0];
     for (int n = 1; n < count; n++) out = b[n] < out ? b[n] : out;
@@ -130,10 +132,10 @@ static int least(const int *b, int count)
 }
 
 /* b: the barycentric coordinates times the order; the last one belongs to the first corner. */
-static int triangle_place(int order, const int b[3])
+static int number_triangle_node(int order, const int b[3])
 {
     int at = 0, max = order, min = 0;
-    for (const int inner = least(b, 3); min < inner; min++, max -= 2, order -= 3) at += 3 * order;
+    for (const int inner = find_least(b, 3); min < inner; min++, max -= 2, order -= 3) at += 3 * order;
     for (int n = 0; n < 3; n++, at++)
         if (b[(n + 2) % 3] == max) return at;
     for (int n = 0; n < 3; n++, at += max - min - 1)
@@ -141,13 +143,13 @@ static int triangle_place(int order, const int b[3])
     return at;
 }
 
-static int tet_place(int order, const int b[4])
+static int number_tet_node(int order, const int b[4])
 {
     static const signed char corner[4] = {3, 0, 1, 2}, edge_side[6] = {0, 1, 3, 2, 2, 2};
     static const signed char edge[6][2] = {{1, 2}, {2, 3}, {0, 2}, {0, 1}, {1, 3}, {0, 3}};
     static const signed char face[4] = {1, 3, 0, 2}, face_sides[4][3] = {{0, 2, 3}, {2, 0, 1}, {2, 1, 3}, {1, 0, 3}};
     int at = 0, max = order, min = 0;
-    for (const int inner = least(b, 4); min < inner; min++, max -= 3, order -= 4) at += 2 * (order * order + 1);
+    for (const int inner = find_least(b, 4); min < inner; min++, max -= 3, order -= 4) at += 2 * (order * order + 1);
     for (int n = 0; n < 4; n++, at++)
         if (b[(int)corner[n]] == max) return at;
     for (int n = 0; n < 6; n++, at += max - min - 1)
@@ -156,18 +158,18 @@ static int tet_place(int order, const int b[4])
         if (b[(int)face[n]] != min) continue;
         int on[3];
         for (int a = 0; a < 3; a++) on[a] = b[(int)face_sides[n][a]] - min;
-        return at + triangle_place(order, on) - 3 * order;
+        return at + number_triangle_node(order, on) - 3 * order;
     }
     return at;
 }
 
 /* Numbers the nodes inside a triangle of order p row by row. */
-static int triangle_inside(int p, int i, int j)
+static int number_inner_triangle_node(int p, int i, int j)
 {
     return i + p * (j - 1) - j * (j + 1) / 2;
 }
 
-static int wedge_place(int p, int i, int j, int k)
+static int number_wedge_node(int p, int i, int j, int k)
 {
     const int r = p - 1, triangle = r * (r - 1) / 2, edges = 6, faces = edges + 9 * r;
     const int quads = faces + 2 * triangle, inside = quads + 3 * r * r;
@@ -177,55 +179,55 @@ static int wedge_place(int p, int i, int j, int k)
     if (at_k && at_j) return edges + (k ? 3 * r : 0) + i - 1;
     if (at_k && at_far) return edges + (k ? 3 * r : 0) + r + j - 1;
     if (at_k && at_i) return edges + (k ? 3 * r : 0) + 2 * r + p - j - 1;
-    if (at_k) return faces + (k ? triangle : 0) + triangle_inside(p, i, j);
+    if (at_k) return faces + (k ? triangle : 0) + number_inner_triangle_node(p, i, j);
     if (at_j) return quads + i - 1 + r * (k - 1);
     if (at_far) return quads + r * r + p - i - 1 + r * (k - 1);
     if (at_i) return quads + 2 * r * r + p - j - 1 + r * (k - 1);
-    return inside + triangle_inside(p, i, j) + triangle * (k - 1);
+    return inside + number_inner_triangle_node(p, i, j) + triangle * (k - 1);
 }
 
 /* For orders 1 and 2. */
-static int pyramid_place(int p, int i, int j, int k)
+static int number_pyramid_node(int p, int i, int j, int k)
 {
-    if (p == 1) return k ? 4 : quad_corner(i, j);
+    if (p == 1) return k ? 4 : number_quad_corner(i, j);
     if (k == 2) return 4;
-    if (k == 1) return 9 + quad_corner(i, j);
-    const int on_base = quad_place(p, i, j);
+    if (k == 1) return 9 + number_quad_corner(i, j);
+    const int on_base = number_quad_node(p, i, j);
     return on_base < 4 ? on_base : on_base == 8 ? 13 : on_base + 1;
 }
 
-static int vtk_place(const session_nodes *of, bool is_old, int i, int j, int k)
+static int number_vtk_node(const session_nodes *of, bool is_old, int i, int j, int k)
 {
     const int p = of->order;
     switch (of->type) {
-    case GRID_TRIANGLE: return triangle_place(p, (const int[]){i, j, p - i - j});
-    case GRID_QUAD: return quad_place(p, i, j);
-    case GRID_TET: return tet_place(p, (const int[]){i, j, k, p - i - j - k});
-    case GRID_HEX: return hex_place(p, is_old, i, j, k);
-    case GRID_WEDGE: return wedge_place(p, i, j, k);
-    default: return pyramid_place(p, i, j, k);
+    case GRID_TRIANGLE: return number_triangle_node(p, (const int[]){i, j, p - i - j});
+    case GRID_QUAD: return number_quad_node(p, i, j);
+    case GRID_TET: return number_tet_node(p, (const int[]){i, j, k, p - i - j - k});
+    case GRID_HEX: return number_hex_node(p, is_old, i, j, k);
+    case GRID_WEDGE: return number_wedge_node(p, i, j, k);
+    default: return number_pyramid_node(p, i, j, k);
     }
 }
 
 /* ---- the other orders ------------------------------------------------------------------------------------------ */
 
-static int triangle_row(int p, int i, int j)
+static int number_triangle_row_node(int p, int i, int j)
 {
     return i + j * (p + 1) - j * (j - 1) / 2;
 }
 
-static int lexicographic_place(int type, int p, int i, int j, int k)
+static int number_lexicographic_node(int type, int p, int i, int j, int k)
 {
     const int n = p + 1;
     int below = 0;
     switch (type) {
-    case GRID_TRIANGLE: return triangle_row(p, i, j);
+    case GRID_TRIANGLE: return number_triangle_row_node(p, i, j);
     case GRID_QUAD:
     case GRID_HEX: return i + n * (j + n * k);
-    case GRID_WEDGE: return triangle_row(p, i, j) + k * (n * (n + 1) / 2);
+    case GRID_WEDGE: return number_triangle_row_node(p, i, j) + k * (n * (n + 1) / 2);
     case GRID_TET:
         for (int layer = 0; layer < k; layer++) below += (n - layer) * (n - layer + 1) / 2;
-        return below + triangle_row(p - k, i, j);
+        return below + number_triangle_row_node(p - k, i, j);
     default:
         for (int layer = 0; layer < k; layer++) below += (n - layer) * (n - layer);
         return below + i + (n - k) * j;
@@ -233,7 +235,7 @@ static int lexicographic_place(int type, int p, int i, int j, int k)
 }
 
 /* Returns the permutation of VTK's nodes other than corners, or NULL if it is the identity. */
-static const signed char *quadratic_turn(int type, insitu_vertex_order order)
+static const signed char *quadratic_permutation(int type, insitu_vertex_order order)
 {
     static const signed char gmsh_tet[] = {4, 5, 6, 7, 9, 8};
     static const signed char gmsh_hex[] = {8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26};
@@ -253,13 +255,13 @@ static const signed char *quadratic_turn(int type, insitu_vertex_order order)
 int session_quadratic_place(const session_nodes *of, insitu_vertex_order order, int n)
 {
     const int corners = grid_type_vertices(of->type);
-    const signed char *turn = n < corners || of->order != 2 ? NULL : quadratic_turn(of->type, order);
+    const signed char *turn = n < corners || of->order != 2 ? NULL : quadratic_permutation(of->type, order);
     return turn ? turn[n - corners] : n;
 }
 
 int session_node_place(const session_nodes *of, insitu_vertex_order order, int i, int j, int k)
 {
-    if (order == INSITU_ORDER_LEXICOGRAPHIC) return lexicographic_place(of->type, of->order, i, j, k);
+    if (order == INSITU_ORDER_LEXICOGRAPHIC) return number_lexicographic_node(of->type, of->order, i, j, k);
     const bool is_old = order == INSITU_ORDER_VTK_BEFORE_9_1 && of->is_lagrange;
-    return session_quadratic_place(of, order, vtk_place(of, is_old, i, j, k));
+    return session_quadratic_place(of, order, number_vtk_node(of, is_old, i, j, k));
 }

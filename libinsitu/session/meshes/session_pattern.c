@@ -139,14 +139,14 @@ static const corner_shape shapes[] = {
     {GRID_QUAD, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {-1, -1}}, {{0, 1, 2, 3}, {-1}}},
 };
 
-static int edge_count(const corner_shape *shape)
+static int count_edges(const corner_shape *shape)
 {
     int count = 0;
     while (count < 12 && shape->edges[count][0] >= 0) count++;
     return count;
 }
 
-static int middle_of(const corner_shape *shape, int a, int b)
+static int find_midpoint(const corner_shape *shape, int a, int b)
 {
     for (int e = 0; e < 12; e++)
         if ((shape->edges[e][0] == a && shape->edges[e][1] == b) ||
@@ -160,13 +160,13 @@ static void add_cut(session_pattern *out, const corner_shape *shape, int corner)
 {
     pattern_polygon *cut = &out->polygons[out->polygon_count++];
     *cut = (pattern_polygon){.corner = corner};
-    for (int e = 0; e < edge_count(shape); e++)
+    for (int e = 0; e < count_edges(shape); e++)
         if (shape->edges[e][0] == corner || shape->edges[e][1] == corner)
             cut->nodes[cut->count++] = grid_type_vertices(shape->type) + e;
 }
 
 /* Returns the coordinates of a node in the straight reference cell of edge 2. */
-static void reference_place(const corner_shape *shape, int node, double out[3])
+static void reference_position(const corner_shape *shape, int node, double out[3])
 {
     static const signed char hex[8][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0},
                                           {0, 0, 2}, {2, 0, 2}, {2, 2, 2}, {0, 2, 2}};
@@ -180,17 +180,17 @@ static void reference_place(const corner_shape *shape, int node, double out[3])
 }
 
 /* Orients the polygon counterclockwise as seen from outside the polyhedron that the polygons bound. */
-static void face_outwards(const corner_shape *shape, pattern_polygon *p)
+static void orient_outwards(const corner_shape *shape, pattern_polygon *p)
 {
     double a[3], b[3], c[3], middle[3] = {0, 0, 0}, volume = 0;
     const int corners = grid_type_vertices(shape->type);
     for (int n = 0; n < corners; n++) {
-        reference_place(shape, n, a);
+        reference_position(shape, n, a);
         for (int axis = 0; axis < 3; axis++) middle[axis] += a[axis] / corners;
     }
-    reference_place(shape, p->nodes[0], a);
-    reference_place(shape, p->nodes[1], b);
-    reference_place(shape, p->nodes[2], c);
+    reference_position(shape, p->nodes[0], a);
+    reference_position(shape, p->nodes[1], b);
+    reference_position(shape, p->nodes[2], c);
     for (int axis = 0; axis < 3; axis++) {
         const int next = (axis + 1) % 3, last = (axis + 2) % 3;
         const double normal = (b[next] - a[next]) * (c[last] - a[last]) - (b[last] - a[last]) * (c[next] - a[next]);
@@ -214,20 +214,20 @@ static void find_polygons(session_pattern *out, insitu_vertex_order order)
         pattern_polygon *face = &out->polygons[out->polygon_count++];
         *face = (pattern_polygon){.corner = -1, .count = shape->faces[f][3] < 0 ? 3 : 4};
         for (int n = 0; n < face->count; n++)
-            face->nodes[n] = middle_of(shape, shape->faces[f][n], shape->faces[f][(n + 1) % face->count]);
+            face->nodes[n] = find_midpoint(shape, shape->faces[f][n], shape->faces[f][(n + 1) % face->count]);
     }
     for (int i = 0; i < out->polygon_count; i++) {
         pattern_polygon *p = &out->polygons[i];
-        if (p->count > 2 && shape->type != GRID_QUAD) face_outwards(shape, p);
+        if (p->count > 2 && shape->type != GRID_QUAD) orient_outwards(shape, p);
         for (int n = 0; n < p->count; n++) p->nodes[n] = session_quadratic_place(&out->nodes, order, p->nodes[n]);
     }
-    out->middle_count = edge_count(shape);
+    out->middle_count = count_edges(shape);
     for (int e = 0; e < out->middle_count; e++)
         out->middles[e] = session_quadratic_place(&out->nodes, order, corners + e);
 }
 
 /* Splits a polygon into triangles of the same orientation by the diagonals from the node of the lowest rank. */
-static int fan(const pattern_polygon *p, const int *ranks, int triangles[2][3])
+static int split_into_triangles(const pattern_polygon *p, const int *ranks, int triangles[2][3])
 {
     int first = 0;
     for (int n = 1; n < p->count; n++)
@@ -247,14 +247,14 @@ static bool has_node(const pattern_polygon *p, int node)
     return has;
 }
 
-static int cut_quad(const session_pattern *of, const int *ranks, int places[][4])
+static int split_quad(const session_pattern *of, const int *ranks, int places[][4])
 {
     int count = 0, triangles[2][3];
     for (int i = 0; i < of->polygon_count; i++) {
         const pattern_polygon *p = &of->polygons[i];
         for (int n = 0; n < p->count && p->corner >= 0; n++) places[count][n] = p->nodes[n];
         if (p->corner >= 0) places[count++][2] = p->corner;
-        const int cut = p->corner < 0 ? fan(p, ranks, triangles) : 0;
+        const int cut = p->corner < 0 ? split_into_triangles(p, ranks, triangles) : 0;
         for (int t = 0; t < cut; t++) memcpy(places[count++], triangles[t], sizeof triangles[t]);
     }
     return count;
@@ -263,12 +263,12 @@ static int cut_quad(const session_pattern *of, const int *ranks, int places[][4]
 int session_cut(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4])
 {
     int count = 0, apex = pattern->middles[0], triangles[2][3];
-    if (pattern->nodes.type == GRID_QUAD) return cut_quad(pattern, ranks, places);
+    if (pattern->nodes.type == GRID_QUAD) return split_quad(pattern, ranks, places);
     for (int n = 1; n < pattern->middle_count; n++)
         if (ranks[pattern->middles[n]] < ranks[apex]) apex = pattern->middles[n];
     for (int i = 0; i < pattern->polygon_count; i++) {
         const pattern_polygon *p = &pattern->polygons[i];
-        const int cut = fan(p, ranks, triangles);
+        const int cut = split_into_triangles(p, ranks, triangles);
         for (int t = 0; t < cut; t++) {
             const int *of = triangles[t];
             if (p->corner >= 0) memcpy(places[count++], (const int[]){of[0], of[1], of[2], p->corner}, 4 * sizeof *of);

@@ -46,7 +46,7 @@ static void add_face(const grid *g, int64_t face, frame_sums *sums, double least
     }
 }
 
-static cell_frame frame_of(const grid *g, int64_t cell)
+static cell_frame find_cell_frame(const grid *g, int64_t cell)
 {
     cell_frame frame = {.least = {INFINITY, INFINITY, INFINITY}, .box = 1};
     frame_sums sums = {.lower = {INFINITY, INFINITY, INFINITY}, .upper = {-INFINITY, -INFINITY, -INFINITY}};
@@ -68,14 +68,14 @@ static double tet_volume(const double *a, const double *b, const double *c)
            6;
 }
 
-static void corner_from(const grid *g, int64_t entry, const double mean[3], double out[3])
+static void read_relative_corner(const grid *g, int64_t entry, const double mean[3], double out[3])
 {
     grid_vertex(g, grid_array_index(&g->face_connectivity, entry), out);
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
 /* Returns the volume of the tet between a triangle and a corner of the cell, all relative to the mean. */
-static double volume_from(const double origin[3], double corners[3][3])
+static double tet_volume_from_origin(const double origin[3], double corners[3][3])
 {
     double d[3][3];
     for (int i = 0; i < 3; i++)
@@ -113,12 +113,12 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     double corners[3][3];
     grid_face_vertices(g, face, &from, &to);
     const int64_t least = least_entry(g, from, to), count = to - from;
-    corner_from(g, least, mean, corners[0]);
-    corner_from(g, from + (least - from + 1) % count, mean, corners[1]);
+    read_relative_corner(g, least, mean, corners[0]);
+    read_relative_corner(g, from + (least - from + 1) % count, mean, corners[1]);
     for (int64_t k = 2; k < count; k++, sums->triangles++) {
-        corner_from(g, from + (least - from + k) % count, mean, corners[2]);
+        read_relative_corner(g, from + (least - from + k) % count, mean, corners[2]);
         sums->from_mean += tet_volume(corners[0], corners[1], corners[2]);
-        sums->from_corner += volume_from(origin, corners);
+        sums->from_corner += tet_volume_from_origin(origin, corners);
         memcpy(corners[1], corners[2], sizeof corners[2]);
     }
 }
@@ -136,7 +136,7 @@ double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)
     int64_t first, end;
     double origin[3];
     volume_sums sums = {0};
-    const cell_frame frame = frame_of(g, cell);
+    const cell_frame frame = find_cell_frame(g, cell);
     for (int axis = 0; axis < 3; axis++) origin[axis] = frame.least[axis] - frame.mean[axis];
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) add_fan(g, grid_array_index(&g->connectivity, i), frame.mean, origin, &sums);

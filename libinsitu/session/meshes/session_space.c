@@ -71,7 +71,7 @@ int session_flat_axis(const session_extent *extent)
 
 /* Returns whether the space can be kept: the bounds' centre is inside the old bounds, and the size is at most 4 times
  * and at least 1/8 of the old one. */
-static bool still_fits(const session_space *space)
+static bool is_space_valid(const session_space *space)
 {
     if (!space->has_origin) return false;
     const double old_half = half_diagonal(space->lower, space->upper);
@@ -106,7 +106,7 @@ insitu_status session_update_space(session_space *space, session_meshes *meshes,
     extent.half_diagonal = half_diagonal(extent.lower, extent.upper);
     space->extent = extent;
     space->has_extent = true;
-    if (!still_fits(space)) {
+    if (!is_space_valid(space)) {
         choose_origin(space);
         for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) session_drop_tree(walk.part);
     }

@@ -48,19 +48,19 @@ int64_t session_entry_place(const insitu_mesh *given, int64_t entry)
     return !row || given->offsets.data || row == used ? entry : entry / used * row + entry % used;
 }
 
-static int64_t first_of(const split_work *w, int64_t cell)
+static int64_t first_cell_entry(const split_work *w, int64_t cell)
 {
     return w->given.offsets.data ? grid_array_index(&w->given.offsets, cell) : cell * w->row;
 }
 
-static int64_t size_of(const split_work *w, int64_t cell)
+static int64_t count_cell_entries(const split_work *w, int64_t cell)
 {
     if (!w->given.offsets.data) return w->nodes;
     return (int64_t)((uint64_t)grid_offset_end(&w->given.offsets, cell) -
                      (uint64_t)grid_array_index(&w->given.offsets, cell));
 }
 
-static int64_t vertex_of(const split_work *w, int64_t entry)
+static int64_t read_vertex(const split_work *w, int64_t entry)
 {
     return w->given.connectivity.data ? grid_array_index(&w->given.connectivity, entry) : entry;
 }
@@ -72,9 +72,9 @@ static const session_pattern *find_pattern(const split_work *w, int type, int64_
     return NULL;
 }
 
-static const session_pattern *pattern_of(const split_work *w, int64_t cell)
+static const session_pattern *find_cell_pattern(const split_work *w, int64_t cell)
 {
-    return find_pattern(w, grid_cell_type(&w->given, cell), size_of(w, cell));
+    return find_pattern(w, grid_cell_type(&w->given, cell), count_cell_entries(w, cell));
 }
 
 /* ---- patterns and checks ---------------------------------------------------------------------------------------- */
@@ -119,7 +119,8 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
 static insitu_status check_offsets(const split_work *w, int64_t cell, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
-    const long long base = given->index_base, first = first_of(w, cell) + base, next = first + size_of(w, cell);
+    const long long base = given->index_base, first = first_cell_entry(w, cell) + base,
+                    next = first + count_cell_entries(w, cell);
     const long long last = given->connectivity_count + base;
     if (!w->given.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH,
@@ -147,7 +148,7 @@ static insitu_status find_patterns(split_work *w, base_error *error)
     for (int64_t cell = 0; cell < cells; cell++) {
         if (check_offsets(w, cell, error)) return error->status;
         const int type = grid_cell_type(&w->given, cell);
-        const int64_t size = size_of(w, cell);
+        const int64_t size = count_cell_entries(w, cell);
         if (type == last_type && size == last_size) continue;
         if (!find_pattern(w, type, size) && add_pattern(w, cell, type, size, error)) return error->status;
         last_type = type;
@@ -167,12 +168,12 @@ static insitu_status find_patterns(split_work *w, base_error *error)
 static insitu_status describe_index(const split_work *w, int64_t cell, base_error *error)
 {
     const long long base = w->mesh->given.index_base, last = w->mesh->given.vertex_count - 1 + base;
-    const int64_t first = first_of(w, cell);
+    const int64_t first = first_cell_entry(w, cell);
     int64_t n = 0;
-    while (vertex_of(w, first + n) >= 0 && vertex_of(w, first + n) < w->mesh->given.vertex_count) n++;
+    while (read_vertex(w, first + n) >= 0 && read_vertex(w, first + n) < w->mesh->given.vertex_count) n++;
     return base_fail(error, INSITU_ERROR_MESH,
                      "mesh \"%s\": cell %lld: index %lld of its node %lld is outside %lld..%lld (index_base is %lld)",
-                     w->mesh->label, (long long)cell, (long long)vertex_of(w, first + n) + base, (long long)n, base,
+                     w->mesh->label, (long long)cell, (long long)read_vertex(w, first + n) + base, (long long)n, base,
                      last, base);
 }
 
@@ -185,9 +186,9 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
         region_enter();
 #pragma omp for schedule(static) reduction(min : bad) nowait
         for (int64_t cell = 0; cell < cells; cell++) {
-            const int64_t first = first_of(w, cell), size = size_of(w, cell);
+            const int64_t first = first_cell_entry(w, cell), size = count_cell_entries(w, cell);
             for (int64_t n = 0; n < size && cell < bad; n++) {
-                const int64_t vertex = vertex_of(w, first + n);
+                const int64_t vertex = read_vertex(w, first + n);
                 if (vertex < 0 || vertex >= vertices) bad = cell;
             }
         }
@@ -206,12 +207,12 @@ static bool comes_before(const double a[3], const double b[3])
 }
 
 /* Stores the rank of each midpoint of a serendipity cell in the order of coordinates; equal points have equal ranks. */
-static void rank_middles(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
+static void rank_midpoints(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
 {
     double at[12][3];
     for (int n = 0; n < of->middle_count; n++)
         for (int axis = 0; axis < 3; axis++) {
-            const int64_t vertex = vertex_of(w, first + of->middles[n]);
+            const int64_t vertex = read_vertex(w, first + of->middles[n]);
             at[n][axis] = grid_array_number(&w->given.coordinates[axis], vertex);
         }
     for (int n = 0; n < of->middle_count; n++) {
@@ -224,13 +225,13 @@ static void rank_middles(const split_work *w, const session_pattern *of, int64_t
 static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int places[PATTERN_MOST_LOOSE][4])
 {
     int ranks[27] = {0};
-    rank_middles(w, of, first_of(w, cell), ranks);
+    rank_midpoints(w, of, first_cell_entry(w, cell), ranks);
     return session_cut(of, ranks, places);
 }
 
 static void count_pieces(const split_work *w, int64_t cell)
 {
-    const session_pattern *of = pattern_of(w, cell);
+    const session_pattern *of = find_cell_pattern(w, cell);
     int loose[PATTERN_MOST_LOOSE][4];
     const int cut = of->polygon_count ? cut_cell(w, of, cell, loose) : 0;
     w->firsts[cell + 1] = of->polygon_count ? cut : of->piece_count;
@@ -238,12 +239,12 @@ static void count_pieces(const split_work *w, int64_t cell)
         w->entries[cell + 1] = of->polygon_count ? cut * (of->nodes.type == GRID_QUAD ? 3 : 4) : of->piece_size;
 }
 
-static void add_up(int64_t *counts, int64_t cells)
+static void accumulate_counts(int64_t *counts, int64_t cells)
 {
     for (int64_t cell = 0; cells && cell < cells; cell++) counts[cell + 1] += counts[cell];
 }
 
-static insitu_status count_all(split_work *w, int threads, base_error *error)
+static insitu_status count_all_pieces(split_work *w, int threads, base_error *error)
 {
     const int64_t cells = w->mesh->given.cell_count, most = 4294967294;
     const size_t bytes = (size_t)(cells + 1) * sizeof *w->firsts;
@@ -259,8 +260,8 @@ static insitu_status count_all(split_work *w, int threads, base_error *error)
         for (int64_t cell = 0; cell < cells; cell++) count_pieces(w, cell);
         region_leave();
     }
-    add_up(w->firsts, cells);
-    if (w->entries) add_up(w->entries, cells);
+    accumulate_counts(w->firsts, cells);
+    if (w->entries) accumulate_counts(w->entries, cells);
     if (w->firsts[cells] <= most) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": its cells have %lld pieces, at most %lld are supported",
                      w->mesh->label, (long long)w->firsts[cells], (long long)most);
@@ -273,33 +274,33 @@ static int64_t entry_count(const split_work *w)
 }
 
 /* Stores the corner at the given position of the cell's row, as its entry or as its vertex. */
-static void put_place(const split_work *w, int64_t cell, int64_t at, int place)
+static void store_corner(const split_work *w, int64_t cell, int64_t at, int place)
 {
-    const int64_t first = first_of(w, cell);
+    const int64_t first = first_cell_entry(w, cell);
     const int64_t corner = w->given.offsets.data ? first + place : cell * w->nodes + place;
-    session_put_index(&w->out, at, w->gives_entries ? corner : vertex_of(w, first + place));
+    session_put_index(&w->out, at, w->gives_entries ? corner : read_vertex(w, first + place));
 }
 
-static void put_cell(const split_work *w, int64_t cell)
+static void store_cell(const split_work *w, int64_t cell)
 {
-    const session_pattern *of = pattern_of(w, cell);
+    const session_pattern *of = find_cell_pattern(w, cell);
     int64_t at = w->entries ? w->entries[cell] : w->firsts[cell] * grid_type_vertices(w->only_type);
-    for (int n = 0; n < of->piece_size; n++) put_place(w, cell, at++, of->places[n]);
+    for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->places[n]);
     if (!of->polygon_count) return;
     int loose[PATTERN_MOST_LOOSE][4];
     const int size = of->nodes.type == GRID_QUAD ? 3 : 4, count = cut_cell(w, of, cell, loose);
     for (int i = 0; i < count; i++)
-        for (int n = 0; n < size; n++) put_place(w, cell, at++, loose[i][n]);
+        for (int n = 0; n < size; n++) store_corner(w, cell, at++, loose[i][n]);
 }
 
-static void put_cells(const split_work *w, int threads)
+static void store_cells(const split_work *w, int threads)
 {
     const int64_t cells = w->mesh->given.cell_count;
 #pragma omp parallel num_threads(session_region_threads(threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t cell = 0; cell < cells; cell++) put_cell(w, cell);
+        for (int64_t cell = 0; cell < cells; cell++) store_cell(w, cell);
         region_leave();
     }
 }
@@ -307,11 +308,11 @@ static void put_cells(const split_work *w, int threads)
 /* ---- the topology ---------------------------------------------------------------------------------------------- */
 
 /* Stores for each piece the number and the ghost flag of its cell, and its type and offset. */
-static void put_parents(const split_work *w, session_topology *t)
+static void store_parents(const split_work *w, session_topology *t)
 {
     const insitu_mesh *given = &w->mesh->given;
     for (int64_t cell = 0; cell < given->cell_count; cell++) {
-        const session_pattern *of = pattern_of(w, cell);
+        const session_pattern *of = find_cell_pattern(w, cell);
         int64_t at = w->entries ? w->entries[cell] : 0;
         for (int64_t i = w->firsts[cell]; i < w->firsts[cell + 1]; i++) {
             const int loose = of->nodes.type == GRID_QUAD ? GRID_TRIANGLE : GRID_TET;
@@ -346,16 +347,16 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     if (!t->parents || (w->entries && !t->cell_types) || (mesh->given.ghosts.data && !t->ghosts))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld pieces of cells", mesh->label,
                          (long long)pieces);
-    put_parents(w, t);
+    store_parents(w, t);
     w->out = t->connectivity;
-    put_cells(w, threads);
+    store_cells(w, threads);
     t->cell_bytes = (entries + 1) * t->connectivity.stride + pieces * (int64_t)sizeof *t->parents;
     if (w->entries) t->cell_bytes += (pieces + 1) * t->offsets.stride + pieces;
     if (t->ghosts) t->cell_bytes += pieces;
     return INSITU_OK;
 }
 
-static split_work begin(const session_mesh *mesh)
+static split_work begin_split(const session_mesh *mesh)
 {
     const insitu_mesh *given = &mesh->given;
     const grid g = session_given_grid(given);
@@ -364,7 +365,7 @@ static split_work begin(const session_mesh *mesh)
         .mesh = mesh, .given = g, .nodes = nodes, .row = given->connectivity_row ? given->connectivity_row : nodes};
 }
 
-static void end(split_work *w)
+static void end_split(split_work *w)
 {
     for (int i = 0; i < w->pattern_count; i++) session_drop_pattern(&w->patterns[i]);
     base_free(w->firsts);
@@ -373,28 +374,28 @@ static void end(split_work *w)
 
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error)
 {
-    split_work w = begin(mesh);
+    split_work w = begin_split(mesh);
     insitu_status status = find_patterns(&w, error);
     if (!status) status = check_indices(&w, threads, error);
-    if (!status) status = count_all(&w, threads, error);
+    if (!status) status = count_all_pieces(&w, threads, error);
     if (!status) status = make_topology(&w, mesh, threads, error);
-    end(&w);
+    end_split(&w);
     return status;
 }
 
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
 {
-    split_work w = begin(mesh);
+    split_work w = begin_split(mesh);
     insitu_status status = find_patterns(&w, error);
     const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
     const int64_t largest = w.given.offsets.data ? mesh->given.connectivity_count : cells * nodes;
     w.gives_entries = true;
-    if (!status) status = count_all(&w, threads, error);
+    if (!status) status = count_all_pieces(&w, threads, error);
     if (!status && !session_make_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
         status = error->status;
     w.out = *out;
-    if (!status) put_cells(&w, threads);
-    end(&w);
+    if (!status) store_cells(&w, threads);
+    end_split(&w);
     return status;
 }
 

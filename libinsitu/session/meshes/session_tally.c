@@ -62,7 +62,7 @@ double tally_signed_volume(int type, double points[][3])
  * division's rounding, the box's own rounding and squares of u. */
 static const double flat_share = 0x1p-46;
 
-MMBVH_INLINE bool is_flat(double volume, double box)
+MMBVH_INLINE bool is_flat_volume(double volume, double box)
 {
     return fabs(volume) <= flat_share * box;
 }
@@ -88,7 +88,7 @@ static bool is_flat_everywhere(int type, double points[][3])
     const cell_corners of = corners_of(type);
     double sum = 0;
     for (int i = 0; i < of.count; i++) sum += fabs(corner_volume(points, of.corners[i]));
-    return is_flat(sum / of.shares, box_volume(points, grid_type_vertices(type)));
+    return is_flat_volume(sum / of.shares, box_volume(points, grid_type_vertices(type)));
 }
 
 /* Computes the cube root of the volume in the same way as the vectorized code (session_lane_loops.c). The math
@@ -170,7 +170,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 static const double least_share = 1e-6;
 
 /* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
-static void quad_corners(double points[][3], double out[4])
+static void quad_corner_areas(double points[][3], double out[4])
 {
     double normals[4][3];
     for (int i = 0; i < 4; i++) {
@@ -194,7 +194,7 @@ bool tally_has_both_signs(int type, double points[][3])
     const cell_corners of = corners_of(is_quad ? GRID_TET : type);
     double volumes[8], largest = 0;
     const int count = is_quad ? 4 : of.count;
-    if (is_quad) quad_corners(points, volumes);
+    if (is_quad) quad_corner_areas(points, volumes);
     for (int i = 0; i < count && !is_quad; i++) volumes[i] = corner_volume(points, of.corners[i]);
     for (int i = 0; i < count; i++) largest = fmax(largest, fabs(volumes[i]));
     bool has[2] = {false, false};
@@ -222,7 +222,7 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
 
 /* Reads the vertices' positions; returns false if an index is out of range or, for a drawn cell, a coordinate is not
  * finite. */
-MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_ghost, double points[][3],
+MMBVH_INLINE bool read_points(const grid *g, int64_t first, int count, bool is_ghost, double points[][3],
                               const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
     double poison = 0;
@@ -239,8 +239,8 @@ MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_g
 }
 
 /* Adds one cell to the sums. Returns false if the cell is bad. */
-MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, double *least,
-                           const fetch_shape shape, const bool wide_index, const bool wide_number)
+MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, double *least,
+                                 const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
     const grid *g = &mesh->cells;
     const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
@@ -248,7 +248,7 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
     if (count == 0 || (shape == FETCH_BY_CELL && !offsets_are_good(mesh, cell, count))) return false;
     const bool is_ghost = grid_is_ghost(g, cell);
     double points[GRID_MAX_CELL_VERTICES][3];
-    if (!take_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, shape, wide_index, wide_number))
+    if (!read_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, shape, wide_index, wide_number))
         return false;
     t->ghosts += is_ghost;
     if (is_ghost) return true;
@@ -265,7 +265,7 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
 
 /* Returns the longest run of cells, beginning with this one, that have its type and contiguous vertices. They can be
  * processed by vectorized code. */
-MMBVH_INLINE lane_cells alike_from(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
+MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
     const grid *g = &mesh->cells;
     const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
@@ -289,7 +289,7 @@ typedef struct lattice_row {
 /* Returns the run of cells of a lattice that begins with this one and stays in one row, and writes their connectivity
  * into the buffer. A cell that is not drawn is a run of length 1, as is each cell of a lattice whose cells are not
  * consecutive along an axis. */
-static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
+static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
 {
     const grid *g = &mesh->cells;
     const grid_lattice *l = g->lattice;
@@ -315,7 +315,7 @@ static lane_cells row_from(const session_mesh *mesh, int64_t cell, int64_t end, 
 
 /* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone is set to the
  * number of following cells that must be added one by one. */
-static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
+static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
     if (alike->count < LANES || alike->g->lattice) return 0; /* there is only one cell in the run */
@@ -334,7 +334,7 @@ static int64_t run_lanes(const lane_cells *alike, mesh_tally *t, double *least, 
 /* Adds the cells of a run a second time, each with its own bounding box. This is needed only if the least volume may be
  * flat compared to the box of all of them. Computing all boxes would take a thirtieth of the time for a mesh of
  * tets. */
-static mesh_tally tally_again(const grid *g, int64_t begin, int64_t end)
+static mesh_tally tally_run_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
     for (int64_t cell = begin; cell < end; cell++) tally_cell(g, cell, &again);
@@ -345,7 +345,7 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 {
     double box = 1;
     for (int axis = 0; axis < 3; axis++) box *= t->upper[axis] - t->lower[axis];
-    return is_flat(least, box);
+    return is_flat_volume(least, box);
 }
 
 /* The lengths of the drawn cells along one axis. */
@@ -355,7 +355,7 @@ typedef struct axis_lengths {
     double lower, upper;
 } axis_lengths;
 
-static axis_lengths lengths_along(const grid_lattice *l, int axis)
+static axis_lengths measure_axis(const grid_lattice *l, int axis)
 {
     const double *at = l->axes[axis].places + l->drawn_first[axis];
     const int64_t count = l->drawn_end[axis] - l->drawn_first[axis];
@@ -381,7 +381,7 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     t.drawn = 1;
     t.sizes = 1;
     for (int axis = 0; axis < 3; axis++) {
-        const axis_lengths along = lengths_along(g->lattice, axis);
+        const axis_lengths along = measure_axis(g->lattice, axis);
         t.drawn *= g->lattice->drawn_end[axis] - g->lattice->drawn_first[axis];
         sized *= along.positive + along.negative;
         difference *= along.positive - along.negative;
@@ -399,7 +399,7 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
 }
 
 /* Adds some cells of a uniform or rectilinear lattice to the sums. These cells are boxes, or are flat. */
-static int64_t run_axes(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
+static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;
     mesh_tally t = tally_empty();
@@ -440,16 +440,17 @@ MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, m
     while (cell < end && is_good) {
         int64_t alone;
         if (!alike.count)
-            alike = shape == FETCH_LATTICE ? row_from(mesh, cell, end, &row) : alike_from(mesh, cell, end, shape);
-        const int64_t taken = run_lanes(&alike, &t, &least, &alone), first = cell + taken;
+            alike =
+                shape == FETCH_LATTICE ? find_row_run(mesh, cell, end, &row) : find_uniform_run(mesh, cell, end, shape);
+        const int64_t taken = tally_lanes(&alike, &t, &least, &alone), first = cell + taken;
         cell = first;
         while (cell < first + alone && is_good)
-            if ((is_good = run_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
+            if ((is_good = tally_one_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
         alike.first += taken + alone;
         alike.entry += (taken + alone) * grid_type_vertices(alike.type);
         alike.count -= taken + alone;
     }
-    if (may_be_flat(&t, least)) t = tally_again(&mesh->cells, begin, cell);
+    if (may_be_flat(&t, least)) t = tally_run_again(&mesh->cells, begin, cell);
     tally_merge(tally, &t);
     return cell;
 }
@@ -465,7 +466,7 @@ tally_run tally_choose(const session_mesh *mesh)
 {
     static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run);
     const grid *g = &mesh->cells;
-    if (g->coordinates[0].axis) return run_axes;
+    if (g->coordinates[0].axis) return tally_lattice_cells;
     if (!fetch_is_plain(g) || (!g->cell_types && grid_is_shell_type(g->cell_type))) return NULL;
     return table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
 }

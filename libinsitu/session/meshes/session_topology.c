@@ -120,7 +120,7 @@ static insitu_status check_row(const session_mesh *mesh, int64_t face, const ses
 }
 
 /* Returns the total number of vertices of all faces, or -1 if a list is invalid. */
-static int64_t count_listed(const session_mesh *mesh, base_error *error)
+static int64_t count_listed_vertices(const session_mesh *mesh, base_error *error)
 {
     int64_t total = 0;
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
@@ -135,11 +135,11 @@ static int64_t count_listed(const session_mesh *mesh, base_error *error)
     return total;
 }
 
-static insitu_status copy_lists(session_mesh *mesh, base_error *error)
+static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
-    const int64_t total = count_listed(mesh, error), count = session_face_count(given);
+    const int64_t total = count_listed_vertices(mesh, error), count = session_face_count(given);
     const long long base = given->index_base;
     int64_t at = 0;
     t->has_own_faces = true;
@@ -228,7 +228,7 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
 
 /* Converts counts into offsets, then stores each face at the offsets of its cells. This advances each offset to the
  * begin of the next cell; the last loop shifts the offsets back. */
-static void put_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
+static void store_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
     for (int64_t c = 0; c < count; c++)
@@ -260,7 +260,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     int64_t total = 0;
     for (int64_t c = 0; c < given->cell_count; c++) total += grid_array_index(&t->offsets, c + 1);
     if (!session_make_indices(mesh, "cells' faces", total, faces, &t->connectivity, error)) return error->status;
-    put_faces(mesh, &sides, t);
+    store_faces(mesh, &sides, t);
     t->connectivity_count = total;
     t->cell_bytes = (given->cell_count + 1) * t->offsets.stride + (total + 1) * t->connectivity.stride;
     return INSITU_OK;
@@ -276,7 +276,7 @@ typedef struct face_ring {
 } face_ring;
 
 /* Reads a face's vertices. Returns false if the face does not exist, or does not have 3 or 4 vertices. */
-static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
+static bool read_face_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
 {
     const grid *g = &mesh->cells;
     int64_t from, to;
@@ -294,7 +294,7 @@ static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
 
 /* Finds an unused face that contains the edge between `ends`, and stores the two vertices next to the edge on that
  * face. Returns its index, or -1 if there is none. */
-static int find_side(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
+static int find_side_face(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {
         const int n = rings[f].count;
@@ -311,7 +311,7 @@ static int find_side(const face_ring *rings, int count, unsigned used, const int
 }
 
 /* Returns whether the face is the loop of the top vertices, beginning at any of them and in either direction. */
-static bool goes_around(const face_ring *ring, const int64_t *top, int n)
+static bool is_loop_of(const face_ring *ring, const int64_t *top, int n)
 {
     if (ring->count != n) return false;
     for (int begin = 0; begin < n; begin++)
@@ -333,7 +333,8 @@ static bool are_distinct(const int64_t *vertices, int count)
 
 /* Constructs the cell on the given base, with sides of side_size vertices, in VTK's order except for its handedness.
  * Returns false if the faces do not form such a cell. */
-static bool erect(const face_ring *rings, int count, int base, int side_size, int64_t vertices[GRID_MAX_CELL_VERTICES])
+static bool build_on_base(const face_ring *rings, int count, int base, int side_size,
+                          int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int n = rings[base].count, tops = side_size == 3 ? 1 : n;
     unsigned used = 1u << base;
@@ -341,7 +342,7 @@ static bool erect(const face_ring *rings, int count, int base, int side_size, in
     for (int i = 0; i < n; i++) {
         const int64_t ends[2] = {rings[base].vertex[i], rings[base].vertex[(i + 1) % n]};
         int64_t above[2];
-        const int side = find_side(rings, count, used, ends, above);
+        const int side = find_side_face(rings, count, used, ends, above);
         if (side < 0 || rings[side].count != side_size) return false;
         used |= 1u << side;
         if (i == 0) top[0] = above[0];
@@ -354,7 +355,7 @@ static bool erect(const face_ring *rings, int count, int base, int side_size, in
     if (!are_distinct(vertices, n + tops)) return false;
     int left = 0;
     while (left < count - 1 && used >> left & 1) left++;
-    return side_size == 3 || goes_around(&rings[left], top, n);
+    return side_size == 3 || is_loop_of(&rings[left], top, n);
 }
 
 static void swap_vertices(int64_t *vertices, int i, int j)
@@ -378,7 +379,7 @@ static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 
 /* Returns the type of cell that a polyhedron's faces form, with its vertices in that type's order. Returns
  * GRID_POLYHEDRON if they form none of these types. */
-static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
+static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     static const struct {
         int type, triangles, quads, base, side;
@@ -390,13 +391,13 @@ static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GR
     grid_cell_faces(g, cell, &first, &end);
     const int count = end - first <= MOST_FACES ? (int)(end - first) : 0;
     for (int i = 0; i < count; i++) {
-        if (!read_ring(mesh, grid_array_index(&g->connectivity, first + i), &rings[i])) return GRID_POLYHEDRON;
+        if (!read_face_ring(mesh, grid_array_index(&g->connectivity, first + i), &rings[i])) return GRID_POLYHEDRON;
         triangles += rings[i].count == 3;
     }
     for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++) {
         if (count != shapes[s].triangles + shapes[s].quads || triangles != shapes[s].triangles) continue;
         while (rings[base].count != shapes[s].base) base++;
-        if (!erect(rings, count, base, shapes[s].side, vertices)) return GRID_POLYHEDRON;
+        if (!build_on_base(rings, count, base, shapes[s].side, vertices)) return GRID_POLYHEDRON;
         make_right_handed(g, shapes[s].type, shapes[s].base, vertices);
         return shapes[s].type;
     }
@@ -439,7 +440,7 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
         r->is_faulty = true;
         return;
     }
-    const int now = type == GRID_POLYHEDRON ? recognise(mesh, cell, vertices) : type;
+    const int now = type == GRID_POLYHEDRON ? recognise_polyhedron(mesh, cell, vertices) : type;
     grid_cell_faces(&mesh->cells, cell, &first, &end);
     r->types[cell] = (unsigned char)now;
     r->polyhedra += type == GRID_POLYHEDRON;
@@ -470,14 +471,14 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
 }
 
 /* Returns the type that all cells have, or 0 if types differ. */
-static int only_type(const recognition *r, int64_t count)
+static int find_common_type(const recognition *r, int64_t count)
 {
     int type = TYPES - 1;
     while (type > 0 && r->of_type[type] != count) type--;
     return type;
 }
 
-static void put_cell(const session_mesh *mesh, int64_t cell, int type, int64_t at, const grid_array *out)
+static void store_cell(const session_mesh *mesh, int64_t cell, int type, int64_t at, const grid_array *out)
 {
     const grid *g = &mesh->cells;
     int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
@@ -486,11 +487,11 @@ static void put_cell(const session_mesh *mesh, int64_t cell, int type, int64_t a
         for (int64_t i = first; i < end; i++) session_put_index(out, at++, grid_array_index(&g->connectivity, i));
         return;
     }
-    recognise(mesh, cell, vertices);
+    recognise_polyhedron(mesh, cell, vertices);
     for (int i = 0; i < grid_type_vertices(type); i++) session_put_index(out, at++, vertices[i]);
 }
 
-static void put_offsets(const session_mesh *mesh, const recognition *r, const grid_array *out)
+static void store_offsets(const session_mesh *mesh, const recognition *r, const grid_array *out)
 {
     int64_t at = 0;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) {
@@ -507,7 +508,7 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
 {
     session_topology *t = &mesh->topology;
     const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
-    const int type = only_type(r, count), size = grid_type_vertices(type);
+    const int type = find_common_type(r, count), size = grid_type_vertices(type);
     grid_array offsets = {0}, connectivity;
     if (!session_make_indices(mesh, "recognised cells", r->entries, vertices > faces ? vertices : faces, &connectivity,
                               error))
@@ -516,13 +517,14 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
         session_drop_array(&connectivity);
         return error->status;
     }
-    if (!type) put_offsets(mesh, r, &offsets);
+    if (!type) store_offsets(mesh, r, &offsets);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t cell = 0; cell < count; cell++)
-            put_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell), &connectivity);
+            store_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell),
+                       &connectivity);
         region_leave();
     }
     session_drop_array(&t->offsets);
@@ -573,7 +575,7 @@ static bool may_have_polyhedra(const grid *g)
 }
 
 /* Copies of cells' values have one for each piece. */
-static void forget_pieces(session_mesh *mesh)
+static void mark_value_copies_stale(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++)
         if (mesh->fields[i].given.centring == INSITU_CELL) session_drop_copy(&mesh->fields[i]);
@@ -582,11 +584,11 @@ static void forget_pieces(session_mesh *mesh)
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error)
 {
     insitu_status status = INSITU_OK;
-    if (mesh->topology.is_split) forget_pieces(mesh);
+    if (mesh->topology.is_split) mark_value_copies_stale(mesh);
     session_drop_topology(&mesh->topology);
     session_read_topology(mesh);
     if ((mesh->given.face_lists.data && mesh->given.face_sizes.data) || mesh->given.boundary_face_count)
-        status = copy_lists(mesh, error);
+        status = copy_face_lists(mesh, error);
     if (!status && session_has_owners(&mesh->given)) status = list_faces(mesh, error);
     if (!status && session_has_higher_order(&mesh->given))
         status = session_split_cells(mesh, threads, error);
@@ -598,6 +600,6 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
     if (status) session_drop_topology(&mesh->topology);
     session_read_topology(mesh);
     mesh->topology.is_made = !status;
-    if (mesh->topology.is_split) forget_pieces(mesh);
+    if (mesh->topology.is_split) mark_value_copies_stale(mesh);
     return status;
 }
