@@ -5,33 +5,33 @@
 
 #include "memory.h"
 
-static int64_t bin_along(const session_bins *b, double place, int axis)
+static int64_t bin_index_along(const session_bins *b, double place, int axis)
 {
     const double at = (place - b->lower[axis]) * b->per_place;
     return at < 0 ? 0 : at >= (double)b->counts[axis] ? b->counts[axis] - 1 : (int64_t)at;
 }
 
-static int64_t bin_of(const session_bins *b, const double place[3])
+static int64_t bin_index(const session_bins *b, const double place[3])
 {
-    return bin_along(b, place[0], 0) +
-           b->counts[0] * (bin_along(b, place[1], 1) + b->counts[1] * bin_along(b, place[2], 2));
+    return bin_index_along(b, place[0], 0) +
+           b->counts[0] * (bin_index_along(b, place[1], 1) + b->counts[1] * bin_index_along(b, place[2], 2));
 }
 
-static const double *place_of(const double *places, int64_t stride, int64_t i)
+static const double *position_at(const double *places, int64_t stride, int64_t i)
 {
     return (const double *)(const void *)((const char *)places + i * stride);
 }
 
 /* Computes the size of the bins and their number along each axis. Returns the total number of bins. */
-static int64_t size_bins(session_bins *b, const double *places, int64_t stride, int64_t count)
+static int64_t choose_bin_size(session_bins *b, const double *places, int64_t stride, int64_t count)
 {
     double upper[3], widest = 0;
     for (int axis = 0; axis < 3; axis++) {
         b->lower[axis] = (double)INFINITY;
         upper[axis] = -(double)INFINITY;
         for (int64_t i = 0; i < count; i++) {
-            b->lower[axis] = fmin(b->lower[axis], place_of(places, stride, i)[axis]);
-            upper[axis] = fmax(upper[axis], place_of(places, stride, i)[axis]);
+            b->lower[axis] = fmin(b->lower[axis], position_at(places, stride, i)[axis]);
+            upper[axis] = fmax(upper[axis], position_at(places, stride, i)[axis]);
         }
         widest = fmax(widest, upper[axis] - b->lower[axis]);
     }
@@ -47,13 +47,13 @@ static int64_t size_bins(session_bins *b, const double *places, int64_t stride, 
 
 bool session_bins_create(session_bins *b, const double *places, int64_t stride, int64_t count)
 {
-    const int64_t bins = size_bins(b, places, stride, count);
+    const int64_t bins = choose_bin_size(b, places, stride, count);
     b->starts = base_calloc((size_t)bins + 2, sizeof *b->starts);
     b->items = base_alloc((size_t)(count + 1) * sizeof *b->items);
     if (!b->starts || !b->items) return false;
-    for (int64_t i = 0; i < count; i++) b->starts[bin_of(b, place_of(places, stride, i)) + 2]++;
+    for (int64_t i = 0; i < count; i++) b->starts[bin_index(b, position_at(places, stride, i)) + 2]++;
     for (int64_t n = 0; n < bins; n++) b->starts[n + 2] += b->starts[n + 1];
-    for (int64_t i = 0; i < count; i++) b->items[b->starts[bin_of(b, place_of(places, stride, i)) + 1]++] = i;
+    for (int64_t i = 0; i < count; i++) b->items[b->starts[bin_index(b, position_at(places, stride, i)) + 1]++] = i;
     return true;
 }
 
@@ -65,7 +65,7 @@ void session_bins_free(session_bins *bins)
 }
 
 /* Moves the iterator to the row of bins at its current position. */
-static void enter_row(session_bin_walk *walk)
+static void enter_bin_row(session_bin_walk *walk)
 {
     const session_bins *b = walk->bins;
     const int64_t row = b->counts[0] * (walk->at[1] + b->counts[1] * walk->at[2]);
@@ -78,10 +78,10 @@ session_bin_walk session_walk_bins(const session_bins *bins, const double lower[
 {
     session_bin_walk walk = {.bins = bins};
     for (int axis = 0; axis < 3; axis++) {
-        walk.at[axis] = walk.low[axis] = bin_along(bins, lower[axis] - margin, axis);
-        walk.high[axis] = bin_along(bins, upper[axis] + margin, axis);
+        walk.at[axis] = walk.low[axis] = bin_index_along(bins, lower[axis] - margin, axis);
+        walk.high[axis] = bin_index_along(bins, upper[axis] + margin, axis);
     }
-    enter_row(&walk);
+    enter_bin_row(&walk);
     return walk;
 }
 
@@ -92,7 +92,7 @@ bool session_next_binned(session_bin_walk *walk, int64_t *point)
             walk->at[1] = walk->low[1];
             if (++walk->at[2] > walk->high[2]) return false;
         }
-        enter_row(walk);
+        enter_bin_row(walk);
     }
     *point = walk->bins->items[walk->next++];
     return true;

@@ -37,7 +37,7 @@ double session_place_distance(const double a[3], const double b[3])
 }
 
 /* Returns the bounding box of the positions. There must be at least one. */
-static session_box box_around(const double places[][3], int count)
+static session_box find_bounding_box(const double places[][3], int count)
 {
     session_box box;
     memcpy(box.lower, places[0], sizeof box.lower);
@@ -52,14 +52,14 @@ static session_box box_around(const double places[][3], int count)
 
 /* Computes the face's normal, box, area and width. side is 1 if the cell is behind the face, according to the
  * orientation of its vertices, and -1 if it is in front. */
-static void measure(session_coarse_face *f, double side)
+static void measure_face(session_coarse_face *f, double side)
 {
     double a[3], b[3];
     for (int axis = 0; axis < 3; axis++) {
         a[axis] = f->places[2][axis] - f->places[0][axis];
         b[axis] = f->places[f->count == 4 ? 3 : 2][axis] - f->places[1][axis];
     }
-    f->box = box_around((const double(*)[3])f->places, f->count);
+    f->box = find_bounding_box((const double(*)[3])f->places, f->count);
     vector3_cross(a, b, f->normal);
     f->area = sqrt(vector3_dot(f->normal, f->normal)) / 2;
     f->width = sqrt(fmax(vector3_dot(a, a), vector3_dot(b, b)));
@@ -67,7 +67,7 @@ static void measure(session_coarse_face *f, double side)
 }
 
 /* Returns on which side of the face its cell lies: 1 if it is behind the face, -1 if it is in front. */
-static double side_of(const grid *g, int64_t cell, const session_coarse_face *f)
+static double find_cell_side(const grid *g, int64_t cell, const session_coarse_face *f)
 {
     double sums[3] = {0, 0, 0}, off[3], place[3];
     int64_t vertex, count = 0;
@@ -95,7 +95,7 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
         out->vertices[i] = session_face_vertex(&loop, i);
         grid_vertex(g, out->vertices[i], out->places[i]);
     }
-    out->box = box_around((const double(*)[3])out->places, out->count);
+    out->box = find_bounding_box((const double(*)[3])out->places, out->count);
     out->reach = session_place_distance(out->box.lower, out->box.upper);
     return true;
 }
@@ -147,16 +147,16 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
         memcpy(out->places[i], places[from], sizeof places[from]);
         vertices[i] = outline.vertices[from];
     }
-    measure(out, 1);
+    measure_face(out, 1);
     if (!(out->area > 0)) return false;
-    measure(out, side_of(g, face->cell, out));
+    measure_face(out, find_cell_side(g, face->cell, out));
     return true;
 }
 
 void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS])
 {
     session_coarse_face other = *face;
-    measure(&other, 1);
+    measure_face(&other, 1);
     const double along = vector3_dot(other.normal, face->normal);
     memcpy(words, face->places, sizeof face->places);
     words[SESSION_FACE_WORDS - 1] = (uint64_t)(4 * face->count + (along > 0) - (along < 0));
@@ -167,7 +167,7 @@ void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], sessio
     const int64_t last = (int64_t)words[SESSION_FACE_WORDS - 1];
     memcpy(out->places, words, sizeof out->places);
     out->count = (int)((last + 1) / 4);
-    measure(out, (double)(last - 4 * out->count));
+    measure_face(out, (double)(last - 4 * out->count));
 }
 
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b)
@@ -190,13 +190,13 @@ bool session_is_at_corner(const session_coarse_face *face, const double place[3]
 }
 
 /* Rounds a coordinate to a multiple of 1 / PARTS if it differs from one only by rounding. */
-static double rounded(double at)
+static double round_coordinate(double at)
 {
     const double parts = round(at * PARTS);
     return fabs(at * PARTS - parts) < 0.01 ? parts / PARTS : at;
 }
 
-static void place_on(const session_coarse_face *f, const double at[2], double out[3], double slopes[2][3])
+static void evaluate_face(const session_coarse_face *f, const double at[2], double out[3], double slopes[2][3])
 {
     const double bent = f->count == 4;
     for (int axis = 0; axis < 3; axis++) {
@@ -210,12 +210,12 @@ static void place_on(const session_coarse_face *f, const double at[2], double ou
 
 /* Computes the coordinates of a position on the face by Newton's method, starting from the face's centre. A triangle is
  * treated as half of a parallelogram. */
-static bool solve(const session_coarse_face *f, const double place[3], double at[2])
+static bool solve_face_coordinates(const session_coarse_face *f, const double place[3], double at[2])
 {
     double on[3], slopes[2][3], off[3];
     at[0] = at[1] = 0.5;
     for (int step = 0; step < (f->count == 4 ? 12 : 2); step++) {
-        place_on(f, at, on, slopes);
+        evaluate_face(f, at, on, slopes);
         for (int axis = 0; axis < 3; axis++) off[axis] = place[axis] - on[axis];
         const double aa = vector3_dot(slopes[0], slopes[0]), ab = vector3_dot(slopes[0], slopes[1]),
                      bb = vector3_dot(slopes[1], slopes[1]);
@@ -233,10 +233,10 @@ bool session_find_on_face(const session_coarse_face *f, const double place[3], d
     double at[2], on[3], slopes[2][3];
     for (int axis = 0; axis < 3; axis++)
         if (!(f->box.lower[axis] - slack <= place[axis] && place[axis] <= f->box.upper[axis] + slack)) return false;
-    if (!solve(f, place, at)) return false;
-    for (int k = 0; k < 2; k++) at[k] = rounded(at[k]);
+    if (!solve_face_coordinates(f, place, at)) return false;
+    for (int k = 0; k < 2; k++) at[k] = round_coordinate(at[k]);
     const double u = at[0], w = at[1];
-    place_on(f, at, on, slopes);
+    evaluate_face(f, at, on, slopes);
     if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_place_distance(on, place) <= slack)) return false;
     if (f->count == 4) {
         const double bilinear[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};

@@ -51,7 +51,7 @@ static void search_free(cover_search *s)
 
 /* ---- boxes ------------------------------------------------------------------------------------------------------ */
 
-static session_level_box box_of(const session_mesh *mesh, int rank)
+static session_level_box make_level_box(const session_mesh *mesh, int rank)
 {
     const insitu_lattice *l = mesh->given.lattice;
     const grid_lattice *cells = &mesh->lattice.cells;
@@ -83,7 +83,7 @@ static bool is_finer(const session_level_box *a, const session_level_box *b)
     return is_any;
 }
 
-static void place(const session_level_box *box, double lower[3], double upper[3])
+static void find_box_bounds(const session_level_box *box, double lower[3], double upper[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = (double)box->lower[axis] / (double)box->refinement[axis];
@@ -91,7 +91,7 @@ static void place(const session_level_box *box, double lower[3], double upper[3]
     }
 }
 
-static bool is_level(const session_mesh *mesh)
+static bool is_level_block(const session_mesh *mesh)
 {
     return mesh->is_given && session_has_levels(&mesh->given) && mesh->cells.lattice;
 }
@@ -103,9 +103,9 @@ static session_box common_box(const session_meshes *meshes)
     session_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < meshes->count; i++) {
         double lower[3], upper[3];
-        if (!is_level(meshes->items[i])) continue;
-        const session_level_box box = box_of(meshes->items[i], 0);
-        place(&box, lower, upper);
+        if (!is_level_block(meshes->items[i])) continue;
+        const session_level_box box = make_level_box(meshes->items[i], 0);
+        find_box_bounds(&box, lower, upper);
         for (int axis = 0; axis < 3; axis++) {
             out.lower[axis] = fmin(out.lower[axis], lower[axis] - 1);
             out.upper[axis] = fmax(out.upper[axis], upper[axis] + 1);
@@ -114,22 +114,22 @@ static session_box common_box(const session_meshes *meshes)
     return out;
 }
 
-static bool list_own(const session_meshes *meshes, cover_search *s)
+static bool list_own_boxes(const session_meshes *meshes, cover_search *s)
 {
     s->boxes = base_alloc((size_t)(meshes->count + 1) * sizeof *s->boxes);
     for (int i = 0; i < meshes->count && s->boxes; i++) {
-        if (!is_level(meshes->items[i])) continue;
-        s->boxes[s->count++] = box_of(meshes->items[i], s->team->rank);
+        if (!is_level_block(meshes->items[i])) continue;
+        s->boxes[s->count++] = make_level_box(meshes->items[i], s->team->rank);
     }
     return s->boxes != NULL;
 }
 
 /* ---- what ranks tell each other --------------------------------------------------------------------------------- */
 
-static bool does_meet(const session_level_box *box, const session_box *common)
+static bool intersects_box(const session_level_box *box, const session_box *common)
 {
     double lower[3], upper[3];
-    place(box, lower, upper);
+    find_box_bounds(box, lower, upper);
     for (int axis = 0; axis < 3; axis++)
         if (!(lower[axis] <= common->upper[axis] && common->lower[axis] <= upper[axis])) return false;
     return true;
@@ -137,13 +137,13 @@ static bool does_meet(const session_level_box *box, const session_box *common)
 
 /* Writes, for each rank, the boxes that intersect the rank's common box. If mail->words is NULL, the words are only
  * counted. */
-static void send_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
+static void write_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
 {
     mail->total = 0;
     for (int rank = 0; rank < s->team->ranks; rank++) {
         const int64_t first = mail->total;
         for (int64_t i = 0; i < s->count && rank != s->team->rank; i++) {
-            if (!does_meet(&s->boxes[i], &commons[rank])) continue;
+            if (!intersects_box(&s->boxes[i], &commons[rank])) continue;
             if (mail->words) memcpy(mail->words + mail->total, &s->boxes[i], sizeof s->boxes[i]);
             mail->total += BOX_WORDS;
         }
@@ -155,13 +155,13 @@ static bool pack_boxes(const cover_search *s, const session_box *commons, sessio
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    send_boxes(s, commons, mail);
+    write_boxes(s, commons, mail);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words);
-    if (mail->words) send_boxes(s, commons, mail);
+    if (mail->words) write_boxes(s, commons, mail);
     return mail->words != NULL;
 }
 
-static bool take_boxes(cover_search *s, const session_mail *in)
+static bool receive_boxes(cover_search *s, const session_mail *in)
 {
     const int64_t count = in->total / BOX_WORDS;
     session_level_box *boxes = base_realloc(s->boxes, (size_t)(s->count + count + 1) * sizeof *boxes);
@@ -172,7 +172,7 @@ static bool take_boxes(cover_search *s, const session_mail *in)
     return true;
 }
 
-static insitu_status share_boxes(cover_search *s, const session_meshes *meshes, base_error *error)
+static insitu_status exchange_boxes(cover_search *s, const session_meshes *meshes, base_error *error)
 {
     session_mail out = {0}, in = {0};
     const session_box own = common_box(meshes);
@@ -186,7 +186,7 @@ static insitu_status share_boxes(cover_search *s, const session_meshes *meshes, 
     if (!status && !pack_boxes(s, commons, &out))
         session_no_memory(error, s->count * (int64_t)sizeof *s->boxes, "boxes of blocks");
     if (!status) status = session_mail_exchange(s->team->comm, &out, &in, error);
-    if (!status && !take_boxes(s, &in)) session_no_memory(error, in.total * 8, "boxes of blocks");
+    if (!status && !receive_boxes(s, &in)) session_no_memory(error, in.total * 8, "boxes of blocks");
     session_mail_free(&out);
     session_mail_free(&in);
     base_free(commons);
@@ -205,7 +205,7 @@ static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_c
     for (int64_t i = 0; i < count; i++) {
         double lower[3], upper[3];
         if (!with_coarsest && is_coarsest(&boxes[i])) continue;
-        place(&boxes[i], lower, upper);
+        find_box_bounds(&boxes[i], lower, upper);
         for (int axis = 0; axis < 3; axis++) {
             out->middles[out->count][axis] = 0.5 * (lower[axis] + upper[axis]);
             out->widest = fmax(out->widest, 0.5 * (upper[axis] - lower[axis]));
@@ -216,7 +216,7 @@ static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_c
 }
 
 /* Returns a / b, rounded down. */
-static int64_t quotient(int64_t a, int64_t b)
+static int64_t floor_quotient(int64_t a, int64_t b)
 {
     const int64_t q = a / b;
     return a % b < 0 ? q - 1 : q;
@@ -232,8 +232,8 @@ static bool find_covered(const session_level_box *coarse, const session_level_bo
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
         /* in units of 1 / (of * by) of a cell of the coarsest level */
         const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
-        lower[axis] = quotient(begin, of);
-        upper[axis] = -quotient(-end, of);
+        lower[axis] = floor_quotient(begin, of);
+        upper[axis] = -floor_quotient(-end, of);
         if (lower[axis] * of != begin || upper[axis] * of != end) *misfit = axis;
         if (lower[axis] < coarse->lower[axis]) lower[axis] = coarse->lower[axis];
         if (upper[axis] > coarse->upper[axis]) upper[axis] = coarse->upper[axis];
@@ -242,7 +242,8 @@ static bool find_covered(const session_level_box *coarse, const session_level_bo
     return true;
 }
 
-static void mark_cells(const session_mesh *mesh, const int64_t lower[3], const int64_t upper[3], unsigned char *covered)
+static void mark_covered_cells(const session_mesh *mesh, const int64_t lower[3], const int64_t upper[3],
+                               unsigned char *covered)
 {
     const insitu_lattice *l = mesh->given.lattice;
     const int64_t *strides = mesh->lattice.cells.by_cell.stride;
@@ -258,12 +259,12 @@ static void mark_cells(const session_mesh *mesh, const int64_t lower[3], const i
 
 /* Finds the cells of the block that finer blocks cover. *out has one byte per cell, or is NULL if no cell is covered.
  * Returns false if memory runs out. */
-static bool cover(const cover_search *s, session_mesh *mesh, unsigned char **out)
+static bool find_covered_cells(const cover_search *s, session_mesh *mesh, unsigned char **out)
 {
-    const session_level_box box = box_of(mesh, s->team->rank);
+    const session_level_box box = make_level_box(mesh, s->team->rank);
     double lower[3], upper[3];
     int64_t near, first[3], end[3];
-    place(&box, lower, upper);
+    find_box_bounds(&box, lower, upper);
     *out = NULL;
     mesh->misfit = (session_misfit){.is_any = false};
     session_bin_walk walk = session_walk_bins(&s->finer.bins, lower, upper, s->finer.widest);
@@ -275,14 +276,14 @@ static bool cover(const cover_search *s, session_mesh *mesh, unsigned char **out
             mesh->misfit = (session_misfit){true, misfit, fine->block, fine->refinement[misfit], (int)fine->rank};
         if (!*out) *out = base_calloc((size_t)mesh->given.cell_count + 1, 1);
         if (!*out) return false;
-        mark_cells(mesh, first, end, *out);
+        mark_covered_cells(mesh, first, end, *out);
     }
     return true;
 }
 
 /* Adds the caller's own ghost flags. They may have to be read from a copy, which is filled here because it is not
  * filled yet. */
-static void add_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
+static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 {
     const insitu_array *ghosts = &mesh->given.ghosts;
     if (!ghosts->data) return;
@@ -297,8 +298,8 @@ static void add_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 static bool update_block(const cover_search *s, session_meshes *meshes, session_mesh *mesh)
 {
     unsigned char *covered;
-    if (!cover(s, mesh, &covered)) return false;
-    if (covered) add_ghosts(mesh, s->team->threads, covered);
+    if (!find_covered_cells(s, mesh, &covered)) return false;
+    if (covered) add_caller_ghosts(mesh, s->team->threads, covered);
     const bool is_same =
         !covered == !mesh->covered && (!covered || memcmp(covered, mesh->covered, (size_t)mesh->given.cell_count) == 0);
     if (!is_same) session_renew_cells(meshes, mesh);
@@ -312,11 +313,12 @@ static bool update_block(const cover_search *s, session_meshes *meshes, session_
 insitu_status session_update_covers(session_meshes *meshes, const session_team *team, base_error *error)
 {
     cover_search s = {.team = team};
-    if (!list_own(meshes, &s)) session_no_memory(error, meshes->count * (int64_t)sizeof *s.boxes, "boxes of blocks");
-    insitu_status status = share_boxes(&s, meshes, error);
+    if (!list_own_boxes(meshes, &s))
+        session_no_memory(error, meshes->count * (int64_t)sizeof *s.boxes, "boxes of blocks");
+    insitu_status status = exchange_boxes(&s, meshes, error);
     bool is_done = !status && !error->status && bin_boxes(s.boxes, s.count, false, &s.finer);
     for (int i = 0; i < meshes->count && is_done; i++)
-        if (is_level(meshes->items[i])) is_done = update_block(&s, meshes, meshes->items[i]);
+        if (is_level_block(meshes->items[i])) is_done = update_block(&s, meshes, meshes->items[i]);
     if (!status && !error->status && !is_done) session_no_memory(error, s.count * 100, "cells that finer blocks cover");
     if (is_done) {
         base_free(meshes->level_boxes);
@@ -334,8 +336,8 @@ insitu_status session_update_covers(session_meshes *meshes, const session_team *
 
 /* Computes the centre of the cell on the other side of the face, if that cell has the same size as the face's cell. The
  * result is in units of cells of the coarsest level. */
-static void place_beside(const session_mesh *mesh, const session_level_box *box, const session_face *face,
-                         double out[3])
+static void find_neighbour_centre(const session_mesh *mesh, const session_level_box *box, const session_face *face,
+                                  double out[3])
 {
     const grid_lattice *l = &mesh->lattice.cells;
     const insitu_lattice *given = mesh->given.lattice;
@@ -367,7 +369,7 @@ static const session_level_box *find_finest(const session_meshes *meshes, const 
         const session_level_box *box = &meshes->level_boxes[bins->boxes[near]];
         double lower[3], upper[3];
         bool is_in = box->mesh == mesh && (!finest || is_finer(box, finest));
-        place(box, lower, upper);
+        find_box_bounds(box, lower, upper);
         for (int axis = 0; axis < 3; axis++) is_in = is_in && lower[axis] < at[axis] && at[axis] < upper[axis];
         if (is_in) finest = box;
     }
@@ -377,11 +379,11 @@ static const session_level_box *find_finest(const session_meshes *meshes, const 
 static void drop_inner_faces(const session_meshes *meshes, const box_bins *bins, const session_mesh *mesh,
                              session_outer *outer)
 {
-    const session_level_box own = box_of(mesh, 0);
+    const session_level_box own = make_level_box(mesh, 0);
     int64_t kept = 0;
     for (int64_t i = 0; i < outer->face_count; i++) {
         double at[3];
-        place_beside(mesh, &own, &outer->faces[i], at);
+        find_neighbour_centre(mesh, &own, &outer->faces[i], at);
         const session_level_box *beside = find_finest(meshes, bins, own.mesh, at);
         if (!beside || memcmp(beside->refinement, own.refinement, sizeof own.refinement) == 0)
             outer->faces[kept++] = outer->faces[i];
@@ -394,11 +396,11 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
 {
     box_bins bins = {.count = 0};
     bool has_levels = false;
-    for (int i = 0; i < count; i++) has_levels = has_levels || is_level(parts[i].mesh);
+    for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(parts[i].mesh);
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_no_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++)
-        if (is_level(parts[i].mesh) && !session_is_plane(parts[i].mesh->given.lattice) &&
+        if (is_level_block(parts[i].mesh) && !session_is_plane(parts[i].mesh->given.lattice) &&
             !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, parts[i].mesh, parts[i].outer);
     bins_free(&bins);

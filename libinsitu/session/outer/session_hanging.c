@@ -76,8 +76,8 @@ static void search_free(hanging_search *s)
 
 /* ---- borders -------------------------------------------------------------------------------------------------- */
 
-static bool keep_border(const session_mesh *mesh, session_outer *outer, const unsigned char *is_border,
-                        session_border *out)
+static bool store_border(const session_mesh *mesh, session_outer *outer, const unsigned char *is_border,
+                         session_border *out)
 {
     int64_t count = 0;
     for (int64_t v = 0; v < mesh->cells.vertex_count; v++) count += is_border[v];
@@ -99,7 +99,7 @@ bool session_has_twins(const session_joint *joint)
 }
 
 /* Stores the meshes of the parts, and allocates one byte per vertex for each part. Returns false if memory runs out. */
-static bool list_faces_of(const session_joint_parts *parts, int first, int count, session_face_part *out)
+static bool list_part_faces(const session_joint_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
     for (int i = 0; i < count && is_done; i++) {
@@ -120,12 +120,12 @@ static insitu_status update_mesh_borders(const session_joint *joint, int m, cons
     session_outer *outers = base_calloc((size_t)count + 1, sizeof *outers);
     session_face_part *of = base_calloc((size_t)count + 1, sizeof *of);
     for (int i = 0; i < count && outers && of; i++) of[i].outer = &outers[i];
-    if (!outers || !of || !list_faces_of(parts, first, count, of))
+    if (!outers || !of || !list_part_faces(parts, first, count, of))
         session_no_memory(error, count * 100LL, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_outer_faces(of, count, &joint->meshes[m]->homes, team, error);
     for (int i = 0; i < count && !status && !error->status; i++)
-        if (!keep_border(of[i].mesh, &outers[i], of[i].is_border, &borders[i]))
+        if (!store_border(of[i].mesh, &outers[i], of[i].is_border, &borders[i]))
             session_no_memory(error, of[i].mesh->cells.vertex_count * 8, "hanging vertices");
     if (!status) status = session_agree(team->comm, error);
     for (int i = 0; i < count && !status; i++) borders[i].cells = joint->meshes[m]->cells;
@@ -220,7 +220,7 @@ typedef enum face_state {
     FACE_READ
 } face_state;
 
-static bool does_meet(const session_box *a, const session_box *b, double margin)
+static bool do_boxes_intersect(const session_box *a, const session_box *b, double margin)
 {
     for (int axis = 0; axis < 3; axis++)
         if (!(a->lower[axis] - margin <= b->upper[axis] && b->lower[axis] - margin <= a->upper[axis])) return false;
@@ -234,7 +234,7 @@ static bool is_own(const hanging_search *s, int m, const session_face_outline *f
     return false;
 }
 
-static bool is_in(const session_box *box, const double place[3], double slack)
+static bool is_in_box(const session_box *box, const double place[3], double slack)
 {
     for (int axis = 0; axis < 3; axis++)
         if (!(box->lower[axis] - slack <= place[axis] && place[axis] <= box->upper[axis] + slack)) return false;
@@ -249,26 +249,26 @@ static bool has_candidate(const hanging_search *s, int m, const session_face_out
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const candidate *c = &s->candidates[near];
-        if (!is_in(&f->box, c->place, slack)) continue;
+        if (!is_in_box(&f->box, c->place, slack)) continue;
         if ((is_hit ? c->hits >= 0 : !is_own(s, m, f, c)) && session_may_hold(f, c->place, slack)) return true;
     }
     return false;
 }
 
-static bool meets_rank(const hanging_search *s, const session_box *box, double slack)
+static bool intersects_rank_box(const hanging_search *s, const session_box *box, double slack)
 {
     const session_homes *homes = s->basis->joint->homes;
     for (int n = 0; n < homes->near_count; n++)
-        if (homes->near[n] != s->team->rank && does_meet(box, &homes->boxes[n], slack)) return true;
+        if (homes->near[n] != s->team->rank && do_boxes_intersect(box, &homes->boxes[n], slack)) return true;
     return false;
 }
 
-static bool is_wanted(const hanging_search *s, int m, const session_face *face, bool is_hit)
+static bool is_face_needed(const hanging_search *s, int m, const session_face *face, bool is_hit)
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    const double slack = place_slack * f.reach + s->rounding; /* at least as large as the result of slack_of() */
-    return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && meets_rank(s, &f.box, slack));
+    const double slack = place_slack * f.reach + s->rounding; /* at least as large as the result of find_face_slack() */
+    return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && intersects_rank_box(s, &f.box, slack));
 }
 
 /* Appends a face to those that were read, if it is a triangle or quad. Returns false if memory runs out. */
@@ -304,7 +304,8 @@ static bool read_faces(hanging_search *s, bool is_hit)
             region_enter();
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait
             for (int64_t i = 0; i < border->face_count; i++)
-                if (states[i] == FACE_UNREAD && is_wanted(s, m, &border->faces[i], is_hit)) states[i] = FACE_WANTED;
+                if (states[i] == FACE_UNREAD && is_face_needed(s, m, &border->faces[i], is_hit))
+                    states[i] = FACE_WANTED;
             region_leave();
         }
         for (int64_t i = 0; i < border->face_count && is_done; i++) {
@@ -329,14 +330,14 @@ static bool read_own_faces(hanging_search *s)
     return true;
 }
 
-static double slack_of(const hanging_search *s, const session_coarse_face *f)
+static double find_face_slack(const hanging_search *s, const session_coarse_face *f)
 {
     return place_slack * f->width + s->rounding;
 }
 
 /* Writes, for each rank, the faces that intersect the rank's box. If mail->words is NULL, the words are only
  * counted. */
-static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
+static void write_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
     const session_homes *homes = s->basis->joint->homes;
     mail->total = 0;
@@ -344,7 +345,7 @@ static void send_faces(const hanging_search *s, session_mail *mail, int64_t *sen
         const int64_t first = mail->total;
         for (int64_t i = 0; i < s->own_count && homes->near[n] != s->team->rank; i++) {
             const session_coarse_face *f = &s->faces[i].face;
-            if (!does_meet(&f->box, &homes->boxes[n], slack_of(s, f))) continue;
+            if (!do_boxes_intersect(&f->box, &homes->boxes[n], find_face_slack(s, f))) continue;
             if (mail->words) {
                 session_pack_coarse_face(f, mail->words + mail->total);
                 sent[mail->total / SESSION_FACE_WORDS] = i;
@@ -360,15 +361,15 @@ static bool pack_faces(const hanging_search *s, session_mail *mail, int64_t **se
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    send_faces(s, mail, NULL);
+    write_faces(s, mail, NULL);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
     *sent = base_alloc((size_t)(mail->total / SESSION_FACE_WORDS + 1) * sizeof **sent);
     if (!mail->words || !*sent) return false;
-    send_faces(s, mail, *sent);
+    write_faces(s, mail, *sent);
     return true;
 }
 
-static bool take_faces(hanging_search *s, const session_mail *in)
+static bool receive_faces(hanging_search *s, const session_mail *in)
 {
     const int64_t count = in->total / SESSION_FACE_WORDS;
     searched_face *faces = base_realloc(s->faces, (size_t)(s->own_count + count + 1) * sizeof *faces);
@@ -408,10 +409,10 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
 
 /* Adds the face to the list of faces on which the candidate lies, if it lies on it. Returns false if memory runs
  * out. */
-static bool try_hit(hanging_search *s, int64_t number, candidate *c)
+static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
-    const double slack = slack_of(s, f);
+    const double slack = find_face_slack(s, f);
     double weights[4];
     if (session_is_at_corner(f, c->place, slack) || !session_find_on_face(f, c->place, slack, weights)) return true;
     return add_contact(s, number, weights, &c->hits);
@@ -419,21 +420,21 @@ static bool try_hit(hanging_search *s, int64_t number, candidate *c)
 
 /* Adds the face to the list of faces that have the candidate as a corner, if it has, and if the candidate lies on some
  * face. Returns false if memory runs out. */
-static bool try_corner(hanging_search *s, int64_t number, candidate *c)
+static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
-    if (c->hits < 0 || !session_is_at_corner(f, c->place, slack_of(s, f))) return true;
+    if (c->hits < 0 || !session_is_at_corner(f, c->place, find_face_slack(s, f))) return true;
     return add_contact(s, number, NULL, &c->corners);
 }
 
 typedef bool try_function(hanging_search *s, int64_t number, candidate *c);
 
-static bool try_faces(hanging_search *s, try_function *try_one)
+static bool test_faces(hanging_search *s, try_function *try_one)
 {
     bool is_done = true;
     for (int64_t number = 0; number < s->face_count && s->candidate_count && is_done; number++) {
         const session_coarse_face *f = &s->faces[number].face;
-        session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, slack_of(s, f));
+        session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, find_face_slack(s, f));
         int64_t near;
         while (is_done && session_next_binned(&walk, &near)) is_done = try_one(s, number, &s->candidates[near]);
     }
@@ -442,7 +443,7 @@ static bool try_faces(hanging_search *s, try_function *try_one)
 
 /* Returns the largest area of those faces that have the candidate as a corner and whose normal is opposite to that of
  * f; 0 if there are none. */
-static double area_against(const hanging_search *s, const candidate *c, const session_coarse_face *f)
+static double largest_opposite_area(const hanging_search *s, const candidate *c, const session_coarse_face *f)
 {
     double area = 0;
     for (int64_t i = c->corners; i >= 0; i = s->contacts[i].last) {
@@ -456,7 +457,7 @@ static void choose_face(const hanging_search *s, candidate *c)
 {
     for (int64_t i = c->hits; i >= 0; i = s->contacts[i].last) {
         const session_coarse_face *f = &s->faces[s->contacts[i].face].face;
-        const double area = area_against(s, c, f);
+        const double area = largest_opposite_area(s, c, f);
         if (!(area > 0 && f->area > least_ratio * area)) continue;
         if (c->face >= 0 && !session_is_larger_face(f, &s->faces[c->face].face)) continue;
         c->face = s->contacts[i].face;
@@ -466,8 +467,8 @@ static void choose_face(const hanging_search *s, candidate *c)
 
 static bool find_contacts(hanging_search *s)
 {
-    bool is_done = try_faces(s, try_hit);
-    if (s->contact_count) is_done = is_done && read_faces(s, true) && try_faces(s, try_corner);
+    bool is_done = test_faces(s, test_face_hit);
+    if (s->contact_count) is_done = is_done && read_faces(s, true) && test_faces(s, test_face_corner);
     for (int64_t i = 0; i < s->candidate_count && is_done; i++) choose_face(s, &s->candidates[i]);
     return is_done;
 }
@@ -476,7 +477,7 @@ static bool find_contacts(hanging_search *s)
 
 /* Requests those received faces on which vertices hang: packs their numbers for the ranks that sent them. *firsts
  * receives, for each such face, the index of its first value among the values that will be received. */
-static bool want_faces(const hanging_search *s, session_mail *wanted, int64_t **firsts)
+static bool request_faces(const hanging_search *s, session_mail *wanted, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
     wanted->counts = base_calloc((size_t)s->team->ranks, sizeof *wanted->counts);
@@ -495,7 +496,7 @@ static bool want_faces(const hanging_search *s, session_mail *wanted, int64_t **
     return true;
 }
 
-static bool keep_vertices(const hanging_search *s, const int64_t *firsts, session_hanging *out)
+static bool store_vertices(const hanging_search *s, const int64_t *firsts, session_hanging *out)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < s->candidate_count; i++) count += s->candidates[i].face >= 0;
@@ -515,8 +516,8 @@ static bool keep_vertices(const hanging_search *s, const int64_t *firsts, sessio
 
 /* Stores which values the other ranks request. `requests` holds, for each rank, indices of faces in the message that
  * this rank sent to it. */
-static bool keep_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
-                          const session_mail *requests, session_hanging *out)
+static bool store_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
+                           const session_mail *requests, session_hanging *out)
 {
     out->sent_counts = base_calloc((size_t)s->team->ranks, sizeof *out->sent_counts);
     out->sent_groups = base_alloc((size_t)(4 * requests->total + 1) * sizeof *out->sent_groups);
@@ -539,7 +540,7 @@ static bool keep_requests(const hanging_search *s, const session_mail *mail, con
 
 /* Finds the hanging vertices, also on faces of other ranks. Errors that occur only on this rank are stored in *error
  * and not returned. */
-static insitu_status find_shared(hanging_search *s, session_hanging *out, base_error *error)
+static insitu_status find_hanging_vertices(hanging_search *s, session_hanging *out, base_error *error)
 {
     session_mail faces = {0}, in = {0}, wanted = {0}, requests = {0};
     int64_t *sent = NULL, *firsts = NULL;
@@ -547,12 +548,12 @@ static insitu_status find_shared(hanging_search *s, session_hanging *out, base_e
         session_no_memory(error, s->own_count * 96, "hanging vertices");
     insitu_status status = session_mail_deliver(s->team->comm, SESSION_MAIL_THERE, &faces, &in, error);
     if (!status && !error->status) {
-        const bool is_done =
-            take_faces(s, &in) && find_contacts(s) && want_faces(s, &wanted, &firsts) && keep_vertices(s, firsts, out);
+        const bool is_done = receive_faces(s, &in) && find_contacts(s) && request_faces(s, &wanted, &firsts) &&
+                             store_vertices(s, firsts, out);
         if (!is_done) session_no_memory(error, s->face_count * 150, "hanging vertices");
     }
     if (!status) status = session_mail_deliver(s->team->comm, SESSION_MAIL_BACK, &wanted, &requests, error);
-    if (!status && !error->status && !keep_requests(s, &faces, sent, &requests, out))
+    if (!status && !error->status && !store_requests(s, &faces, sent, &requests, out))
         session_no_memory(error, requests.total * 32, "hanging vertices");
     session_mail_free(&faces);
     session_mail_free(&in);
@@ -563,7 +564,7 @@ static insitu_status find_shared(hanging_search *s, session_hanging *out, base_e
     return status;
 }
 
-static insitu_status count_all(const session_team *team, session_hanging *out, base_error *error)
+static insitu_status count_hanging_vertices(const session_team *team, session_hanging *out, base_error *error)
 {
     int64_t count = out->count;
     const insitu_status status =
@@ -582,10 +583,10 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
         search.rounding = fmax(search.rounding, session_place_rounding(basis->meshes[i]));
     if (!list_candidates(&search) || !bin_candidates(&search) || !read_own_faces(&search))
         session_no_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
-    insitu_status status = find_shared(&search, &found, error);
+    insitu_status status = find_hanging_vertices(&search, &found, error);
     search_free(&search);
     if (!status) status = session_agree(team->comm, error);
-    if (!status) status = count_all(team, &found, error);
+    if (!status) status = count_hanging_vertices(team, &found, error);
     if (status) {
         session_hanging_free(&found, false);
         return status;
@@ -602,7 +603,7 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 
 /* Sets the values of the hanging vertices to those of their faces at their positions. Returns whether a value
  * changed. */
-static bool constrain(const session_hanging *hanging, const double *received, double *means)
+static bool apply_constraints(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;
     for (int64_t i = 0; i < hanging->count; i++) {
@@ -619,8 +620,8 @@ static bool constrain(const session_hanging *hanging, const double *received, do
 
 /* Exchanges values with other ranks, then sets the values of the hanging vertices once. *is_changed is set if a value
  * changed on any rank. */
-static insitu_status constrain_once(const session_hanging *hanging, const session_team *team, double *means,
-                                    int *is_changed, base_error *error)
+static insitu_status exchange_and_constrain(const session_hanging *hanging, const session_team *team, double *means,
+                                            int *is_changed, base_error *error)
 {
     session_mail out = {.counts = hanging->sent_counts, .total = hanging->sent_total}, in = {0};
     insitu_status status = INSITU_OK;
@@ -634,7 +635,7 @@ static insitu_status constrain_once(const session_hanging *hanging, const sessio
         if (!status) status = session_agree(team->comm, error);
     }
     if (status) return status;
-    *is_changed = constrain(hanging, (const double *)(const void *)in.words, means);
+    *is_changed = apply_constraints(hanging, (const double *)(const void *)in.words, means);
     session_mail_free(&in);
     return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, is_changed, 1, MPI_INT, MPI_MAX, team->comm),
                        "MPI_Allreduce");
@@ -646,6 +647,6 @@ insitu_status session_constrain_hanging(const session_hanging *hanging, const se
     insitu_status status = INSITU_OK;
     int is_changed = hanging->total > 0;
     for (int round = 0; round < MOST_ROUNDS && is_changed && !status; round++)
-        status = constrain_once(hanging, team, means, &is_changed, error);
+        status = exchange_and_constrain(hanging, team, means, &is_changed, error);
     return status;
 }

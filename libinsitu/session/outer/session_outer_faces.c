@@ -82,7 +82,7 @@ static void search_free(face_search *s)
 
 /* Returns the number of vertices of the part. Vertices of a part without cells do not count: they may lack the ids that
  * all others have. */
-static int64_t vertices_of(const part_cells *p)
+static int64_t count_part_vertices(const part_cells *p)
 {
     return p->grid->cell_count ? p->grid->vertex_count : 0;
 }
@@ -91,7 +91,7 @@ static int64_t vertices_of(const part_cells *p)
 
 /* Returns whether the face's i-th vertex is not among the vertices before it. A vertex that the face contains twice
  * counts once: a quad with two corners at the same position is a triangle. */
-static inline bool is_new(const part_cells *p, const session_face_loop *loop, int64_t i)
+static inline bool is_first_occurrence(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
     const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
     for (int64_t k = 0; k < i; k++)
@@ -105,7 +105,7 @@ static bool make_key(const part_cells *p, const session_face_loop *loop, session
     uint64_t sums[3] = {0, 0, 0}, vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
         const uint64_t h = p->hashes[session_face_vertex(loop, i)];
-        if (!is_new(p, loop, i)) continue;
+        if (!is_first_occurrence(p, loop, i)) continue;
         vertices++;
         sums[0] += h;
         sums[1] += h * h;
@@ -130,7 +130,7 @@ static void hash_vertices(const face_search *s, bool by_id)
         region_enter();
         for (int part = 0; part < s->part_count; part++) {
             const part_cells *p = &s->cells[part];
-            const int64_t count = vertices_of(p);
+            const int64_t count = count_part_vertices(p);
 #pragma omp for schedule(static) nowait
             for (int64_t v = 0; v < count; v++) {
                 const session_key key = session_vertex_key(s->parts[part].mesh, v, by_id);
@@ -165,13 +165,14 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
     uint64_t sum = 0;
     int64_t vertices = 0;
     for (int64_t i = 0; i < loop->size; i++) {
-        if (!is_new(p, loop, i)) continue;
+        if (!is_first_occurrence(p, loop, i)) continue;
         sum += p->hashes[session_face_vertex(loop, i)];
         vertices++;
     }
     if (vertices < 3) return;
     for (int64_t i = 0; i < loop->size; i++)
-        if (is_new(p, loop, i)) add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
+        if (is_first_occurrence(p, loop, i))
+            add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
 }
 
 /* Adds the hashes of all faces of a cell whose type has a table of faces. If two of its vertices have the same hash,
@@ -297,7 +298,7 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
 }
 
 /* Appends those faces of the cell to the list that may be outer faces. */
-static void take_faces(const face_search *s, int part, int64_t cell, face_list *out)
+static void append_open_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
     if (!has_faces(p, cell) || !has_open_vertices(p, cell)) return;
@@ -313,13 +314,13 @@ static void take_faces(const face_search *s, int part, int64_t cell, face_list *
 }
 
 /* Appends the possible outer faces of the cells first .. end - 1 to the list. Cells are numbered over all parts. */
-static void take_share(const face_search *s, int64_t first, int64_t end, face_list *out)
+static void append_faces_of_cells(const face_search *s, int64_t first, int64_t end, face_list *out)
 {
     for (int part = 0; part < s->part_count; part++) {
         const part_cells *p = &s->cells[part];
         const int64_t from = first - p->first_cell, to = end - p->first_cell;
         for (int64_t cell = from > 0 ? from : 0; cell < to && cell < p->grid->cell_count; cell++)
-            take_faces(s, part, cell, out);
+            append_open_faces(s, part, cell, out);
     }
 }
 
@@ -353,7 +354,7 @@ static bool collect_faces(face_search *s)
         region_enter();
 #pragma omp for schedule(static, 1) nowait
         for (int i = 0; i < shares; i++)
-            take_share(s, s->cell_count * i / shares, s->cell_count * (i + 1) / shares, &lists[i]);
+            append_faces_of_cells(s, s->cell_count * i / shares, s->cell_count * (i + 1) / shares, &lists[i]);
         region_leave();
     }
     const bool is_done = join_lists(s, lists, shares);
@@ -416,7 +417,7 @@ static bool make_tables(face_search *s)
 
 /* Numbers the cells and vertices of all parts, and finds the cells that are beyond thresholds. Returns false if memory
  * runs out. */
-static bool begin_parts(face_search *s)
+static bool number_parts(face_search *s)
 {
     s->cells = base_calloc((size_t)s->part_count + 1, sizeof *s->cells);
     if (!s->cells) return false;
@@ -425,7 +426,7 @@ static bool begin_parts(face_search *s)
         part_cells *p = &s->cells[part];
         *p = (part_cells){.grid = &of->mesh->cells, .first_cell = s->cell_count, .first_vertex = s->vertex_count};
         s->cell_count += p->grid->cell_count;
-        s->vertex_count += vertices_of(p);
+        s->vertex_count += count_part_vertices(p);
         if (!of->outer->threshold.is_given) continue;
         p->is_hidden = session_hidden_cells(of->mesh, &of->outer->threshold, s->threads);
         if (!p->is_hidden) return false;
@@ -433,9 +434,9 @@ static bool begin_parts(face_search *s)
     return true;
 }
 
-static insitu_status search_own(face_search *s, bool by_id, base_error *error)
+static insitu_status search_own_faces(face_search *s, bool by_id, base_error *error)
 {
-    bool is_done = begin_parts(s);
+    bool is_done = number_parts(s);
     if (is_done && s->cell_count == 0) return INSITU_OK;
     is_done = is_done && make_tables(s);
     if (is_done) {
@@ -456,7 +457,7 @@ enum { KEY_WORDS = 3 };
 
 /* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have the
  * face. The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
-static int home_of(const face_search *s, const session_homes *homes, int64_t number)
+static int find_face_home(const face_search *s, const session_homes *homes, int64_t number)
 {
     const found_face *face = &s->faces[number];
     const part_cells *p = &s->cells[face->part];
@@ -484,7 +485,7 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
     bool is_done = places && home && mail->counts;
     for (int64_t i = 0; i < s->count && is_done; i++) {
-        home[i] = home_of(s, homes, i);
+        home[i] = find_face_home(s, homes, i);
         if (home[i] >= 0) places[home[i] + 1]++;
     }
     for (int rank = 0; rank < ranks && is_done; rank++) {
@@ -507,7 +508,7 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
 }
 
 /* Computes the reply to each received key, which is the number of its occurrences. Returns false if memory runs out. */
-static bool answer_keys(const session_mail *in, int ranks, session_mail *reply)
+static bool count_received_keys(const session_mail *in, int ranks, session_mail *reply)
 {
     const int64_t count = in->total / KEY_WORDS;
     int64_t *groups = NULL, *sizes = NULL;
@@ -527,7 +528,7 @@ static bool answer_keys(const session_mail *in, int ranks, session_mail *reply)
     return is_done;
 }
 
-static void drop_shared(face_search *s, const session_mail *answers, const int64_t *order)
+static void drop_shared_faces(face_search *s, const session_mail *answers, const int64_t *order)
 {
     int64_t kept = 0;
     for (int64_t i = 0; i < answers->total; i++)
@@ -543,19 +544,19 @@ static insitu_status exchange_keys(face_search *s, const session_mail *mail, con
     session_mail in = {0}, reply = {0}, answers = {0};
     insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, mail, &in, error);
     if (status) return status;
-    if (!error->status && !answer_keys(&in, team->ranks, &reply))
+    if (!error->status && !count_received_keys(&in, team->ranks, &reply))
         session_no_memory(error, in.total * 24, "faces that ranks share");
     status = session_mail_deliver(team->comm, SESSION_MAIL_BACK, &reply, &answers, error);
     if (!status) status = session_agree(team->comm, error);
-    if (!status) drop_shared(s, &answers, order);
+    if (!status) drop_shared_faces(s, &answers, order);
     session_mail_free(&in);
     session_mail_free(&reply);
     session_mail_free(&answers);
     return status;
 }
 
-static insitu_status search_shared(face_search *s, const session_homes *homes, const session_team *team,
-                                   base_error *error)
+static insitu_status search_shared_faces(face_search *s, const session_homes *homes, const session_team *team,
+                                         base_error *error)
 {
     session_mail mail = {0};
     int64_t *order = NULL;
@@ -580,7 +581,7 @@ static void mark_borders(const face_search *s)
 }
 
 /* Stores the outer faces that were found with the parts to which they belong. */
-static void keep_faces(const face_search *s, base_error *error)
+static void store_outer_faces(const face_search *s, base_error *error)
 {
     int64_t at = 0;
     for (int part = 0; part < s->part_count; part++) {
@@ -601,11 +602,11 @@ insitu_status session_find_outer_faces(const session_face_part *parts, int count
                                        const session_team *team, base_error *error)
 {
     face_search search = {.parts = parts, .part_count = count, .threads = team->threads};
-    search_own(&search, homes->by_id, error);
+    search_own_faces(&search, homes->by_id, error);
     if (!error->status) mark_borders(&search);
     const insitu_status status =
-        team->ranks > 1 ? search_shared(&search, homes, team, error) : session_agree(team->comm, error);
-    if (!status) keep_faces(&search, error);
+        team->ranks > 1 ? search_shared_faces(&search, homes, team, error) : session_agree(team->comm, error);
+    if (!status) store_outer_faces(&search, error);
     search_free(&search);
     return status;
 }

@@ -67,7 +67,7 @@ static void find_normal(const corner_loop *loop, double out[3])
     }
 }
 
-static double perimeter(const corner_loop *loop)
+static double measure_perimeter(const corner_loop *loop)
 {
     double sum = 0, side[3];
     for (int i = 0; i < loop->count; i++) {
@@ -89,7 +89,7 @@ static bool find_apex(const corner_loop *loop, const double inside[3], double ap
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
     find_normal(loop, normal);
-    const double length = sqrt(vector3_dot(normal, normal)), around = perimeter(loop);
+    const double length = sqrt(vector3_dot(normal, normal)), around = measure_perimeter(loop);
     if (!(length > 1e-12 * around * around)) return false;
     for (int i = 0; i < loop->count; i++)
         for (int axis = 0; axis < 3; axis++) middle[axis] += loop->places[i][axis] / loop->count;
@@ -145,7 +145,7 @@ static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, 
     return w->vertex_count++;
 }
 
-static int64_t place_vertex(outer_work *w, int64_t origin, const double place[3])
+static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double place[3])
 {
     int64_t *out = &w->places[origin];
     if (*out < 0) *out = add_vertex(w, place, origin, 0);
@@ -160,7 +160,7 @@ static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex,
     w->pyramid_count += loop->count == 4;
     w->out->cell_origins[w->cell_count++] = origin;
     for (int i = 0; i < loop->count; i++)
-        w->out->connectivity[w->entry_count++] = place_vertex(w, loop->vertices[i], loop->places[i]);
+        w->out->connectivity[w->entry_count++] = add_copied_vertex(w, loop->vertices[i], loop->places[i]);
     w->out->connectivity[w->entry_count++] = apex;
 }
 
@@ -246,7 +246,7 @@ static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
     int64_t *loops = w->out->loops;
     for (int64_t cell = first; cell < w->cell_count; cell++) loops[cell] = w->loop_end;
     loops[w->loop_end++] = p->count;
-    for (int i = 0; i < p->count; i++) loops[w->loop_end++] = place_vertex(w, p->vertices[i], p->places[i]);
+    for (int i = 0; i < p->count; i++) loops[w->loop_end++] = add_copied_vertex(w, p->vertices[i], p->places[i]);
 }
 
 static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], int64_t origin)
@@ -309,7 +309,7 @@ typedef struct outer_counts {
     int64_t corners;        /* largest number of corners of one face */
 } outer_counts;
 
-static outer_counts count_most(const grid *g, const session_outer *outer)
+static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
 {
     outer_counts most = {0};
     for (int64_t i = 0; i < outer->face_count; i++) {
@@ -350,7 +350,7 @@ static void work_free(outer_work *w)
 
 static bool work_create(const grid *g, session_outer *out, outer_work *w)
 {
-    const outer_counts most = count_most(g, out);
+    const outer_counts most = find_count_bounds(g, out);
     const int64_t cells = most.cells, entries = most.entries, loops = most.loops;
     *w = (outer_work){.cells = g, .out = out};
     if (most.corners > INT32_MAX / 64) return false;
@@ -375,7 +375,7 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
 
 /* Returns the mesh as a grid. If all cells have one type, types and offsets are omitted, so that vectorized code can be
  * used. */
-static grid describe(const outer_work *w)
+static grid describe_grid(const outer_work *w)
 {
     const session_outer *out = w->out;
     const int64_t size = (int64_t)sizeof(double);
@@ -395,13 +395,13 @@ static grid describe(const outer_work *w)
 }
 
 /* Completes the mesh. Its scalar takes ownership of the array of values. Returns false if memory runs out. */
-static bool finish(const session_mesh *whole, outer_work *w)
+static bool finish_mesh(const session_mesh *whole, outer_work *w)
 {
     session_mesh *out = w->out->mesh;
     out->name = whole->name;
     out->is_given = true;
     out->is_topology_stale = true;
-    out->cells = describe(w);
+    out->cells = describe_grid(w);
     out->given.vertex_count = w->vertex_count;
     out->given.cell_count = out->drawn_count = w->cell_count;
     session_scalar *scalar = session_add_scalar(out);
@@ -422,7 +422,7 @@ insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *
         for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.places[v] = -1;
         for (int64_t i = 0; i < outer->face_count; i++) add_face(&work, &outer->faces[i]);
         outer->offsets[work.cell_count] = work.entry_count;
-        is_made = finish(whole, &work);
+        is_made = finish_mesh(whole, &work);
     }
     work_free(&work);
     if (is_made) return INSITU_OK;

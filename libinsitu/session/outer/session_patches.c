@@ -32,14 +32,14 @@ typedef struct patch_face {
     int64_t number; /* number of the face in the mesh, from 0 on; -1: the face is given by its vertices */
 } patch_face;
 
-static insitu_status no_memory(int64_t entries, base_error *error)
+static insitu_status fail_for_memory(int64_t entries, base_error *error)
 {
     return session_no_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
 }
 
 /* Stores an error about a face and returns its status. The message is 'mesh ...: field ...: patch 2: face 17', or 'its
  * face 3', followed by `what`. */
-static insitu_status tell(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
+static insitu_status fail_at_face(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
 {
     const insitu_patch *given = &p->field->given.patches[patch];
     const grid_array faces = session_grid_array(&given->faces);
@@ -50,19 +50,19 @@ static insitu_status tell(const patch_faces *p, int patch, int64_t face, const c
                      p->field->given.name, patch, given->connectivity.data ? "its " : "", number, what);
 }
 
-static insitu_status tell_range(const patch_faces *p, int patch, int64_t face, const char *what, int64_t count,
-                                base_error *error)
+static insitu_status fail_range_at_face(const patch_faces *p, int patch, int64_t face, const char *what, int64_t count,
+                                        base_error *error)
 {
     char words[128];
     const long long base = p->mesh->given.index_base;
     snprintf(words, sizeof words, "%s %lld..%lld (index_base is %lld)", what, base, (long long)count - 1 + base, base);
-    return tell(p, patch, face, words, error);
+    return fail_at_face(p, patch, face, words, error);
 }
 
 /* ---- faces ----------------------------------------------------------------------------------------------------- */
 
 /* Reads a face's vertices from the patch's own list. */
-static void own_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
+static void read_listed_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
 {
     session_face_row *row = &out->row;
     row->list = session_index_array(mesh, &patch->connectivity);
@@ -84,18 +84,18 @@ static insitu_status find_face(const patch_faces *p, int patch, int64_t i, patch
     const insitu_patch *given = &p->field->given.patches[patch];
     const session_face_row *row = &out->row;
     if (given->connectivity.data) {
-        own_vertices(mesh, given, i, out);
+        read_listed_vertices(mesh, given, i, out);
     } else {
         const grid_array faces = session_index_array(mesh, &given->faces);
         const int64_t number =
             given->faces.data ? grid_array_index(&faces, i) : given->first_face - mesh->index_base + i;
         if (number < 0 || number >= session_face_count(mesh))
-            return tell_range(p, patch, i, "is outside", session_face_count(mesh), error);
+            return fail_range_at_face(p, patch, i, "is outside", session_face_count(mesh), error);
         *out = (patch_face){session_given_face(mesh, number), number};
     }
-    if (row->size < 3) return tell(p, patch, i, "has fewer than three vertices", error);
+    if (row->size < 3) return fail_at_face(p, patch, i, "has fewer than three vertices", error);
     if (row->first < 0 || row->first > row->limit || row->size > row->limit - row->first)
-        return tell(p, patch, i, "has vertices beyond the connectivity", error);
+        return fail_at_face(p, patch, i, "has vertices beyond the connectivity", error);
     return INSITU_OK;
 }
 
@@ -105,7 +105,8 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
     const int64_t count = p->mesh->given.vertex_count;
     for (int64_t k = 0; k < face->row.size; k++) {
         const int64_t vertex = grid_array_index(&face->row.list, face->row.first + k);
-        if (vertex < 0 || vertex >= count) return tell_range(p, patch, i, "has a vertex index outside", count, error);
+        if (vertex < 0 || vertex >= count)
+            return fail_range_at_face(p, patch, i, "has a vertex index outside", count, error);
         groups[k] = p->mesh->torn.is_torn ? -1 : p->numbers->of_vertex[vertex];
         if (groups[k] >= 0) continue;
         const session_key key = session_given_vertex_key(p->mesh, vertex, p->numbers->by_id);
@@ -128,7 +129,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
         }
     p->starts[f] = entries;
     p->groups = base_alloc((size_t)entries * sizeof *p->groups);
-    if (!p->groups) return no_memory(entries, error);
+    if (!p->groups) return fail_for_memory(entries, error);
     f = 0;
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
@@ -142,17 +143,17 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
 /* ---- the cells behind them, by owner and neighbour ----------------------------------------------------------------
  */
 
-static insitu_status ask_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
-                               base_error *error)
+static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
+                                 base_error *error)
 {
     const session_face_sides sides = session_sides(&p->mesh->given);
     patch_face face;
     int64_t cells[2];
     if (find_face(p, patch, i, &face, error)) return error->status;
     session_cells_of_face(&sides, face.number, cells);
-    if (cells[1] >= 0) return tell(p, patch, i, "is between two cells, not on the boundary", error);
+    if (cells[1] >= 0) return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
     unsigned char *taken = &is_taken[face.number / 8], bit = (unsigned char)(1u << face.number % 8);
-    if (*taken & bit) return tell(p, patch, i, "is given twice", error);
+    if (*taken & bit) return fail_at_face(p, patch, i, "is given twice", error);
     *taken |= bit;
     p->is_drawn[f] = cells[0] >= 0 && !grid_is_ghost(&p->mesh->cells, cells[0]);
     return INSITU_OK;
@@ -166,16 +167,16 @@ static bool are_by_number(const insitu_field *field)
     return all;
 }
 
-static insitu_status ask_owners(patch_faces *p, base_error *error)
+static insitu_status check_owners(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
     const int64_t bytes = session_face_count(&p->mesh->given) / 8 + 1;
     unsigned char *is_taken = base_calloc((size_t)bytes, 1);
     int64_t f = 0;
-    if (!is_taken) return no_memory(bytes / 8, error);
+    if (!is_taken) return fail_for_memory(bytes / 8, error);
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count && !error->status; i++)
-            ask_owner(p, patch, i, f++, is_taken, error);
+            check_owner(p, patch, i, f++, is_taken, error);
     base_free(is_taken);
     return error->status;
 }
@@ -219,7 +220,7 @@ static void add_vertex(session_key *key, int64_t group)
     key->words[2] += h * h * h;
 }
 
-static void enter_faces(cell_search *s, const patch_faces *p)
+static void add_faces_to_table(cell_search *s, const patch_faces *p)
 {
     for (int64_t f = 0; f < p->count; f++) {
         session_key key = {{0}};
@@ -235,7 +236,7 @@ static void enter_faces(cell_search *s, const patch_faces *p)
 }
 
 /* Computes the key of a cell's face. Returns false if one of its vertices is not on any given face. */
-static bool key_of(const cell_search *s, const patch_faces *p, const session_face_loop *loop, session_key *key)
+static bool find_face_key(const cell_search *s, const patch_faces *p, const session_face_loop *loop, session_key *key)
 {
     *key = (session_key){{0}};
     for (int64_t i = 0; i < loop->size; i++) {
@@ -255,7 +256,7 @@ static void count_cells(cell_search *s, const patch_faces *p)
         for (int64_t i = 0; i < faces.count; i++) {
             const session_face_loop loop = session_face_of(&faces, i);
             session_key key;
-            const int64_t found = key_of(s, p, &loop, &key) ? session_keys_find(&s->keys, &key) : -1;
+            const int64_t found = find_face_key(s, p, &loop, &key) ? session_keys_find(&s->keys, &key) : -1;
             if (found < 0) continue;
             s->cells[found]++;
             if (!grid_is_ghost(g, cell)) s->is_drawn[found] = 1;
@@ -263,7 +264,7 @@ static void count_cells(cell_search *s, const patch_faces *p)
     }
 }
 
-static insitu_status judge_faces(const cell_search *s, patch_faces *p, base_error *error)
+static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
     int64_t f = 0;
@@ -272,24 +273,24 @@ static insitu_status judge_faces(const cell_search *s, patch_faces *p, base_erro
             const int64_t key = s->of_face[f];
             if (key < 0) continue; /* the face belongs to a ghost cell */
             if (s->cells[key] > s->given[key])
-                return tell(p, patch, i, "is between two cells, not on the boundary", error);
-            if (s->cells[key] == 0) return tell(p, patch, i, "is no face of a cell", error);
-            if (s->cells[key] < s->given[key]) return tell(p, patch, i, "is given twice", error);
+                return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
+            if (s->cells[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);
+            if (s->cells[key] < s->given[key]) return fail_at_face(p, patch, i, "is given twice", error);
             p->is_drawn[f] = s->is_drawn[key];
         }
     return INSITU_OK;
 }
 
-static insitu_status ask_cells(patch_faces *p, base_error *error)
+static insitu_status check_faces_by_cells(patch_faces *p, base_error *error)
 {
     cell_search search = {0};
     insitu_status status = INSITU_OK;
     if (search_create(&search, p)) {
-        enter_faces(&search, p);
+        add_faces_to_table(&search, p);
         count_cells(&search, p);
-        status = judge_faces(&search, p, error);
+        status = check_cell_counts(&search, p, error);
     } else {
-        status = no_memory(p->count * 6, error);
+        status = fail_for_memory(p->count * 6, error);
     }
     search_free(&search);
     return status;
@@ -298,7 +299,7 @@ static insitu_status ask_cells(patch_faces *p, base_error *error)
 /* ---- values -------------------------------------------------------------------------------------------------------
  */
 
-static grid_field values_of(const patch_faces *p, int patch, int component)
+static grid_field find_patch_field(const patch_faces *p, int patch, int component)
 {
     const insitu_field *field = &p->field->given;
     const insitu_patch *given = &field->patches[patch];
@@ -311,27 +312,27 @@ static grid_field values_of(const patch_faces *p, int patch, int component)
     return out;
 }
 
-static bool is_first(const int64_t *groups, int64_t i)
+static bool is_first_in_groups(const int64_t *groups, int64_t i)
 {
     for (int64_t k = 0; k < i; k++)
         if (groups[k] == groups[i]) return false;
     return groups[i] >= 0;
 }
 
-static insitu_status give_values(const patch_faces *p, int component, session_patch_values *out, base_error *error)
+static insitu_status store_values(const patch_faces *p, int component, session_patch_values *out, base_error *error)
 {
     const int64_t most = p->starts[p->count];
     int64_t f = 0;
     out->groups = base_alloc((size_t)most * sizeof *out->groups);
     out->values = base_alloc((size_t)most * sizeof *out->values);
-    if (!out->groups || !out->values) return no_memory(most * 2, error);
+    if (!out->groups || !out->values) return fail_for_memory(most * 2, error);
     for (int patch = 0; patch < p->field->given.patch_count; patch++) {
-        const grid_field values = values_of(p, patch, component);
+        const grid_field values = find_patch_field(p, patch, component);
         for (int64_t i = 0; i < p->field->given.patches[patch].count; i++, f++) {
             const double value = grid_field_value(&values, i);
             const int64_t *groups = p->groups + p->starts[f], size = p->starts[f + 1] - p->starts[f];
             for (int64_t k = 0; k < size && p->is_drawn[f] && isfinite(value); k++) {
-                if (!is_first(groups, k)) continue;
+                if (!is_first_in_groups(groups, k)) continue;
                 out->groups[out->count] = groups[k];
                 out->values[out->count++] = value;
             }
@@ -357,10 +358,10 @@ insitu_status session_find_patch_values(const session_mesh *mesh, int field, int
     if (p.count == 0) return INSITU_OK;
     p.starts = base_alloc((size_t)(p.count + 1) * sizeof *p.starts);
     p.is_drawn = base_calloc((size_t)p.count, 1);
-    insitu_status status = p.starts && p.is_drawn ? list_faces(&p, error) : no_memory(p.count * 2, error);
+    insitu_status status = p.starts && p.is_drawn ? list_faces(&p, error) : fail_for_memory(p.count * 2, error);
     const bool has_sides = session_has_owners(&mesh->given) && are_by_number(given);
-    if (!status) status = has_sides ? ask_owners(&p, error) : ask_cells(&p, error);
-    if (!status) status = give_values(&p, component, out, error);
+    if (!status) status = has_sides ? check_owners(&p, error) : check_faces_by_cells(&p, error);
+    if (!status) status = store_values(&p, component, out, error);
     base_free(p.starts);
     base_free(p.groups);
     base_free(p.is_drawn);

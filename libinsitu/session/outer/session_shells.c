@@ -10,7 +10,7 @@ bool session_has_shells(const session_catalogue *catalogue)
 }
 
 /* Copies the isovalues and their colours, sorted by value. */
-static void take_values(const scene_isosurface *layer, scene_lines *out)
+static void copy_isovalues(const scene_isosurface *layer, scene_lines *out)
 {
     for (int i = 0; i < layer->value_count; i++) {
         int at = out->count++;
@@ -43,7 +43,7 @@ scene_surface session_shells_of(const scene_isosurface *layer, int height)
                               .has_values = true,
                               .is_alone = true,
                               .width = scene_line_width(height)};
-    take_values(layer, &out.lines);
+    copy_isovalues(layer, &out.lines);
     return out;
 }
 

@@ -7,7 +7,7 @@
 #include "session_region.h"
 #include "session_scalars.h"
 
-static session_threshold resolve(const session_mesh *mesh, const scene_threshold *in)
+static session_threshold resolve_threshold(const session_mesh *mesh, const scene_threshold *in)
 {
     if (!in->is_given) return (session_threshold){0};
     session_threshold out = {true, session_find_field(mesh, in->field.name), 0, in->low, in->high};
@@ -16,7 +16,7 @@ static session_threshold resolve(const session_mesh *mesh, const scene_threshold
     return out;
 }
 
-static bool is_same(const session_threshold *a, const session_threshold *b)
+static bool is_same_threshold(const session_threshold *a, const session_threshold *b)
 {
     if (!a->is_given || !b->is_given) return a->is_given == b->is_given;
     return a->field == b->field && a->component == b->component && a->low == b->low && a->high == b->high;
@@ -24,9 +24,9 @@ static bool is_same(const session_threshold *a, const session_threshold *b)
 
 session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold)
 {
-    const session_threshold wanted = resolve(mesh, threshold);
+    const session_threshold wanted = resolve_threshold(mesh, threshold);
     for (int i = 0; i < mesh->outer_count; i++)
-        if (is_same(&mesh->outers[i]->threshold, &wanted)) return mesh->outers[i];
+        if (is_same_threshold(&mesh->outers[i]->threshold, &wanted)) return mesh->outers[i];
     return NULL;
 }
 
@@ -37,7 +37,7 @@ static session_outer *add_outer(session_mesh *mesh, const scene_threshold *thres
     mesh->outers = outers;
     session_outer *out = base_calloc(1, sizeof *out);
     if (!out) return NULL;
-    out->threshold = resolve(mesh, threshold);
+    out->threshold = resolve_threshold(mesh, threshold);
     outers[mesh->outer_count++] = out;
     return out;
 }

@@ -71,7 +71,7 @@ static bool add_corners(twin_search *s, const session_mesh *mesh, const session_
     return edges != NULL;
 }
 
-static bool list_own(twin_search *s)
+static bool list_own_corners(twin_search *s)
 {
     const session_border *borders = s->joint->hanging.borders;
     int64_t count = 0;
@@ -93,7 +93,7 @@ static bool list_own(twin_search *s)
 /* ---- corners of several ranks --------------------------------------------------------------------------------- */
 
 /* Writes, for each rank, the corners that lie in the rank's box. If mail->words is NULL, the words are only counted. */
-static void send_corners(const twin_search *s, session_mail *mail)
+static void write_corners(const twin_search *s, session_mail *mail)
 {
     const session_homes *homes = s->joint->homes;
     mail->total = 0;
@@ -112,13 +112,13 @@ static bool pack_corners(const twin_search *s, session_mail *mail)
 {
     mail->counts = base_calloc((size_t)s->team->ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    send_corners(s, mail);
+    write_corners(s, mail);
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words + 1);
-    if (mail->words) send_corners(s, mail);
+    if (mail->words) write_corners(s, mail);
     return mail->words != NULL;
 }
 
-static bool take_corners(twin_search *s, const session_mail *in)
+static bool receive_corners(twin_search *s, const session_mail *in)
 {
     const int64_t count = in->total / CORNER_WORDS;
     face_corner *corners = base_realloc(s->corners, (size_t)(s->corner_count + count + 1) * sizeof *corners);
@@ -131,7 +131,7 @@ static bool take_corners(twin_search *s, const session_mail *in)
 
 /* ---- twins ---------------------------------------------------------------------------------------------------- */
 
-static void find_least(twin_search *s)
+static void find_least_corners(twin_search *s)
 {
     for (int64_t i = 0; i < s->corner_count && s->vertex_count; i++) {
         const face_corner *c = &s->corners[i];
@@ -146,7 +146,7 @@ static void find_least(twin_search *s)
     }
 }
 
-static bool keep_twins(const border_vertex *vertices, session_border *border)
+static bool store_twins(const border_vertex *vertices, session_border *border)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < border->vertex_count; i++)
@@ -165,13 +165,13 @@ static bool keep_twins(const border_vertex *vertices, session_border *border)
     return true;
 }
 
-static bool keep_all(const twin_search *s)
+static bool store_all_twins(const twin_search *s)
 {
     bool is_done = true;
     int64_t first = 0;
     for (int m = 0; m < s->parts->count && is_done; m++) {
         session_border *border = &s->joint->hanging.borders[m];
-        is_done = keep_twins(s->vertices + first, border);
+        is_done = store_twins(s->vertices + first, border);
         first += border->vertex_count;
     }
     return is_done;
@@ -183,13 +183,14 @@ insitu_status session_find_twins(session_joint *joint, const session_joint_parts
     twin_search s = {.joint = joint, .parts = parts, .team = team};
     session_mail out = {0}, in = {0};
     for (int i = 0; i < parts->count; i++) s.rounding = fmax(s.rounding, session_place_rounding(parts->items[i]));
-    if (!error->status && (!list_own(&s) || !pack_corners(&s, &out)))
+    if (!error->status && (!list_own_corners(&s) || !pack_corners(&s, &out)))
         session_no_memory(error, (s.corner_count + s.vertex_count) * 80, "vertices of several meshes");
     const insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);
     if (!status && !error->status) {
-        const bool is_taken = take_corners(&s, &in);
-        if (is_taken) find_least(&s);
-        if (!is_taken || !keep_all(&s)) session_no_memory(error, s.corner_count * 32, "vertices of several meshes");
+        const bool is_taken = receive_corners(&s, &in);
+        if (is_taken) find_least_corners(&s);
+        if (!is_taken || !store_all_twins(&s))
+            session_no_memory(error, s.corner_count * 32, "vertices of several meshes");
     }
     session_mail_free(&out);
     session_mail_free(&in);
