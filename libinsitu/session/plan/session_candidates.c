@@ -38,7 +38,7 @@ static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, in
     return true;
 }
 
-static bool add_surface(session_scalar *scalar, const scene_isosurface *layer)
+static bool add_isovalue_intervals(session_scalar *scalar, const scene_isosurface *layer)
 {
     /* Central differences also sample neighbours of crossed cells, so all cells are kept. */
     if (layer->normals == SCENE_DIFFERENCES) scalar->needs_all = true;
@@ -50,7 +50,7 @@ static bool add_surface(session_scalar *scalar, const scene_isosurface *layer)
     return is_added;
 }
 
-static bool add_volume(session_scalar *scalar, const scene_volume *layer)
+static bool add_visible_intervals(session_scalar *scalar, const scene_volume *layer)
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     const int count = session_visible_intervals(layer, intervals);
@@ -63,7 +63,7 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
 {
     session_scalar *scalar;
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
-    return !scalar || add_volume(scalar, layer);
+    return !scalar || add_visible_intervals(scalar, layer);
 }
 
 /* Marks the scalar of distances from a plane, with its isovalue, which is 0 or very small
@@ -105,7 +105,7 @@ static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer, int 
         const scene_surface shells = session_shells_of(layer, height);
         return mark_outer(mesh, &shells);
     }
-    if (!add_surface(scalar, layer)) return false;
+    if (!add_isovalue_intervals(scalar, layer)) return false;
     if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }

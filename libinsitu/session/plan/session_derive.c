@@ -46,7 +46,7 @@ static const session_catalogue_field *find_field(const derive_work *w, const ses
 }
 
 /* Iterates over this rank's parts of a mesh that have the field:
- *     for (part_visit v = visit_parts(w, mesh); next_part(w, &v);) use(v.part, v.index); */
+ *     for (part_visit v = visit_parts(w, mesh); next_visited_part(w, &v);) use(v.part, v.index); */
 typedef struct part_visit {
     session_parts parts;
     int next;
@@ -61,7 +61,7 @@ static part_visit visit_parts(const derive_work *w, const session_catalogue_mesh
     return visit;
 }
 
-static bool next_part(const derive_work *w, part_visit *v)
+static bool next_visited_part(const derive_work *w, part_visit *v)
 {
     while (v->next < v->parts.count) {
         v->part = v->parts.items[v->next++];
@@ -72,7 +72,7 @@ static bool next_part(const derive_work *w, part_visit *v)
 }
 
 /* Returns the number of the input's component, in the format of grid_field.component. */
-static int component_of(const scene_field *input, int component_count)
+static int input_component(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
@@ -84,7 +84,7 @@ static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mes
     return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
 }
 
-static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *input)
+static uint64_t find_joint_name(const session_catalogue_mesh *mesh, const scene_field *input)
 {
     return session_joint_name(mesh, input->joined);
 }
@@ -95,7 +95,7 @@ static uint64_t joint_of(const session_catalogue_mesh *mesh, const scene_field *
 static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, const scene_field *input, int component)
 {
     const int index = part->is_given ? session_find_field(part, input->name) : -1;
-    const uint64_t joint = joint_of(mesh, input);
+    const uint64_t joint = find_joint_name(mesh, input);
     if (index < 0 || session_find_recentred(part, input->name, component, joint)) return true;
     session_scalar *scalar = session_add_scalar(part);
     if (!scalar) return false;
@@ -120,9 +120,9 @@ static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, c
 {
     if (!is_recentred(w, mesh, input)) return true;
     const int count = session_catalogue_find(mesh, input->name)->component_count;
-    const int first = session_takes_vector(w->derived) ? 0 : component_of(input, count);
+    const int first = session_takes_vector(w->derived) ? 0 : input_component(input, count);
     const int end = session_takes_vector(w->derived) ? count : first + 1;
-    session_joint *joint = session_find_joint(w->basis->catalogue, joint_of(mesh, input));
+    session_joint *joint = session_find_joint(w->basis->catalogue, find_joint_name(mesh, input));
     bool is_done = joint != NULL;
     for (int c = first; c < end && is_done; c++) {
         const session_recentring item = {joint, input->name, c};
@@ -149,7 +149,8 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
                                       const session_mesh *part, int input, int component)
 {
     const scene_field *of = &w->derived->inputs[input];
-    return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, joint_of(mesh, of)) : NULL;
+    return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, find_joint_name(mesh, of))
+                                     : NULL;
 }
 
 /* Returns a hash of all data from which the values on this rank's part are computed. */
@@ -179,7 +180,7 @@ static insitu_status find_stale(derive_work *w, base_error *error)
     const int count = catalogue->mesh_count;
     for (int m = 0; m < count; m++) {
         w->stale[m] = 0;
-        for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_part(w, &v);)
+        for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v);)
             if (v.part->fields[v.index].made_of != hash_sources(w, &catalogue->meshes[m], v.part)) w->stale[m] = 1;
     }
     w->stale[count] = error->status != INSITU_OK;
@@ -206,18 +207,18 @@ static bool is_wide_input(const session_mesh *part, const scene_field *input)
     return index >= 0 && part->fields[index].values.is_wide;
 }
 
-static int64_t place_count(const session_mesh *part, const session_field *field)
+static int64_t count_values(const session_mesh *part, const session_field *field)
 {
     return field->given.centring == INSITU_CELL ? part->cells.cell_count : session_vertex_count(part);
 }
 
 /* Allocates memory for the values, unless it already has the right size. */
-static bool make_room(const derive_work *w, session_mesh *part, session_field *field)
+static bool allocate_values(const derive_work *w, session_mesh *part, session_field *field)
 {
     bool is_wide = false;
     for (int k = 0; k < w->derived->input_count; k++) is_wide = is_wide || is_wide_input(part, &w->derived->inputs[k]);
     const int64_t size = is_wide ? 8 : 4;
-    const int64_t bytes = place_count(part, field) * field->given.component_count * size;
+    const int64_t bytes = count_values(part, field) * field->given.component_count * size;
     if (!field->copy || field->copy_bytes != bytes) {
         session_drop_copy(field);
         field->copy = base_alloc((size_t)bytes);
@@ -230,7 +231,7 @@ static bool make_room(const derive_work *w, session_mesh *part, session_field *f
     return true;
 }
 
-static void store(const session_field *field, int64_t place, const double *values)
+static void store_values(const session_field *field, int64_t place, const double *values)
 {
     const int count = field->given.component_count;
     for (int c = 0; c < count; c++)
@@ -241,7 +242,7 @@ static void store(const session_field *field, int64_t place, const double *value
 }
 
 /* Records that the values are new, for the scalars and fields that depend on them. */
-static void note_values(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
+static void mark_values_new(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
 {
     session_spoil_scalars(part, index);
     part->fields[index].made_of = hash_sources(w, mesh, part);
@@ -313,7 +314,7 @@ static void evaluate(const scene_derived *derived, const grid_field *inputs, con
             for (int k = 0; k < derived->input_count; k++)
                 load_block(&inputs[k], first, size, room->values + k * SCENE_BLOCK);
             scene_evaluate(&derived->expression, room->inputs, size, stack);
-            for (int i = 0; i < size; i++) store(field, first + i, stack + i);
+            for (int i = 0; i < size; i++) store_values(field, first + i, stack + i);
         }
         region_leave();
     }
@@ -325,16 +326,16 @@ static bool make_expression(const derive_work *w, const session_catalogue_mesh *
     session_field *field = &part->fields[index];
     block_room *rooms = NULL;
     grid_field *inputs = base_alloc((size_t)w->derived->input_count * sizeof *inputs);
-    const bool is_done = inputs && rooms_create(w->derived, threads, &rooms) && make_room(w, part, field);
+    const bool is_done = inputs && rooms_create(w->derived, threads, &rooms) && allocate_values(w, part, field);
     for (int k = 0; k < w->derived->input_count && is_done; k++) {
         const scene_field *input = &w->derived->inputs[k];
         const int count = part->fields[session_find_field(part, input->name)].given.component_count;
-        inputs[k] = input_values(w, mesh, part, k, component_of(input, count));
+        inputs[k] = input_values(w, mesh, part, k, input_component(input, count));
     }
-    if (is_done) evaluate(w->derived, inputs, rooms, field, place_count(part, field), threads);
+    if (is_done) evaluate(w->derived, inputs, rooms, field, count_values(part, field), threads);
     rooms_free(rooms, threads);
     base_free(inputs);
-    if (is_done) note_values(w, mesh, part, index);
+    if (is_done) mark_values_new(w, mesh, part, index);
     return is_done;
 }
 
@@ -343,9 +344,9 @@ static void make_expressions(const derive_work *w, base_error *error)
     const session_catalogue *catalogue = w->basis->catalogue;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         if (!w->stale[m]) continue;
-        for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_part(w, &v) && !error->status;)
+        for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v) && !error->status;)
             if (!make_expression(w, &catalogue->meshes[m], v.part, v.index))
-                session_no_memory(error, place_count(v.part, &v.part->fields[v.index]) * 8, "a derived field");
+                session_no_memory(error, count_values(v.part, &v.part->fields[v.index]) * 8, "a derived field");
     }
 }
 
@@ -364,7 +365,7 @@ static int keep_component(int component, const double vector[3], double *out)
 }
 
 /* Computes the derived values at a vertex from the gradients of the components there. */
-static void make_values(const scene_derived *derived, const double gradient[SPACE][SPACE], double out[SPACE])
+static void compute_values(const scene_derived *derived, const double gradient[SPACE][SPACE], double out[SPACE])
 {
     double curl[SPACE];
     switch (derived->kind) {
@@ -393,9 +394,9 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
             if (part->entries[v] >= 0) {
                 session_mean_gradients(sums->sums + (int64_t)part->entries[v] * words, sums->field_count, &sums->bounds,
                                        sums->length, gradient);
-                make_values(w->derived, (const double(*)[SPACE])gradient, values);
+                compute_values(w->derived, (const double(*)[SPACE])gradient, values);
             }
-            store(field, v, values);
+            store_values(field, v, values);
         }
         region_leave();
     }
@@ -411,13 +412,13 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     const int count = session_takes_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
     for (int c = 0; c < count; c++)
         out[c] = input_values(w, mesh, part, session_takes_vector(derived) ? 0 : c,
-                              session_takes_vector(derived) ? c : component_of(&derived->inputs[c], 1));
+                              session_takes_vector(derived) ? c : input_component(&derived->inputs[c], 1));
     return count;
 }
 
 /* Returns the first of the joint's meshes on which the field has no fault. The vector has the same number of components
  * on all such meshes. */
-static const session_catalogue_mesh *first_sound(const derive_work *w, const session_joint *joint)
+static const session_catalogue_mesh *find_first_faultless(const derive_work *w, const session_joint *joint)
 {
     int i = 0;
     while (i < joint->count && !find_field(w, joint->meshes[i])) i++;
@@ -428,7 +429,7 @@ static const session_catalogue_mesh *first_sound(const derive_work *w, const ses
 static int count_scalars(const derive_work *w, const session_joint *joint)
 {
     if (!session_takes_vector(w->derived)) return w->derived->input_count;
-    return session_catalogue_find(first_sound(w, joint), w->derived->inputs[0].name)->component_count;
+    return session_catalogue_find(find_first_faultless(w, joint), w->derived->inputs[0].name)->component_count;
 }
 
 static insitu_status begin_sums(const derive_work *w, const session_joint *joint, session_vertex_sums *sums,
@@ -437,12 +438,12 @@ static insitu_status begin_sums(const derive_work *w, const session_joint *joint
     sums->parts = base_calloc((size_t)w->basis->meshes->count + 1, sizeof *sums->parts);
     if (!sums->parts) return session_no_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
     for (int m = 0; m < joint->count; m++)
-        for (part_visit v = visit_parts(w, joint->meshes[m]); next_part(w, &v);) {
+        for (part_visit v = visit_parts(w, joint->meshes[m]); next_visited_part(w, &v);) {
             session_sum_part *part = &sums->parts[sums->part_count++];
             part->mesh = v.part;
             part->of_shells = joint->meshes[m]->has_shells_alone;
             list_scalars(w, joint->meshes[m], v.part, part->fields);
-            if (!make_room(w, v.part, &v.part->fields[v.index]))
+            if (!allocate_values(w, v.part, &v.part->fields[v.index]))
                 return session_no_memory(error, v.part->cells.vertex_count * 8, "a derived field");
         }
     return session_key_all_vertices(sums, error);
@@ -457,9 +458,9 @@ static insitu_status derive_joint(const derive_work *w, const session_joint *joi
     const insitu_status status = session_find_sums(joint->homes, w->basis->team, w->basis->extent, &sums, error);
     int at = 0;
     for (int m = 0; m < joint->count && !status && !error->status; m++)
-        for (part_visit v = visit_parts(w, joint->meshes[m]); next_part(w, &v);) {
+        for (part_visit v = visit_parts(w, joint->meshes[m]); next_visited_part(w, &v);) {
             store_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.index]);
-            note_values(w, joint->meshes[m], v.part, v.index);
+            mark_values_new(w, joint->meshes[m], v.part, v.index);
         }
     session_vertex_sums_free(&sums);
     return status;
@@ -482,7 +483,8 @@ static insitu_status derive_joints(const derive_work *w, base_error *error)
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_joint *joint =
             find_field(w, mesh) ? session_find_joint(catalogue, session_joint_name(mesh, w->derived->joined)) : NULL;
-        if (joint && first_sound(w, joint) == mesh && is_joint_stale(w, joint)) status = derive_joint(w, joint, error);
+        if (joint && find_first_faultless(w, joint) == mesh && is_joint_stale(w, joint))
+            status = derive_joint(w, joint, error);
     }
     return status;
 }
@@ -490,7 +492,7 @@ static insitu_status derive_joints(const derive_work *w, base_error *error)
 /* ---- one derived field ---------------------------------------------------------------------------------------------
  */
 
-static insitu_status derive(derive_work *w, base_error *error)
+static insitu_status derive_field(derive_work *w, base_error *error)
 {
     const session_derive_basis *b = w->basis;
     const bool is_expression = w->derived->kind == SCENE_EXPRESSION;
@@ -513,7 +515,7 @@ insitu_status session_derive(const session_derive_basis *basis, uint64_t needed,
     for (int i = 0; i < basis->scene->derived_count && !status; i++) {
         if (!(needed >> i & 1)) continue;
         derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .number = i};
-        status = derive(&work, error);
+        status = derive_field(&work, error);
         base_free(work.recentrings);
         base_free(work.stale);
     }

@@ -20,14 +20,14 @@ int session_find_derived(const scene *scene, const char *name)
 
 /* ---- needed fields -------------------------------------------------------------------------------------------- */
 
-static uint64_t bit_of(const scene *scene, const scene_field *field)
+static uint64_t derived_field_bit(const scene *scene, const scene_field *field)
 {
     const int derived = session_find_derived(scene, field->name);
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 
 /* Adds to the set of needed fields those on which they depend, which come before them in the list. */
-static uint64_t with_sources(const scene *scene, uint64_t needed)
+static uint64_t add_source_bits(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
         for (int k = 0; k < scene->derived[i].input_count && needed >> i & 1; k++)
@@ -39,7 +39,7 @@ static uint64_t bits_of_image(const scene *scene, const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
     uint64_t bits = 0;
-    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) bits |= bit_of(scene, field);
+    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) bits |= derived_field_bit(scene, field);
     return bits;
 }
 
@@ -48,17 +48,18 @@ uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan)
     uint64_t bits = 0;
     for (int i = 0; i < plan->image_count && scene->derived_count; i++)
         if (plan->images[i]->variant.view == 0) bits |= bits_of_image(scene, plan->images[i]);
-    return with_sources(scene, bits);
+    return add_source_bits(scene, bits);
 }
 
 uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images)
 {
     uint64_t bits = 0;
     for (int i = 0; i < scene->statistics_count; i++)
-        if (session_is_statistics_due(&scene->statistics[i], cycle)) bits |= bit_of(scene, &scene->statistics[i].field);
+        if (session_is_statistics_due(&scene->statistics[i], cycle))
+            bits |= derived_field_bit(scene, &scene->statistics[i].field);
     for (int i = 0; i < scene->image_count && images; i++)
-        if (scene->images[i].when.is_given) bits |= bit_of(scene, &scene->images[i].when.field);
-    return with_sources(scene, bits);
+        if (scene->images[i].when.is_given) bits |= derived_field_bit(scene, &scene->images[i].when.field);
+    return add_source_bits(scene, bits);
 }
 
 void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes)
@@ -158,7 +159,7 @@ static insitu_status check_input(const derived_place *at, const scene_field *inp
 
 /* ---- derived fields in the catalogue --------------------------------------------------------------------------- */
 
-static bool keep_fault(session_catalogue_field *field, const base_error *error)
+static bool store_fault(session_catalogue_field *field, const base_error *error)
 {
     if (field->fault) return true;
     field->fault = base_calloc(1, sizeof *field->fault);
@@ -191,7 +192,7 @@ static bool add_to_mesh(const char *scene_path, const scene *scene, int number, 
     if (!field)
         field = session_catalogue_add(mesh, derived->name, is_vector ? 3 : 1, is_of_cells ? INSITU_CELL : INSITU_VERTEX,
                                       number);
-    return field && (!error.status || keep_fault(field, &error));
+    return field && (!error.status || store_fault(field, &error));
 }
 
 static bool name_in_catalogue(const scene *scene, const char *scene_path, session_catalogue *catalogue)
@@ -205,7 +206,7 @@ static bool name_in_catalogue(const scene *scene, const char *scene_path, sessio
 
 /* ---- derived fields of this rank's meshes ---------------------------------------------------------------------- */
 
-static bool is_sound(const session_catalogue_field *field)
+static bool is_faultless(const session_catalogue_field *field)
 {
     return field->derived >= 0 && !field->fault;
 }
@@ -216,7 +217,7 @@ static bool are_fields_named(const session_catalogue_mesh *all, const session_me
     for (int f = 0; f < mesh->field_count; f++) found += mesh->fields[f].is_derived;
     for (int f = 0; f < all->field_count; f++) {
         const session_catalogue_field *field = &all->fields[f];
-        if (!is_sound(field)) continue;
+        if (!is_faultless(field)) continue;
         const int at = session_find_field(mesh, field->name);
         if (at < 0 || !mesh->fields[at].is_derived || mesh->fields[at].given.centring != field->centring ||
             mesh->fields[at].given.component_count != field->component_count)
@@ -232,7 +233,7 @@ static bool name_on_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
     session_drop_derived(mesh);
     for (int f = 0; f < all->field_count; f++) {
         const session_catalogue_field *field = &all->fields[f];
-        if (!is_sound(field)) continue;
+        if (!is_faultless(field)) continue;
         session_field *own = session_add_field(mesh, field->name);
         if (!own) return false;
         own->given.component_count = field->component_count;

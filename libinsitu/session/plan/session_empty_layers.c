@@ -91,7 +91,7 @@ static int list_layers(const session_plan *plan, layer_window *window)
     return window->next;
 }
 
-static const scene_field *field_of(const planned_layer *layer)
+static const scene_field *find_layer_field(const planned_layer *layer)
 {
     if (layer->isosurface) return &layer->isosurface->field;
     return layer->volume ? &layer->volume->field : &layer->surface->threshold.field;
@@ -99,52 +99,53 @@ static const scene_field *field_of(const planned_layer *layer)
 
 /* ---- ranges ---------------------------------------------------------------------------------------------------- */
 
-static void take(double low, double high, field_range *range)
+static void widen_range(double low, double high, field_range *range)
 {
     range->low = fmin(range->low, low);
     range->minus_high = fmin(range->minus_high, -high);
 }
 
 /* Takes the range at the root of the tree, which contains all visible values. */
-static void take_root(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
+static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
     const mmbvh_ranges root = session_scalar_ranges(mesh, scalar);
-    take((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
+    widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
 /* Widens the range by the values of cells of this kind, which are computed if necessary. */
-static void take_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
-                        field_range *range)
+static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
+                             field_range *range)
 {
     double low, high;
     session_scalar_extent(mesh, scalar, threads, kind, &low, &high);
-    take(low, high, range);
+    widen_range(low, high, range);
 }
 
-static void take_faces(const session_mesh *mesh, const scene_surface *surface, field_range *range)
+static void add_face_range(const session_mesh *mesh, const scene_surface *surface, field_range *range)
 {
     const session_outer *outer =
         scene_field_is_on(&surface->on, mesh->name) ? session_find_outer(mesh, &surface->threshold) : NULL;
-    if (outer && outer->face_count > 0) take(0, 0, range);
+    if (outer && outer->face_count > 0) widen_range(0, 0, range);
 }
 
-static field_range own_range(const session_meshes *meshes, const planned_layer *layer, int threads, bool of_all_cells)
+static field_range find_own_range(const session_meshes *meshes, const planned_layer *layer, int threads,
+                                  bool of_all_cells)
 {
     field_range range = no_range;
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
         if (!mesh->is_given) continue;
-        session_scalar *scalar = session_find_scalar(mesh, field_of(layer));
+        session_scalar *scalar = session_find_scalar(mesh, find_layer_field(layer));
         if (layer->surface && !of_all_cells)
-            take_faces(mesh, layer->surface, &range);
+            add_face_range(mesh, layer->surface, &range);
         else if (scalar && layer->isosurface && mesh->has_shells_alone)
             /* shells are in no tree, so their values are read */
-            take_extent(mesh, scalar, threads, SESSION_SEEN, &range);
+            add_extent_range(mesh, scalar, threads, SESSION_SEEN, &range);
         else if (scalar && of_all_cells)
-            take_extent(mesh, scalar, threads, SESSION_SOLID, &range);
+            add_extent_range(mesh, scalar, threads, SESSION_SOLID, &range);
         else if (scalar)
-            take_root(mesh, scalar, &range);
+            add_root_range(mesh, scalar, &range);
     }
     return range;
 }
@@ -167,7 +168,7 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
     lows[last + 2] = -news->telling;
     for (int i = 0; i < window->count && !error->status; i++) {
         planned_layer *layer = &window->layers[i];
-        if (!of_all_cells || layer->is_news) layer->range = own_range(meshes, layer, team->threads, of_all_cells);
+        if (!of_all_cells || layer->is_news) layer->range = find_own_range(meshes, layer, team->threads, of_all_cells);
     }
     for (int i = 0; i < window->count; i++) {
         lows[2 * i] = window->layers[i].range.low;
@@ -185,7 +186,7 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 
 /* Returns the identity of the layer's warning. In a sweep over isovalues each picture has one isovalue, whose number is
  * that in the file. */
-static session_warning warning_of(const planned_layer *layer, int value)
+static session_warning make_warning(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
                                       : layer->volume   ? WARNING_TRANSPARENT
@@ -217,28 +218,28 @@ static field_range least_of_trees(const field_range *range)
     return (field_range){range->low < low ? nextafter(low, -INFINITY) : low, range->minus_high};
 }
 
-static int value_count(const planned_layer *layer)
+static int count_values(const planned_layer *layer)
 {
     return layer->isosurface ? layer->isosurface->value_count : 1;
 }
 
 /* Returns whether the layer, or its isovalue number `value`, shows no value of the range. */
-static bool shows_nothing(const planned_layer *layer, int value, const field_range *range)
+static bool is_layer_empty(const planned_layer *layer, int value, const field_range *range)
 {
     if (layer->isosurface) return is_outside(layer->isosurface->values[value], range);
     return layer->volume ? is_transparent(layer->volume, range) : layer->is_empty;
 }
 
-static bool find_news(const session_report *report, layer_window *window)
+static bool find_new_warnings(const session_report *report, layer_window *window)
 {
     bool is_any = false;
     for (int i = 0; i < window->count; i++) {
         planned_layer *layer = &window->layers[i];
         layer->is_empty = layer->range.low > -layer->range.minus_high;
         layer->range = least_of_trees(&layer->range);
-        for (int v = 0; v < value_count(layer); v++) {
-            const session_warning warning = warning_of(layer, v);
-            if (shows_nothing(layer, v, &layer->range) && !session_is_warned(report, &warning)) layer->is_news = true;
+        for (int v = 0; v < count_values(layer); v++) {
+            const session_warning warning = make_warning(layer, v);
+            if (is_layer_empty(layer, v, &layer->range) && !session_is_warned(report, &warning)) layer->is_news = true;
         }
         is_any = is_any || layer->is_news;
     }
@@ -249,7 +250,7 @@ static bool find_news(const session_report *report, layer_window *window)
 
 static void warn_of_value(session_report *report, const planned_layer *layer, int value, bool holds)
 {
-    const session_warning warning = warning_of(layer, value);
+    const session_warning warning = make_warning(layer, value);
     const double low = layer->range.low, high = -layer->range.minus_high, at = layer->isosurface->values[value];
     session_warn(report, &warning, holds,
                  "image \"%s\": the isosurface of \"%s\" at %g is empty: the field goes from %g to %g%s",
@@ -259,7 +260,7 @@ static void warn_of_value(session_report *report, const planned_layer *layer, in
 
 static void warn_of_volume(session_report *report, const planned_layer *layer, bool holds)
 {
-    const session_warning warning = warning_of(layer, 0);
+    const session_warning warning = make_warning(layer, 0);
     session_warn(report, &warning, holds,
                  "image \"%s\": the volume of \"%s\" shows nothing: the field goes from %g to %g, where its opacity is "
                  "0; check its range and opacity",
@@ -268,7 +269,7 @@ static void warn_of_volume(session_report *report, const planned_layer *layer, b
 
 static void warn_of_threshold(session_report *report, const planned_layer *layer, bool holds)
 {
-    const session_warning warning = warning_of(layer, 0);
+    const session_warning warning = make_warning(layer, 0);
     const scene_threshold *threshold = &layer->surface->threshold;
     session_warn(report, &warning, holds,
                  "image \"%s\": a surface is empty: no cell is within its threshold, from %g to %g of \"%s\", which "
@@ -281,8 +282,8 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {
     const bool has_values = layer->range.low <= -layer->range.minus_high || !layer->is_news;
-    for (int v = 0; v < value_count(layer); v++) {
-        const bool holds = has_values && shows_nothing(layer, v, &layer->range);
+    for (int v = 0; v < count_values(layer); v++) {
+        const bool holds = has_values && is_layer_empty(layer, v, &layer->range);
         if (layer->isosurface) warn_of_value(report, layer, v, holds);
         if (layer->volume) warn_of_volume(report, layer, holds);
         if (layer->surface) warn_of_threshold(report, layer, holds);
@@ -301,7 +302,8 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
         layer_window window = {.first = first};
         if (count) list_layers(plan, &window);
         status = reduce_ranges(meshes, team, &window, false, &news, error);
-        if (!status && find_news(report, &window)) status = reduce_ranges(meshes, team, &window, true, &news, error);
+        if (!status && find_new_warnings(report, &window))
+            status = reduce_ranges(meshes, team, &window, true, &news, error);
         for (int i = 0; i < window.count && !status; i++) warn_of_layer(report, &window.layers[i]);
     }
     if (!status && news.telling)

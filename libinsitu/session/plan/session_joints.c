@@ -11,7 +11,7 @@ typedef struct join_wish {
     int derived;
 } join_wish;
 
-static bool is_member(const session_catalogue_mesh *mesh, const join_wish *wish)
+static bool is_joint_member(const session_catalogue_mesh *mesh, const join_wish *wish)
 {
     const scene_field *field = wish->field;
     if (!field) {
@@ -40,7 +40,7 @@ static session_joint *add_joint(session_catalogue *catalogue, uint64_t name, int
     return joints[catalogue->joint_count++] = joint;
 }
 
-static bool set_apart(session_catalogue *catalogue, session_catalogue_mesh *mesh)
+static bool add_joint_of_one(session_catalogue *catalogue, session_catalogue_mesh *mesh)
 {
     if (session_find_joint(catalogue, mesh->apart)) return true;
     session_joint *joint = add_joint(catalogue, mesh->apart, 1);
@@ -51,7 +51,7 @@ static bool set_apart(session_catalogue *catalogue, session_catalogue_mesh *mesh
 }
 
 /* Computes the name of the joint of all meshes of the wish that have no global ids, and adds the joint if it is new. */
-static bool join(session_catalogue *catalogue, const join_wish *wish, uint64_t *joined)
+static bool join_meshes(session_catalogue *catalogue, const join_wish *wish, uint64_t *joined)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     bool is_done = true;
@@ -59,9 +59,9 @@ static bool join(session_catalogue *catalogue, const join_wish *wish, uint64_t *
     *joined = 0;
     for (int m = 0; m < catalogue->mesh_count && is_done; m++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        if (!is_member(mesh, wish)) continue;
+        if (!is_joint_member(mesh, wish)) continue;
         if (mesh->apart) {
-            is_done = set_apart(catalogue, mesh);
+            is_done = add_joint_of_one(catalogue, mesh);
             continue;
         }
         session_hash_text(&hash, mesh->name);
@@ -72,7 +72,7 @@ static bool join(session_catalogue *catalogue, const join_wish *wish, uint64_t *
     if (session_find_joint(catalogue, *joined)) return true;
     session_joint *joint = add_joint(catalogue, *joined, count);
     for (int m = 0; m < catalogue->mesh_count && joint; m++)
-        if (!catalogue->meshes[m].apart && is_member(&catalogue->meshes[m], wish))
+        if (!catalogue->meshes[m].apart && is_joint_member(&catalogue->meshes[m], wish))
             joint->meshes[joint->count++] = &catalogue->meshes[m];
     return joint != NULL;
 }
@@ -81,20 +81,20 @@ static bool join_field(session_catalogue *catalogue, scene_field *field)
 {
     const join_wish wish = {field, -1};
     field->joined = 0;
-    return !field->name || join(catalogue, &wish, &field->joined);
+    return !field->name || join_meshes(catalogue, &wish, &field->joined);
 }
 
 static bool join_derived(session_catalogue *catalogue, scene *scene, int number)
 {
     scene_derived *derived = &scene->derived[number];
     const join_wish wish = {NULL, number};
-    bool is_done = join(catalogue, &wish, &derived->joined);
+    bool is_done = join_meshes(catalogue, &wish, &derived->joined);
     for (int k = 0; k < derived->input_count && is_done; k++) is_done = join_field(catalogue, &derived->inputs[k]);
     return is_done;
 }
 
 /* Adds each mesh with global ids as a joint by itself. Stores in each part whether any block of its mesh is refined. */
-static void find_apart(session_catalogue *catalogue, const session_meshes *meshes)
+static void add_joints_of_one(session_catalogue *catalogue, const session_meshes *meshes)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
@@ -133,7 +133,7 @@ void session_join_meshes(scene *scene, session_catalogue *catalogue, session_mes
     bool is_done = true;
     if (catalogue->are_joined) return;
     session_drop_joints(catalogue);
-    find_apart(catalogue, meshes);
+    add_joints_of_one(catalogue, meshes);
     for (int i = 0; i < scene->image_count && is_done; i++)
         if (scene->images[i].variant.view == 0) is_done = join_image(catalogue, &scene->images[i]);
     for (int i = 0; i < scene->derived_count && is_done; i++) is_done = join_derived(catalogue, scene, i);

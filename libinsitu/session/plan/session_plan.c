@@ -55,7 +55,7 @@ static insitu_status refuse_fault(const base_error *fault, base_error *error)
 
 /* Returns the fault of a mesh on which the layer is drawn, because a field that seems to be on no mesh may be on the
  * faulty one. NULL if there is none. */
-static const base_error *find_hidden(const session_plan_basis *basis, const scene_field *field)
+static const base_error *find_hidden_fault(const session_plan_basis *basis, const scene_field *field)
 {
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
@@ -64,7 +64,7 @@ static const base_error *find_hidden(const session_plan_basis *basis, const scen
     return NULL;
 }
 
-static bool is_anywhere(const session_catalogue *catalogue, const char *name)
+static bool is_on_any_mesh(const session_catalogue *catalogue, const char *name)
 {
     for (int m = 0; m < catalogue->mesh_count; m++)
         if (session_catalogue_find(&catalogue->meshes[m], name)) return true;
@@ -72,7 +72,7 @@ static bool is_anywhere(const session_catalogue *catalogue, const char *name)
 }
 
 /* Writes "did you mean" and the most similar field name; "" if none is similar. */
-static void word_meant(const session_catalogue *catalogue, const char *name, char words[300])
+static void write_suggestion(const session_catalogue *catalogue, const char *name, char words[300])
 {
     const char *candidates[256];
     int count = 0;
@@ -85,7 +85,7 @@ static void word_meant(const session_catalogue *catalogue, const char *name, cha
 }
 
 /* Refuses a derived field that exists on no mesh, and names the input that no mesh has. */
-static insitu_status refuse_sources(const session_plan_basis *basis, const scene_field *field, base_error *error)
+static insitu_status refuse_missing_input(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
     const int number = session_find_derived(basis->scene, field->name);
@@ -93,10 +93,11 @@ static insitu_status refuse_sources(const session_plan_basis *basis, const scene
     if (!derived) return INSITU_OK;
     for (int k = 0; k < derived->input_count; k++) {
         const scene_field *input = &derived->inputs[k];
-        if (is_anywhere(basis->catalogue, input->name)) continue;
-        if (refuse_fault(find_hidden(basis, input), error) || refuse_sources(basis, input, error)) return error->status;
+        if (is_on_any_mesh(basis->catalogue, input->name)) continue;
+        if (refuse_fault(find_hidden_fault(basis, input), error) || refuse_missing_input(basis, input, error))
+            return error->status;
         list_fields(basis->catalogue, names);
-        word_meant(basis->catalogue, input->name, meant);
+        write_suggestion(basis->catalogue, input->name, meant);
         return base_fail(error, INSITU_ERROR_FIELD,
                          "%s:%d: fields.%s: no mesh has the field \"%s\"%s, of which it is made; there are: %s",
                          basis->scene_path, derived->line, derived->name, input->name, meant, names);
@@ -107,13 +108,13 @@ static insitu_status refuse_sources(const session_plan_basis *basis, const scene
                      basis->scene_path, derived->line, derived->name, names);
 }
 
-static insitu_status refuse_missing(const session_plan_basis *basis, const scene_field *field, base_error *error)
+static insitu_status refuse_missing_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
-    if (refuse_fault(find_hidden(basis, field), error)) return error->status;
-    if (refuse_sources(basis, field, error)) return error->status;
+    if (refuse_fault(find_hidden_fault(basis, field), error)) return error->status;
+    if (refuse_missing_input(basis, field, error)) return error->status;
     list_fields(basis->catalogue, names);
-    word_meant(basis->catalogue, field->name, meant);
+    write_suggestion(basis->catalogue, field->name, meant);
     return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"%s; there are: %s",
                      basis->scene_path, field->line, field->name, meant, names);
 }
@@ -165,7 +166,7 @@ static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_
 }
 
 /* Returns the mesh's field if the layer is drawn on the mesh, else NULL. */
-static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
+static const session_catalogue_field *find_drawn_field(const session_catalogue_mesh *mesh, const scene_field *field)
 {
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
@@ -183,7 +184,7 @@ static insitu_status check_field(const session_plan_basis *basis, const scene_fi
         is_there = is_there || session_catalogue_find(mesh, field->name);
         if (shown) status = check_on_mesh(basis, field, mesh, shown, error);
     }
-    return is_there || status ? status : refuse_missing(basis, field, error);
+    return is_there || status ? status : refuse_missing_field(basis, field, error);
 }
 
 static insitu_status check_layer_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
@@ -205,7 +206,7 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const bool is_grey = mesh->first_rank >= 0 && find_shown(mesh, &layer->field) &&
+        const bool is_grey = mesh->first_rank >= 0 && find_drawn_field(mesh, &layer->field) &&
                              !session_catalogue_find(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
@@ -224,7 +225,7 @@ static insitu_status check_lines(const session_plan_basis *basis, const scene_li
 
 static insitu_status check_surface(const session_plan_basis *basis, const scene_surface *layer, base_error *error)
 {
-    insitu_status status = refuse_fault(find_hidden(basis, &layer->on), error);
+    insitu_status status = refuse_fault(find_hidden_fault(basis, &layer->on), error);
     for (int i = 0; i < layer->on.mesh_count && !status; i++)
         status = check_named_mesh(basis, &layer->on, layer->on.meshes[i], error);
     if (!status && layer->threshold.is_given) status = check_field(basis, &layer->threshold.field, &layer->on, error);
@@ -257,7 +258,7 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const session_catalogue_field *shown = find_shown(mesh, field);
+        const session_catalogue_field *shown = find_drawn_field(mesh, field);
         const bool is_wished = shown && session_is_recentred(field, shown->centring, mesh->is_refined);
         session_joint *joint =
             is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joined)) : NULL;
@@ -285,7 +286,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* Returns the number of multiples of the interval up to the time. A time within rounding of a multiple counts, because
  * steps of 0.1 add up to slightly less. */
-static double intervals(double time, double interval)
+static double count_intervals(double time, double interval)
 {
     const double count = time / interval;
     return floor(count + 1e-9 * fmax(1, fabs(count)));
@@ -294,13 +295,14 @@ static double intervals(double time, double interval)
 static bool is_due(const scene_image *image, const session_moment *m)
 {
     if (image->every_time > 0)
-        return m->is_first || intervals(m->time, image->every_time) != intervals(m->last_time, image->every_time);
+        return m->is_first ||
+               count_intervals(m->time, image->every_time) != count_intervals(m->last_time, image->every_time);
     return image->every <= 1 || m->cycle % image->every == 0;
 }
 
 /* Returns whether any rank has cells, or any mesh has a fault. If not, fields are not required, and the picture is its
  * background. */
-static bool has_anything(const session_plan_basis *basis)
+static bool has_cells_or_faults(const session_plan_basis *basis)
 {
     return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
 }
@@ -309,7 +311,7 @@ session_sound_events session_check_event_fields(const session_plan_basis *basis,
 {
     const scene *scene = basis->scene;
     session_sound_events sound = {UINT64_MAX, UINT64_MAX};
-    if (!has_anything(basis)) return sound;
+    if (!has_cells_or_faults(basis)) return sound;
     for (int i = 0; i < scene->statistics_count; i++) {
         base_error own = {.status = INSITU_OK};
         if (!session_is_statistics_due(&scene->statistics[i], basis->moment->cycle)) continue;
@@ -354,7 +356,7 @@ static void warn_of_no_lines(const session_catalogue *catalogue, const scene_ima
 {
     for (int m = 0; m < catalogue->mesh_count && lines->is_given && !lines->is_of_colours; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const bool is_on = on->name ? find_shown(mesh, on) != NULL : scene_field_is_on(on, mesh->name);
+        const bool is_on = on->name ? find_drawn_field(mesh, on) != NULL : scene_field_is_on(on, mesh->name);
         const session_warning warning = {WARNING_NO_LINES, image->name, mesh->name, lines->field.line};
         session_warn(report, &warning,
                      mesh->first_rank >= 0 && is_on && !session_catalogue_find(mesh, lines->field.name),
@@ -371,7 +373,7 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
     bool is_empty = true;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        if (mesh->first_rank < 0 || !find_shown(mesh, field)) continue;
+        if (mesh->first_rank < 0 || !find_drawn_field(mesh, field)) continue;
         is_empty = is_empty && mesh->has_shells_alone;
         if (!name) name = mesh->name;
     }
@@ -391,7 +393,7 @@ static void warn_of_apart(const session_catalogue *catalogue, const scene_image 
     int count = 0;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const session_catalogue_field *shown = mesh->first_rank >= 0 ? find_shown(mesh, field) : NULL;
+        const session_catalogue_field *shown = mesh->first_rank >= 0 ? find_drawn_field(mesh, field) : NULL;
         if (!shown || !session_is_recentred(field, shown->centring, mesh->is_refined)) continue;
         if (mesh->apart && !name) name = mesh->name;
         count++;
@@ -431,7 +433,7 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
 static bool can_be_drawn(const session_plan_basis *basis, const scene_image *image, session_report *report,
                          base_error *refusal)
 {
-    if (!has_anything(basis)) return true;
+    if (!has_cells_or_faults(basis)) return true;
     if (check_image(basis, image, refusal) != INSITU_OK) return false;
     warn_of_grey_layers(basis->catalogue, image, report);
     warn_of_fields(basis->catalogue, image, report);
@@ -460,7 +462,7 @@ static bool is_for_nobody(const session_plan_basis *basis, const scene_image *im
 
 /* Selects the images that are due and can be drawn. Views of an orbit share their layers, and so the warnings about
  * these. */
-static void take_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
+static void select_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
     bool is_well = false;
     for (int i = 0; i < basis->scene->image_count; i++) {
@@ -478,8 +480,8 @@ static void take_images(const session_plan_basis *basis, session_report *report,
 
 static void warn_of_no_cells(const session_plan_basis *basis, bool are_images_due, session_report *report)
 {
-    session_warn(report, &(session_warning){WARNING_NO_CELLS, NULL, NULL, 0}, are_images_due && !has_anything(basis),
-                 "pictures show their background alone: %s",
+    session_warn(report, &(session_warning){WARNING_NO_CELLS, NULL, NULL, 0},
+                 are_images_due && !has_cells_or_faults(basis), "pictures show their background alone: %s",
                  basis->catalogue->mesh_count ? "no mesh has cells on any rank but ghosts" : "no rank has set a mesh");
 }
 
@@ -489,7 +491,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     const size_t due = (size_t)session_count_due(basis->scene, basis->moment);
     const session_extent *extent = basis->extent;
     session_plan plan = {.images = base_calloc(due, sizeof *plan.images), .cell_count = extent->cell_count};
-    if (plan.images) take_images(basis, report, &plan);
+    if (plan.images) select_images(basis, report, &plan);
     warn_of_no_cells(basis, plan.image_count > 0, report);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);

@@ -45,14 +45,14 @@ enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 6 };
 static const uint64_t sign_bit = UINT64_C(1) << 63;
 
 /* Maps a value to an integer, preserving the order. */
-static uint64_t order_of(double value)
+static uint64_t order_from_value(double value)
 {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits & sign_bit ? ~bits : bits | sign_bit;
 }
 
-static double value_of(uint64_t order)
+static double value_from_order(uint64_t order)
 {
     const uint64_t bits = order & sign_bit ? order & ~sign_bit : ~order;
     double value;
@@ -61,15 +61,15 @@ static double value_of(uint64_t order)
 }
 
 /* Returns the position of the lowest bit by which a pass counts. The last pass has 9 bits left. */
-static int shift_of(int pass)
+static int pass_shift(int pass)
 {
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
 /* Returns the mask of the bits that are known before a pass. */
-static uint64_t known_of(int pass)
+static uint64_t known_bits_mask(int pass)
 {
-    return pass ? ~UINT64_C(0) << shift_of(pass - 1) : 0;
+    return pass ? ~UINT64_C(0) << pass_shift(pass - 1) : 0;
 }
 
 /* This rank's values that the last pass has considered, unsorted; they are stored if there are at most MOST_KEPT. */
@@ -103,11 +103,11 @@ static void keep_value(uint64_t order, kept_values *kept)
  * for any. */
 static bool count_value(const digit_count *of, uint64_t order, int64_t counts[2 * DIGITS])
 {
-    const uint64_t known = known_of(of->pass);
+    const uint64_t known = known_bits_mask(of->pass);
     bool is_counted = false;
     for (int end = 0; end < 2; end++) {
         if ((order & known) != of->found[end]) continue;
-        counts[end * DIGITS + (int)((order & ~known) >> shift_of(of->pass))]++;
+        counts[end * DIGITS + (int)((order & ~known) >> pass_shift(of->pass))]++;
         is_counted = true;
     }
     return is_counted;
@@ -127,15 +127,15 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
             const fetch_range range = fetch_any_cell_range(g, &field, cell);
             const double middle = 0.5 * range.low + 0.5 * range.high;
             if (!range.is_finite || (of->is_positive && !(middle > 0))) continue;
-            const uint64_t order = order_of(middle);
+            const uint64_t order = order_from_value(middle);
             if (count_value(of, order, counts) && of->pass >= FIRST_KEPT) keep_value(order, &of->kept);
         }
         region_leave();
     }
 }
 
-static void count_own(const session_meshes *meshes, const session_team *team, const scene_field *field, digit_count *of,
-                      int64_t counts[2 * DIGITS])
+static void count_own_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                             digit_count *of, int64_t counts[2 * DIGITS])
 {
     for (int i = 0; i < of->kept.count && of->is_kept; i++) count_value(of, of->kept.orders[i], counts);
     if (of->is_kept) return;
@@ -152,7 +152,7 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                                   digit_count *of, int64_t counts[2 * DIGITS], base_error *error)
 {
     memset(counts, 0, 2 * DIGITS * sizeof *counts);
-    count_own(meshes, team, field, of, counts);
+    count_own_digits(meshes, team, field, of, counts);
     return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, counts, 2 * DIGITS, MPI_INT64_T, MPI_SUM, team->comm),
                        "MPI_Allreduce");
 }
@@ -179,11 +179,11 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
         for (int end = 0; end < 2; end++) {
             if (of.pass == 0) ranks[end] = (int64_t)fmax(ceil(percent[end] / 100 * (double)total), 1) - 1;
             const int digit = find_digit(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
-            of.found[end] |= (uint64_t)digit << shift_of(of.pass);
+            of.found[end] |= (uint64_t)digit << pass_shift(of.pass);
         }
     }
-    *low = total ? value_of(of.found[0]) : INFINITY;
-    *high = total ? value_of(of.found[1]) : -INFINITY;
+    *low = total ? value_from_order(of.found[0]) : INFINITY;
+    *high = total ? value_from_order(of.found[1]) : -INFINITY;
     return INSITU_OK;
 }
 

@@ -4,7 +4,7 @@
  * of them are on other ranks than its cells.
  *
  * Sums depend on their order, so sums of ranks' partial sums would depend on the partition. Instead all ranks' single
- * values are gathered, and summed so that their order does not matter (sum_of()).
+ * values are gathered, and summed so that their order does not matter (sum_values()).
  *
  *     local:  groups of equal vertices (session_vertex_groups.h) -> values of the cells around each -> means
  *     shared: groups inside another rank's box  --(key, values)-->  their home (session_homes.h): merged by key, means
@@ -86,7 +86,7 @@ static void groups_free(value_groups *groups)
  * rest of it, which is exact too, is rounded to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate
  * floating-point summation, 2008, section 3). What remains of 100 values after that is below 2^-85 of the largest
  * value, so the sum is rounded correctly unless it is that close to a tie. */
-static double sum_of(const double *values, int64_t count, double largest, double scale)
+static double sum_values(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
     int exponent, bits;
@@ -102,7 +102,7 @@ static double sum_of(const double *values, int64_t count, double largest, double
 }
 
 /* Returns the mean. The mean of equal values is exactly their value. */
-static double mean_of(const double *values, int64_t count)
+static double find_mean(const double *values, int64_t count)
 {
     double largest = 0;
     bool are_equal = count > 0;
@@ -112,7 +112,7 @@ static double mean_of(const double *values, int64_t count)
     }
     if (are_equal) return values[0];
     const double scale = largest > 0x1p900 ? 0x1p-128 : 1; /* prevents overflow of the sum */
-    return count ? sum_of(values, count, largest, scale) / (double)count / scale : NAN;
+    return count ? sum_values(values, count, largest, scale) / (double)count / scale : NAN;
 }
 
 static void groups_average(value_groups *groups, int threads)
@@ -122,7 +122,7 @@ static void groups_average(value_groups *groups, int threads)
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t g = 0; g < groups->count; g++)
-            groups->means[g] = mean_of(groups->values + groups->starts[g], groups->ends[g] - groups->starts[g]);
+            groups->means[g] = find_mean(groups->values + groups->starts[g], groups->ends[g] - groups->starts[g]);
         region_leave();
     }
 }
@@ -151,7 +151,7 @@ static void add_group(cell_groups *list, int64_t group)
 }
 
 /* Adds a value to a group, unless the group has values of faces. is_shared: several threads may do so at once. */
-static inline void give_value(value_groups *values, int64_t group, double value, bool is_shared)
+static inline void add_value(value_groups *values, int64_t group, double value, bool is_shared)
 {
     int64_t at;
     if (values->are_faces[group]) return;
@@ -165,7 +165,7 @@ static inline void give_value(value_groups *values, int64_t group, double value,
 
 /* Adds the cell's value to the group of each of its vertices, once per group; or, for values at corners, adds each
  * finite one to the group of its corner. */
-static void give_cell(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
+static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
     const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
@@ -180,29 +180,29 @@ static void give_cell(recentring *r, int part, int64_t cell, cell_groups *list, 
             continue;
         }
         value = grid_field_value(field, vertex);
-        if (isfinite(value)) give_value(&r->values, of_vertex[vertex], value, is_shared);
+        if (isfinite(value)) add_value(&r->values, of_vertex[vertex], value, is_shared);
     }
-    for (int64_t i = 0; i < list->count; i++) give_value(&r->values, list->groups[i], value, is_shared);
+    for (int64_t i = 0; i < list->count; i++) add_value(&r->values, list->groups[i], value, is_shared);
 }
 
 /* Adds the finite values at the vertices of drawn cells to their groups, each vertex once. */
-static void give_vertices(recentring *r, int part)
+static void add_vertex_values(recentring *r, int part)
 {
     const grid_field *field = &r->parts[part].field;
     const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
     for (int64_t v = 0; v < r->list.items[part]->cells.vertex_count; v++) {
         const double value = of_vertex[v] < 0 ? NAN : grid_field_value(field, v);
-        if (isfinite(value)) give_value(&r->values, of_vertex[v], value, false);
+        if (isfinite(value)) add_value(&r->values, of_vertex[v], value, false);
     }
 }
 
 /* Adds the values of a part's cells to the groups. Returns false if memory ran out. */
-static bool give_values(recentring *r, int part, int threads)
+static bool add_part_values(recentring *r, int part, int threads)
 {
     const grid *g = &r->list.items[part]->cells;
     bool is_lost = false;
     if (r->parts[part].is_of_vertices) {
-        give_vertices(r, part);
+        add_vertex_values(r, part);
         return true;
     }
 #pragma omp parallel num_threads(session_region_threads(threads, g->cell_count)) reduction(|| : is_lost)
@@ -212,7 +212,7 @@ static bool give_values(recentring *r, int part, int threads)
         const bool is_shared = omp_get_num_threads() > 1;
 #pragma omp for schedule(static) nowait
         for (int64_t cell = 0; cell < g->cell_count; cell++)
-            if (!grid_is_ghost(g, cell)) give_cell(r, part, cell, &list, is_shared);
+            if (!grid_is_ghost(g, cell)) add_cell_values(r, part, cell, &list, is_shared);
         is_lost = list.is_lost;
         base_free(list.groups);
         region_leave();
@@ -221,7 +221,7 @@ static bool give_values(recentring *r, int part, int threads)
 }
 
 /* Replaces the values in groups of boundary faces by the values of these faces alone. */
-static void give_face_values(const session_patch_values *faces, value_groups *values)
+static void set_face_values(const session_patch_values *faces, value_groups *values)
 {
     for (int64_t i = 0; i < faces->count; i++) {
         const int64_t group = faces->groups[i];
@@ -271,7 +271,7 @@ static void find_face_values(const recentring *r, session_patch_values *faces, b
 }
 
 /* Allocates memory for the values of cells and, if there are any, of faces. */
-static bool make_values(recentring *r, const session_patch_values *faces)
+static bool allocate_values(recentring *r, const session_patch_values *faces)
 {
     const session_vertex_groups *groups = &r->joint->groups;
     int64_t count = 0, added = 0;
@@ -286,20 +286,20 @@ static bool make_values(recentring *r, const session_patch_values *faces)
         r->starts[g] = groups->starts[g] + added;
     }
     if (!groups_create(&r->values, groups->count, r->starts)) return false;
-    for (int i = 0; i < r->list.count; i++) give_face_values(&faces[i], &r->values);
+    for (int i = 0; i < r->list.count; i++) set_face_values(&faces[i], &r->values);
     return true;
 }
 
 /* Computes the means over this rank's cells and faces. */
-static void average_own(recentring *r, const session_team *team, base_error *error)
+static void average_own_values(recentring *r, const session_team *team, base_error *error)
 {
     const int count = r->list.count;
     session_patch_values *faces = base_calloc((size_t)count + 1, sizeof *faces);
     bool is_done = faces && update_groups(r, team->ranks);
     if (is_done) find_face_values(r, faces, error);
-    if (is_done && !error->status) is_done = make_values(r, faces);
+    if (is_done && !error->status) is_done = allocate_values(r, faces);
     for (int i = 0; i < count && is_done && !error->status; i++)
-        if (r->parts[i].scalar) is_done = give_values(r, i, team->threads);
+        if (r->parts[i].scalar) is_done = add_part_values(r, i, team->threads);
     if (!is_done) session_no_memory(error, r->joint->groups.count * 100, "values recentred to vertices");
     if (!error->status) groups_average(&r->values, team->threads);
     for (int i = 0; i < count && faces; i++) session_patch_values_free(&faces[i]);
@@ -449,7 +449,7 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
 
 /* Copies the means to the vertices. A corner whose own value is not finite keeps it, so that its cell is not drawn, as
  * without means. For cell values this is checked elsewhere (grid_field.own). */
-static void spread_means(const recentring *r, int part, int threads)
+static void copy_means_to_vertices(const recentring *r, int part, int threads)
 {
     const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
     const int64_t count = r->list.items[part]->cells.vertex_count;
@@ -486,7 +486,7 @@ static insitu_status constrain_hanging(const recentring *r, const session_team *
 }
 
 /* Allocates memory for the recentred values of each part. */
-static void make_room(const recentring *r, base_error *error)
+static void allocate_recentred(const recentring *r, base_error *error)
 {
     for (int i = 0; i < r->list.count; i++) {
         session_scalar *scalar = r->parts[i].scalar;
@@ -497,12 +497,12 @@ static void make_room(const recentring *r, base_error *error)
     }
 }
 
-static void keep_means(const recentring *r, int threads)
+static void store_means(const recentring *r, int threads)
 {
     for (int i = 0; i < r->list.count; i++) {
         session_scalar *scalar = r->parts[i].scalar;
         if (!scalar) continue;
-        spread_means(r, i, threads);
+        copy_means_to_vertices(r, i, threads);
         scalar->are_values_stale = false;
         scalar->made++;
         scalar->of_places = r->joint->places;
@@ -510,8 +510,8 @@ static void keep_means(const recentring *r, int threads)
     }
 }
 
-static insitu_status recentre(const session_recentring *item, const session_meshes *meshes, const session_team *team,
-                              base_error *error)
+static insitu_status recentre_field(const session_recentring *item, const session_meshes *meshes,
+                                    const session_team *team, base_error *error)
 {
     recentring r = {0};
     insitu_status status = INSITU_OK;
@@ -519,11 +519,11 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     if (!is_listed) session_no_memory(error, item->joint->count * 64LL, "values recentred to vertices");
     if (item->joint->count > 1 || is_constrained(item))
         status = session_update_borders(item->joint, &r.list, team, error);
-    if (!status && is_listed) average_own(&r, team, error);
-    if (!status && !error->status) make_room(&r, error);
+    if (!status && is_listed) average_own_values(&r, team, error);
+    if (!status && !error->status) allocate_recentred(&r, error);
     if (!status) status = team->ranks > 1 ? merge_shared(team, &r, error) : session_agree(team->comm, error);
     if (!status && is_constrained(item)) status = constrain_hanging(&r, team, error);
-    if (!status && !error->status) keep_means(&r, team->threads);
+    if (!status && !error->status) store_means(&r, team->threads);
     groups_free(&r.values);
     base_free(r.starts);
     base_free(r.parts);
@@ -567,6 +567,6 @@ insitu_status session_recentre(const session_recentring *items, int count, int *
     insitu_status status =
         session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
     for (int i = 0; i < count && !status; i++)
-        if (stale[i]) status = recentre(&items[i], meshes, team, error);
+        if (stale[i]) status = recentre_field(&items[i], meshes, team, error);
     return status;
 }

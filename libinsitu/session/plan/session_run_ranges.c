@@ -51,8 +51,8 @@ static int count_layers(const scene_image *image)
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
 /* Stores an error about the file. what: "read" or "written". */
-static insitu_status fail(const session_image_ranges *ranges, const char *what, const file_failure *failure,
-                          base_error *error)
+static insitu_status fail_at_file(const session_image_ranges *ranges, const char *what, const file_failure *failure,
+                                  base_error *error)
 {
     return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, failure->reason);
@@ -70,7 +70,7 @@ static char *file_path(const scene_image *image)
     return path;
 }
 
-static void take_line(session_image_ranges *ranges, const session_run_range *line, int component, const char *field)
+static void store_line(session_image_ranges *ranges, const session_run_range *line, int component, const char *field)
 {
     for (int i = 0; i < ranges->count; i++) {
         session_run_range *layer = &ranges->items[i];
@@ -90,7 +90,7 @@ static bool read_line(session_image_ranges *ranges, const char *text)
     if (sscanf(text, "%15s %d %d %lf %lf %n", kind, &line.number, &component, &line.low, &line.high, &at) < 5)
         return false;
     if (at == 0 || !(isfinite(line.low) && isfinite(line.high) && line.low <= line.high)) return false;
-    take_line(ranges, &line, component, text + at);
+    store_line(ranges, &line, component, text + at);
     return true;
 }
 
@@ -119,7 +119,7 @@ static insitu_status read_ranges(session_image_ranges *ranges, base_error *error
     file_content content;
     file_failure failure;
     if (!file_read_own(ranges->path, MOST_BYTES, &content, &failure))
-        return failure.is_missing ? INSITU_OK : fail(ranges, "read", &failure, error);
+        return failure.is_missing ? INSITU_OK : fail_at_file(ranges, "read", &failure, error);
     insitu_status status = INSITU_OK;
     if (c_numbers_begin(&numbers)) {
         status = read_lines(ranges, &content, error);
@@ -148,7 +148,7 @@ insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error 
     if (!ranges->is_changed) return INSITU_OK;
     file_failure failure;
     if (!text_file_replace(ranges->path, write_lines, ranges, &failure))
-        return fail(ranges, "written", &failure, error);
+        return fail_at_file(ranges, "written", &failure, error);
     ranges->is_changed = false;
     return INSITU_OK;
 }

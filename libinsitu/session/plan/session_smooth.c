@@ -101,7 +101,7 @@ bool session_is_smooth(const session_plan *plan)
 
 /* Sets the entries of the vertices of a part's crossed cells to 0, and the others to -1. Returns the number of vertices
  * set to 0. */
-static int64_t mark_vertices(const mmbvh_selection *crossed, session_sum_part *part)
+static int64_t mark_crossed_vertices(const mmbvh_selection *crossed, session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
     int64_t count = 0, vertex;
@@ -146,15 +146,15 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
         if (!part->entries) return session_no_memory(error, vertices * 4, "gradients at vertices");
         if (mmbvh_select(&part->mesh->cells, &wish, 1, &options, &work->crossed[i], &unusable, error))
             return error->status;
-        most += mark_vertices(&work->crossed[i], part);
+        most += mark_crossed_vertices(&work->crossed[i], part);
     }
     if (!add_own_keys(item, most, sums)) session_no_memory(error, most * 40, "gradients at vertices");
     return error->status;
 }
 
 /* Prepares this rank's data for the item. */
-static insitu_status begin_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
-                                base_error *error)
+static insitu_status create_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
+                                 base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, item->mesh->name);
     const size_t room = (size_t)parts.count + 1;
@@ -203,7 +203,7 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
 
 /* Stores the gradients of a part's vertices. They are scaled to the size of the scene, because their length does not
  * matter, so that no unit of the values makes them too small for a float. */
-static bool keep_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
+static bool store_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
 {
     const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);
     const session_gradient_bounds bounds = {1, sums->bounds.sharpness};
@@ -226,14 +226,14 @@ static bool keep_gradients(const session_vertex_sums *sums, session_sum_part *pa
     return true;
 }
 
-static insitu_status smooth(const smooth_item *item, const session_meshes *meshes, const session_team *team,
-                            const session_extent *extent, base_error *error)
+static insitu_status find_item_gradients(const smooth_item *item, const session_meshes *meshes,
+                                         const session_team *team, const session_extent *extent, base_error *error)
 {
     smooth_work work = {0};
-    if (!error->status) begin_work(item, meshes, team->threads, &work, error);
+    if (!error->status) create_work(item, meshes, team->threads, &work, error);
     const insitu_status status = session_find_sums(&item->mesh->homes, team, extent, &work.sums, error);
     for (int i = 0; i < work.sums.part_count && !status && !error->status; i++)
-        if (!keep_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
+        if (!store_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
             session_no_memory(error, work.sums.own_count * 12, "gradients at vertices");
     free_work(&work);
     return status;
@@ -246,7 +246,8 @@ insitu_status session_smooth(const session_plan *plan, const session_catalogue *
     if (!session_is_smooth(plan)) return INSITU_OK;
     if (!list_items(plan, catalogue, &items)) session_no_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
-    for (int i = 0; i < items.count && !status; i++) status = smooth(&items.items[i], meshes, team, extent, error);
+    for (int i = 0; i < items.count && !status; i++)
+        status = find_item_gradients(&items.items[i], meshes, team, extent, error);
     items_free(&items);
     return status;
 }

@@ -16,23 +16,23 @@ typedef struct surface_wish {
 } surface_wish;
 
 /* Returns the part's outer faces for the wish; NULL if it has none. */
-static session_outer *find_own(const session_mesh *part, const surface_wish *wish)
+static session_outer *find_own_outer(const session_mesh *part, const surface_wish *wish)
 {
     return part->is_given ? session_find_outer(part, wish->threshold) : NULL;
 }
 
 /* Returns whether faces are out of date on some of this rank's parts. */
-static bool is_stale(const session_meshes *meshes, const surface_wish *wish)
+static bool are_faces_stale(const session_meshes *meshes, const surface_wish *wish)
 {
     const session_parts parts = session_find_parts(meshes, wish->mesh->name);
     for (int i = 0; i < parts.count; i++) {
-        const session_outer *outer = find_own(parts.items[i], wish);
+        const session_outer *outer = find_own_outer(parts.items[i], wish);
         if (outer && session_is_outer_stale(parts.items[i], outer)) return true;
     }
     return false;
 }
 
-static bool is_same(const scene_threshold *a, const scene_threshold *b)
+static bool is_same_threshold(const scene_threshold *a, const scene_threshold *b)
 {
     if (!a->is_given || !b->is_given) return a->is_given == b->is_given;
     return strcmp(a->field.name, b->field.name) == 0 && a->field.component == b->field.component && a->low == b->low &&
@@ -42,14 +42,15 @@ static bool is_same(const scene_threshold *a, const scene_threshold *b)
 static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
 {
     for (int i = 0; i < count; i++)
-        if (wishes[i].mesh == wish->mesh && is_same(wishes[i].threshold, wish->threshold)) return count;
+        if (wishes[i].mesh == wish->mesh && is_same_threshold(wishes[i].threshold, wish->threshold)) return count;
     wishes[count] = *wish;
     return count + 1;
 }
 
 /* Lists the outer surfaces of an image's layers with the meshes on which they are drawn. Returns the new length of the
  * list. */
-static int list_image(const scene_image *image, const session_catalogue *catalogue, surface_wish *wishes, int count)
+static int list_image_wishes(const scene_image *image, const session_catalogue *catalogue, surface_wish *wishes,
+                             int count)
 {
     static const scene_threshold none = {.is_given = false};
     for (int m = 0; m < catalogue->mesh_count; m++) {
@@ -72,19 +73,19 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
 {
     int count = 0;
     for (int i = 0; i < plan->image_count; i++)
-        if (plan->images[i]->variant.view == 0) count = list_image(plan->images[i], catalogue, wishes, count);
+        if (plan->images[i]->variant.view == 0) count = list_image_wishes(plan->images[i], catalogue, wishes, count);
     return count;
 }
 
 /* Determines which of the faces are out of date on some rank. If a rank has failed before, all return its error.
  * Collective. */
-static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
-                                const session_team *team, int *stale, bool *is_any, base_error *error)
+static insitu_status find_stale_wishes(const session_meshes *meshes, const surface_wish *wishes, int count,
+                                       const session_team *team, int *stale, bool *is_any, base_error *error)
 {
     /* entries: whether this rank has failed; whether it has faces that are out of date */
     int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
-        stale[i] = is_stale(meshes, &wishes[i]);
+        stale[i] = are_faces_stale(meshes, &wishes[i]);
         own[1] = own[1] || stale[i];
     }
     insitu_status status =
@@ -103,7 +104,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
     session_face_part *of = base_calloc((size_t)parts.count + 1, sizeof *of);
     if (!of) session_no_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
     for (int i = 0; i < parts.count && of; i++) {
-        session_outer *outer = find_own(parts.items[i], wish);
+        session_outer *outer = find_own_outer(parts.items[i], wish);
         if (outer) of[count++] = (session_face_part){parts.items[i], outer, NULL};
     }
     insitu_status status = session_agree(team->comm, error);
@@ -115,7 +116,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
 }
 
 /* Prepares a mesh of outer faces for drawing. Each of its cells has one drawn face. */
-static insitu_status make_ready(const session_mesh *mesh, session_outer *outer, base_error *error)
+static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer *outer, base_error *error)
 {
     const insitu_status status = session_make_outer_mesh(mesh, outer, error);
     if (status) return status;
@@ -131,7 +132,7 @@ static void make_meshes(const session_meshes *meshes, base_error *error)
         const session_mesh *mesh = meshes->items[i];
         for (int k = 0; k < mesh->outer_count && !error->status; k++)
             if (mesh->outers[k]->is_wanted && mesh->outers[k]->are_faces_known)
-                make_ready(mesh, mesh->outers[k], error);
+                prepare_outer_mesh(mesh, mesh->outers[k], error);
     }
 }
 
@@ -146,7 +147,7 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
         session_no_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
     else
         count = list_wishes(plan, catalogue, wishes);
-    insitu_status status = find_stale(meshes, wishes, count, team, stale, &is_any, error);
+    insitu_status status = find_stale_wishes(meshes, wishes, count, team, stale, &is_any, error);
     for (int i = 0; i < count && !status && is_any; i++)
         if (stale[i]) status = find_faces(meshes, &wishes[i], team, error);
     base_free(stale);

@@ -25,14 +25,14 @@ static const double constant_linear = 1e-6, constant_scaled = 1e-3;
  * eighth of the share, 1.3e-4 of the map. */
 static const double straight = 1e-3;
 
-static double larger_end(double low, double high)
+static double larger_magnitude(double low, double high)
 {
     return fmax(fabs(low), fabs(high));
 }
 
-static render_scale scale_of(const scene_colour_map *map, double low, double high)
+static render_scale make_scale(const scene_colour_map *map, double low, double high)
 {
-    if (high - low < straight * larger_end(low, high)) return RENDER_LINEAR;
+    if (high - low < straight * larger_magnitude(low, high)) return RENDER_LINEAR;
     switch (map->scale) {
     case SCENE_LINEAR: return RENDER_LINEAR;
     case SCENE_LOG: return RENDER_LOG;
@@ -43,12 +43,12 @@ static render_scale scale_of(const scene_colour_map *map, double low, double hig
 
 bool session_is_too_narrow(double low, double high)
 {
-    return low < high && high - low < fmax(least_of_data * larger_end(low, high), FLT_MIN);
+    return low < high && high - low < fmax(least_of_data * larger_magnitude(low, high), FLT_MIN);
 }
 
 /* Extends a range so that it is not empty, and positive for a logarithmic scale; a constant field gets its value in the
  * middle. Returns whether there is a single value, and stores it in *constant. */
-static bool make_usable(const scene_colour_map *map, double *low, double *high, double *constant)
+static bool make_range_usable(const scene_colour_map *map, double *low, double *high, double *constant)
 {
     const bool is_log = map->scale == SCENE_LOG;
     if (is_log && *high > 0 && *low > *high) *low = *high / 1000;
@@ -57,12 +57,12 @@ static bool make_usable(const scene_colour_map *map, double *low, double *high, 
         *high = is_log ? 10 : 1;
     }
     if (is_log) *low = fmax(*low, *high / widest_log);
-    const double narrowest = map->range.is_fixed ? 0 : least_of_data * larger_end(*low, *high);
+    const double narrowest = map->range.is_fixed ? 0 : least_of_data * larger_magnitude(*low, *high);
     const double width = *high - *low;
     const bool is_constant = width <= 0 || width < narrowest;
     if (!is_constant && width >= FLT_MIN) return false;
     const double share = map->scale == SCENE_LINEAR ? constant_linear : constant_scaled;
-    const double least = fmax(is_constant ? share * larger_end(*low, *high) : 0, FLT_MIN);
+    const double least = fmax(is_constant ? share * larger_magnitude(*low, *high) : 0, FLT_MIN);
     const double middle = 0.5 * *low + 0.5 * *high;
     *constant = middle;
     *low = middle - 0.5 * least;
@@ -72,7 +72,7 @@ static bool make_usable(const scene_colour_map *map, double *low, double *high, 
 
 /* ---- colours --------------------------------------------------------------------------------------------------- */
 
-static double value_at(const render_transfer *t, double place)
+static double scale_value_at(const render_transfer *t, double place)
 {
     if (t->scale == RENDER_LINEAR) return t->low + place * (t->high - t->low);
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -102,8 +102,8 @@ static bool expand_table(const scene_colour_map *map, session_transfer *out)
     if (map->has_below) copy_colour(entry, map->outside[0]), entry += 3;
     for (int i = 0; i < inner; i++, entry += 3) copy_colour(entry, map->colours + 3 * (size_t)(i / repeated));
     if (map->has_above) copy_colour(entry, map->outside[1]);
-    const double low = value_at(t, map->has_below ? -1.0 / (inner - 1) : 0);
-    const double high = value_at(t, map->has_above ? 1 + 1.0 / (inner - 1) : 1);
+    const double low = scale_value_at(t, map->has_below ? -1.0 / (inner - 1) : 0);
+    const double high = scale_value_at(t, map->has_above ? 1 + 1.0 / (inner - 1) : 1);
     if (map->has_below) t->low = low;
     if (map->has_above) t->high = high;
     t->colours = out->table;
@@ -118,7 +118,7 @@ static void set_opacity(const scene_volume *volume, double half_diagonal, sessio
     render_transfer *t = &out->transfer;
     t->opacity_count = volume->opacity_count;
     for (int i = 0; i < t->opacity_count; i++) {
-        out->opacity_values[i] = value_at(t, volume->opacity[i].at);
+        out->opacity_values[i] = scale_value_at(t, volume->opacity[i].at);
         out->opacities[i] = volume->opacity[i].opacity;
     }
     t->opacity_values = out->opacity_values;
@@ -133,13 +133,13 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
                            const scene_volume *volume, session_transfer *out)
 {
     double constant = 0;
-    const bool is_constant = make_usable(map, &low, &high, &constant);
+    const bool is_constant = make_range_usable(map, &low, &high, &constant);
     *out = (session_transfer){.transfer = {.low = low,
                                            .high = high,
                                            .colour_count = map->count,
                                            .colours = map->colours,
-                                           .scale = scale_of(map, low, high),
-                                           .threshold = fmax(map->threshold, larger_end(low, high) / widest_log),
+                                           .scale = make_scale(map, low, high),
+                                           .threshold = fmax(map->threshold, larger_magnitude(low, high) / widest_log),
                                            .unit_distance = 1},
                               .low = low,
                               .high = high,

@@ -31,12 +31,12 @@ static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit 
 /* Minimum number of cells of a measurement from which costs are extrapolated. */
 enum { MEASURED_CELLS = 10000 };
 
-static double rate_of(double measured, double first, int threads)
+static double estimate_rate(double measured, double first, int threads)
 {
     return measured > 0 ? measured : first / threads;
 }
 
-static void measure(double *rate, double seconds, int64_t cells)
+static void update_rate(double *rate, double seconds, int64_t cells)
 {
     if (cells < MEASURED_CELLS) return;
     const double now = seconds / (double)cells;
@@ -52,12 +52,12 @@ typedef struct tree_update {
     insitu_report *report;
 } tree_update;
 
-static mmbvh_options options_of(const tree_update *u)
+static mmbvh_options make_tree_options(const tree_update *u)
 {
     return (mmbvh_options){.threads = u->threads};
 }
 
-static session_scalar *own_scalar(const session_mesh *mesh)
+static session_scalar *find_own_scalar(const session_mesh *mesh)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
         if (mesh->scalars[i].has_own_ranges) return &mesh->scalars[i];
@@ -67,7 +67,7 @@ static session_scalar *own_scalar(const session_mesh *mesh)
 /* Returns the scalar whose ranges are in the nodes; if there is none, the first scalar that is drawn. */
 static session_scalar *choose_own_scalar(session_mesh *mesh)
 {
-    session_scalar *own = own_scalar(mesh);
+    session_scalar *own = find_own_scalar(mesh);
     for (int i = 0; i < mesh->scalar_count && !own; i++)
         if (mesh->scalars[i].wants_ranges) own = &mesh->scalars[i];
     if (!own->has_own_ranges) {
@@ -80,7 +80,7 @@ static session_scalar *choose_own_scalar(session_mesh *mesh)
 }
 
 /* Returns half the surface area of the mesh's bounding box. */
-static double surface_of(const session_mesh *mesh)
+static double half_box_area(const session_mesh *mesh)
 {
     double d[3];
     for (int axis = 0; axis < 3; axis++) d[axis] = mesh->upper[axis] - mesh->lower[axis];
@@ -99,7 +99,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
                                 base_error *error)
 {
     const double start = omp_get_wtime();
-    mmbvh_options options = options_of(u);
+    mmbvh_options options = make_tree_options(u);
     options.selection = selection;
     options.builder = choose_builder(mesh, selection);
     session_drop_tree(mesh);
@@ -115,11 +115,11 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     own->are_ranges_stale = false;
     mesh->is_partial = selection != NULL;
     mesh->are_bounds_partial = false;
-    mesh->built_surface = surface_of(mesh);
+    mesh->built_surface = half_box_area(mesh);
     if (!selection) mesh->full_tree_steps = 0;
     if (!selection) own->unusable = mesh->tree.unusable_cells;
     const double seconds = omp_get_wtime() - start;
-    measure(&u->trees->rates.build, seconds, mesh->tree.cell_count);
+    update_rate(&u->trees->rates.build, seconds, mesh->tree.cell_count);
     u->report->build_ms += 1e3 * seconds;
     return INSITU_OK;
 }
@@ -143,7 +143,7 @@ static insitu_status refit_scalar(session_mesh *mesh, session_scalar *scalar, co
 
 static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base_error *error)
 {
-    const mmbvh_options options = options_of(u);
+    const mmbvh_options options = make_tree_options(u);
     choose_own_scalar(mesh);
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
@@ -155,7 +155,7 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
                              session_scalar_name(mesh, scalar));
         scalar->are_ranges_stale = false;
         const double seconds = omp_get_wtime() - start;
-        measure(&u->trees->rates.refit, seconds, mesh->tree.cell_count);
+        update_rate(&u->trees->rates.refit, seconds, mesh->tree.cell_count);
         u->report->refit_ms += 1e3 * seconds;
     }
     return INSITU_OK;
@@ -173,7 +173,7 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
  * that were not refitted count as unchanged. */
 static bool is_decayed(const session_mesh *mesh)
 {
-    const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * surface_of(mesh);
+    const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * half_box_area(mesh);
     return tree > worst_cost * built;
 }
 
@@ -194,7 +194,7 @@ static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
 static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool all, base_error *error)
 {
     const double start = omp_get_wtime();
-    const mmbvh_options options = options_of(u);
+    const mmbvh_options options = make_tree_options(u);
     bool is_whole;
     mmbvh_visible *visible = base_alloc((size_t)(mesh->scalar_count + 1) * sizeof *visible);
     if (!visible) return session_no_memory(error, (mesh->scalar_count + 1) * (int64_t)sizeof *visible, "visible nodes");
@@ -225,7 +225,7 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
 
 /* ---- the tree over all parts ----------------------------------------------------------------------------------- */
 
-static uint64_t parts_key(const session_meshes *meshes, int *count)
+static uint64_t hash_parts(const session_meshes *meshes, int *count)
 {
     uint64_t key = 0;
     *count = 0;
@@ -261,7 +261,7 @@ static void fill_boxes(const session_meshes *meshes, float *boxes, int count)
 static insitu_status update_parent(const tree_update *u, const session_meshes *meshes, base_error *error)
 {
     int count = 0;
-    const uint64_t key = parts_key(meshes, &count);
+    const uint64_t key = hash_parts(meshes, &count);
     if (!u->trees->is_parent_stale && key == u->trees->parent_key) return INSITU_OK;
     mmbvh_free(&u->trees->parent);
     u->trees->parent_key = key;
@@ -272,7 +272,7 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
     float *boxes = base_alloc((size_t)count * 8 * sizeof *boxes);
     if (!boxes) return session_no_memory(error, count * 32, "boxes of meshes");
     fill_boxes(meshes, boxes, count);
-    const mmbvh_options options = options_of(u);
+    const mmbvh_options options = make_tree_options(u);
     const insitu_status status = mmbvh_build_boxes(boxes, boxes + 3 * (size_t)count, boxes + 6 * (size_t)count, count,
                                                    &options, &u->trees->parent, error);
     base_free(boxes);
@@ -283,9 +283,9 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
 
 /* ---- choice between full and partial trees --------------------------------------------------------------------- */
 
-static double full_price(const tree_update *u, const session_mesh *mesh)
+static double full_tree_cost(const tree_update *u, const session_mesh *mesh)
 {
-    return rate_of(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
+    return estimate_rate(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
 }
 
 /* Returns whether there is a full tree over the current cells. */
@@ -294,11 +294,11 @@ static bool has_full_tree(const session_mesh *mesh)
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
 }
 
-static bool wants_partial(const tree_update *u, const session_mesh *mesh, uint64_t *key)
+static bool prefers_partial_tree(const tree_update *u, const session_mesh *mesh, uint64_t *key)
 {
     if (u->choice == SCENE_TREE_FULL || !session_find_candidates(mesh, key)) return false;
     if (u->choice == SCENE_TREE_PARTIAL) return true;
-    return !has_full_tree(mesh) && mesh->rent < full_price(u, mesh);
+    return !has_full_tree(mesh) && mesh->rent < full_tree_cost(u, mesh);
 }
 
 static bool has_new_values(const session_mesh *mesh)
@@ -324,7 +324,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     insitu_status status = session_select_candidates(mesh, u->threads, &selection, error);
     if (status) return status;
     const double seconds = omp_get_wtime() - start;
-    measure(&u->trees->rates.select, seconds, mesh->given.cell_count);
+    update_rate(&u->trees->rates.select, seconds, mesh->given.cell_count);
     u->report->build_ms += 1e3 * seconds;
     /* The full tree is built if the partial one would cost at least half of its price. */
     const bool is_forced = u->choice == SCENE_TREE_PARTIAL;
@@ -333,7 +333,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     mmbvh_selection_free(&selection);
     mesh->candidates_key = key;
     mesh->rent += omp_get_wtime() - start;
-    mesh->rent -= rate_of(u->trees->rates.refit, first_rates.refit, u->threads) * (double)mesh->drawn_count;
+    mesh->rent -= estimate_rate(u->trees->rates.refit, first_rates.refit, u->threads) * (double)mesh->drawn_count;
     return status;
 }
 
@@ -349,7 +349,7 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
 {
     uint64_t key;
     insitu_status status;
-    if (wants_partial(u, mesh, &key)) {
+    if (prefers_partial_tree(u, mesh, &key)) {
         status = update_partial(u, mesh, key, error);
         if (!status) status = refit_ranges(u, mesh, error);
     } else {
@@ -384,7 +384,7 @@ static void merge_threads(const tree_update *u, const thread_update *each, base_
     u->report->refit_ms += refit_ms;
 }
 
-static insitu_status update_apart(const tree_update *u, session_mesh *const *parts, int count, base_error *error)
+static insitu_status update_on_threads(const tree_update *u, session_mesh *const *parts, int count, base_error *error)
 {
     thread_update *each = base_calloc((size_t)u->threads, sizeof *each);
     if (!each) return session_no_memory(error, u->threads * (int64_t)sizeof *each, "trees of blocks");
@@ -421,7 +421,7 @@ static int list_needed(const session_meshes *meshes, session_mesh **parts)
     return count;
 }
 
-static insitu_status update_all(const tree_update *u, const session_meshes *meshes, base_error *error)
+static insitu_status update_all_trees(const tree_update *u, const session_meshes *meshes, base_error *error)
 {
     const int count = list_needed(meshes, NULL);
     session_mesh **parts = base_alloc((size_t)(count + 1) * sizeof *parts);
@@ -429,7 +429,7 @@ static insitu_status update_all(const tree_update *u, const session_meshes *mesh
     list_needed(meshes, parts);
     insitu_status status = INSITU_OK;
     if (u->threads > 1 && count >= PARTS_A_THREAD * u->threads)
-        status = update_apart(u, parts, count, error);
+        status = update_on_threads(u, parts, count, error);
     else
         for (int i = 0; i < count && !status; i++) status = update_tree(u, parts[i], error);
     base_free(parts);
@@ -441,7 +441,7 @@ insitu_status session_update_trees(session_trees *trees, const session_meshes *m
                                    base_error *error)
 {
     const tree_update update = {trees, space, choice, team->threads, report};
-    return update_all(&update, meshes, error);
+    return update_all_trees(&update, meshes, error);
 }
 
 void session_trees_free(session_trees *trees)

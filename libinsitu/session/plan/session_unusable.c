@@ -25,7 +25,7 @@ static const scene_field *next_field(field_walk *walk)
     }
 }
 
-static int64_t unusable_of(const session_mesh *mesh, const scene_field *field)
+static int64_t count_unusable(const session_mesh *mesh, const scene_field *field)
 {
     const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
     return scalar ? scalar->unusable : 0;
@@ -35,7 +35,7 @@ static int64_t unusable_of_parts(const session_meshes *meshes, const char *name,
 {
     const session_parts parts = session_find_parts(meshes, name);
     int64_t sum = 0;
-    for (int i = 0; i < parts.count; i++) sum += unusable_of(parts.items[i], field);
+    for (int i = 0; i < parts.count; i++) sum += count_unusable(parts.items[i], field);
     return sum;
 }
 
@@ -46,7 +46,7 @@ uint64_t session_unusable_key(const session_plan *plan, const session_meshes *me
     for (const scene_field *field; (field = next_field(&walk)) != NULL;)
         for (int m = 0; m < meshes->count; m++) {
             const session_mesh *mesh = meshes->items[m];
-            const int64_t count = unusable_of(mesh, field);
+            const int64_t count = count_unusable(mesh, field);
             if (!count) continue;
             if (!key) key = SESSION_HASH_BEGIN;
             session_hash_text(&key, mesh->name);
@@ -56,7 +56,7 @@ uint64_t session_unusable_key(const session_plan *plan, const session_meshes *me
     return key;
 }
 
-static void warn(const char *mesh, const scene_field *field, int64_t count, session_report *report)
+static void warn_of_count(const char *mesh, const scene_field *field, int64_t count, session_report *report)
 {
     session_warn(report, &(session_warning){WARNING_UNUSABLE, field->name, mesh, field->component}, count > 0,
                  "mesh \"%s\": %lld cells are not drawn: values of field \"%s\" are not finite", mesh, (long long)count,
@@ -76,7 +76,8 @@ insitu_status session_warn_of_unusable(const session_plan *plan, const session_c
         for (int m = 0; m < mesh_count; m++) counts[m] = unusable_of_parts(meshes, catalogue->meshes[m].name, field);
         const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
         status = session_mpi(error, code, "MPI_Allreduce");
-        for (int m = 0; m < mesh_count && !status; m++) warn(catalogue->meshes[m].name, field, counts[m], report);
+        for (int m = 0; m < mesh_count && !status; m++)
+            warn_of_count(catalogue->meshes[m].name, field, counts[m], report);
     }
     base_free(counts);
     if (!status) report->unusable_key = session_unusable_key(plan, meshes);

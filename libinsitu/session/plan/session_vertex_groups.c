@@ -83,8 +83,8 @@ static void place_of_vertex(const groups_basis *basis, const session_vertex_grou
     grid_vertex(&basis->parts[part]->cells, number - groups->firsts[part], place);
 }
 
-static void place_of(const groups_basis *basis, const session_vertex_groups *groups, const int64_t *one_vertex,
-                     int64_t group, double place[3])
+static void find_group_position(const groups_basis *basis, const session_vertex_groups *groups,
+                                const int64_t *one_vertex, int64_t group, double place[3])
 {
     if (one_vertex)
         place_of_vertex(basis, groups, one_vertex[group], place);
@@ -99,7 +99,7 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
     for (int64_t group = 0; group < out->count; group++) {
         const session_key *key = &out->keys.keys[group];
         double place[1][3];
-        place_of(basis, out, one_vertex, group, place[0]);
+        find_group_position(basis, out, one_vertex, group, place[0]);
         home[group] = -1;
         if (!session_homes_share(basis->homes, place[0])) continue;
         home[group] =

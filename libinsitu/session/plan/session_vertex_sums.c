@@ -58,7 +58,7 @@ static bool key_all_vertices(session_vertex_sums *sums)
     return true;
 }
 
-static int64_t vertex_count(const session_vertex_sums *sums)
+static int64_t count_vertices(const session_vertex_sums *sums)
 {
     int64_t count = 0;
     for (int i = 0; i < sums->part_count; i++) count += sums->parts[i].mesh->cells.vertex_count;
@@ -69,7 +69,7 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
 {
     sums->are_all = true;
     if (key_all_vertices(sums)) return INSITU_OK;
-    return session_no_memory(error, vertex_count(sums) * 60, "gradients at vertices");
+    return session_no_memory(error, count_vertices(sums) * 60, "gradients at vertices");
 }
 
 /* ---- requests to other ranks ----------------------------------------------------------------------------------- */
@@ -93,7 +93,7 @@ static void mail_free(sums_mail *mail)
 }
 
 /* Finds the position of one vertex for each of this rank's keys. */
-static bool find_places(const session_vertex_sums *sums, double (**out)[3])
+static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3])
 {
     *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
     if (!*out) return false;
@@ -166,11 +166,11 @@ static bool read_questions(const session_mail *in, session_vertex_sums *sums, in
     return sums->keys.count <= INT32_MAX;
 }
 
-static insitu_status ask(const session_homes *homes, const session_team *team, session_vertex_sums *sums,
-                         sums_mail *mail, base_error *error)
+static insitu_status send_questions(const session_homes *homes, const session_team *team, session_vertex_sums *sums,
+                                    sums_mail *mail, base_error *error)
 {
     if (!error->status &&
-        (!find_places(sums, &mail->places) ||
+        (!find_key_positions(sums, &mail->places) ||
          !write_questions(sums, team, homes, (const double(*)[3])mail->places, &mail->questions, &mail->own_numbers)))
         session_no_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
     const insitu_status status =
@@ -209,7 +209,8 @@ static void add_answers(const sums_mail *mail, session_vertex_sums *sums)
     }
 }
 
-static insitu_status answer(const session_team *team, session_vertex_sums *sums, sums_mail *mail, base_error *error)
+static insitu_status send_answers(const session_team *team, session_vertex_sums *sums, sums_mail *mail,
+                                  base_error *error)
 {
     if (!error->status && !write_answers(sums, mail, team->ranks, &mail->answers))
         session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
@@ -267,7 +268,8 @@ static bool find_all_entries(const session_vertex_sums *sums, int threads)
     return true;
 }
 
-static session_gradient_basis basis_of(const session_vertex_sums *sums, const session_sum_part *part, int threads)
+static session_gradient_basis make_gradient_basis(const session_vertex_sums *sums, const session_sum_part *part,
+                                                  int threads)
 {
     return (session_gradient_basis){&part->mesh->cells, part->fields, sums->field_count, part->of_shells, part->entries,
                                     sums->length,       threads};
@@ -282,7 +284,7 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
     for (int i = 0; i < sums->part_count && sums->keys.count; i++) {
         session_gradient_bounds own;
         const session_sum_part *part = &sums->parts[i];
-        const session_gradient_basis basis = basis_of(sums, part, threads);
+        const session_gradient_basis basis = make_gradient_basis(sums, part, threads);
         if (!session_list_cells(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own)) return false;
         sums->bounds.rise = fmax(sums->bounds.rise, own.rise);
         sums->bounds.sharpness = fmax(sums->bounds.sharpness, own.sharpness);
@@ -296,7 +298,7 @@ static bool add_sums(const session_vertex_sums *sums, const session_cell_list *l
     bool is_done = owners != NULL;
     for (int i = 0; i < sums->part_count && is_done; i++) {
         if (!lists[i].count) continue;
-        const session_gradient_basis basis = basis_of(sums, &sums->parts[i], threads);
+        const session_gradient_basis basis = make_gradient_basis(sums, &sums->parts[i], threads);
         is_done = session_add_gradients(&basis, &lists[i], &sums->bounds, owners, sums->sums);
     }
     base_free(owners);
@@ -330,9 +332,9 @@ insitu_status session_find_sums(const session_homes *homes, const session_team *
     session_cell_list *lists = base_calloc((size_t)sums->part_count, sizeof *lists);
     frexp(extent->half_diagonal, &exponent);
     sums->length = ldexp(1, exponent);
-    if (team->ranks > 1) status = ask(homes, team, sums, &mail, error);
+    if (team->ranks > 1) status = send_questions(homes, team, sums, &mail, error);
     if (!status) status = make_sums(team, sums, lists, error);
-    if (!status && team->ranks > 1) status = answer(team, sums, &mail, error);
+    if (!status && team->ranks > 1) status = send_answers(team, sums, &mail, error);
     for (int i = 0; i < sums->part_count && lists; i++) base_free(lists[i].cells);
     base_free(lists);
     mail_free(&mail);
