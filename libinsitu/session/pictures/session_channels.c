@@ -23,7 +23,7 @@ void session_free_channels(session_channels *channels)
 
 /* ---- frames -------------------------------------------------------------------------------------------------- */
 
-static void add_frame(session_frame *sum, const session_frame *frame)
+static void add_frame_statistics(session_frame *sum, const session_frame *frame)
 {
     sum->rays += frame->rays;
     sum->map_failures += frame->map_failures;
@@ -35,8 +35,8 @@ static void add_frame(session_frame *sum, const session_frame *frame)
     sum->schedule = frame->schedule;
 }
 
-static insitu_status draw_numbers(const session_frame_target *target, const render_job *job, render_paint paint,
-                                  float *rgba, session_frame *taken, base_error *error)
+static insitu_status draw_surface_numbers(const session_frame_target *target, const render_job *job, render_paint paint,
+                                          float *rgba, session_frame *taken, base_error *error)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     const session_frame_target bare = {target->comm, target->compositing, nothing, target->fragment_limit};
@@ -45,13 +45,13 @@ static insitu_status draw_numbers(const session_frame_target *target, const rend
     session_frame frame = {0};
     numbers.paint = paint;
     const insitu_status status = session_draw_frame(&bare, &numbers, &out, &frame, error);
-    add_frame(taken, &frame);
+    add_frame_statistics(taken, &frame);
     return status;
 }
 
 /* Returns the job without clips, volumes and transparency, so that only its surfaces are visible. `surfaces` is a
  * buffer for the job's surfaces. */
-static render_job opaque_job(const render_job *job, render_surface_layer *surfaces)
+static render_job make_opaque_job(const render_job *job, render_surface_layer *surfaces)
 {
     render_job out = *job;
     for (int i = 0; i < job->surface_count; i++) {
@@ -73,7 +73,7 @@ typedef struct surface_numbers {
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
 } surface_numbers;
 
-static void add_numbers(surface_numbers *n, int layer, int surfaces)
+static void add_surface_numbers(surface_numbers *n, int layer, int surfaces)
 {
     for (int i = 0; i < surfaces && n->count < RENDER_MAX_ISOVALUES; i++) {
         n->layer[n->count] = (float)layer;
@@ -87,16 +87,17 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
 {
     surface_numbers out = {0};
     for (int i = 0; i < image->isosurface_count; i++)
-        add_numbers(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
-    for (int i = 0; i < image->isosurface_count && has_shells; i++) add_numbers(&out, image->isosurfaces[i].number, 1);
-    for (int i = 0; i < image->surface_count; i++) add_numbers(&out, image->surfaces[i].number, 1);
+        add_surface_numbers(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
+    for (int i = 0; i < image->isosurface_count && has_shells; i++)
+        add_surface_numbers(&out, image->isosurfaces[i].number, 1);
+    for (int i = 0; i < image->surface_count; i++) add_surface_numbers(&out, image->surfaces[i].number, 1);
     for (int i = 0; i < image->slice_count; i++)
-        add_numbers(&out, image->slices[i].number, image->slices[i].plane_count);
+        add_surface_numbers(&out, image->slices[i].number, image->slices[i].plane_count);
     return out;
 }
 
 /* Converts the numbers of each pixel from (value, number of the isovalue, 0, opacity) to value, layer and surface. */
-static void name_surfaces(const scene_image *image, bool has_shells, float *values, int threads)
+static void convert_surface_numbers(const scene_image *image, bool has_shells, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image, has_shells);
     const int64_t pixels = (int64_t)image->width * image->height;
@@ -119,7 +120,7 @@ static void name_surfaces(const scene_image *image, bool has_shells, float *valu
     }
 }
 
-static void fill_items(session_channels *c)
+static void fill_channel_items(session_channels *c)
 {
     const insitu_channel items[SESSION_CHANNELS] = {{"N.X", c->normals, 4},      {"N.Y", c->normals + 1, 4},
                                                     {"N.Z", c->normals + 2, 4},  {"value", c->values, 4},
@@ -145,16 +146,16 @@ insitu_status session_draw_channels(const session_frame_target *target, const se
     if (!has_memory) session_no_memory(error, 2 * (int64_t)bytes, "the data of a picture");
     insitu_status status = session_agree(team->comm, error);
     if (!status) {
-        const render_job opaque = opaque_job(job, surfaces);
-        status = draw_numbers(target, &opaque, RENDER_NORMALS, out->normals, taken, error);
-        if (!status) status = draw_numbers(target, &opaque, RENDER_VALUES, out->values, taken, error);
+        const render_job opaque = make_opaque_job(job, surfaces);
+        status = draw_surface_numbers(target, &opaque, RENDER_NORMALS, out->normals, taken, error);
+        if (!status) status = draw_surface_numbers(target, &opaque, RENDER_VALUES, out->values, taken, error);
     }
     base_free(surfaces);
     if (!status && team->rank == 0) {
         int surfaces_given = image->isosurface_count + image->surface_count;
         for (int i = 0; i < image->slice_count; i++) surfaces_given += image->slices[i].plane_count;
-        name_surfaces(image, job->surface_count > surfaces_given, out->values, team->threads);
-        fill_items(out);
+        convert_surface_numbers(image, job->surface_count > surfaces_given, out->values, team->threads);
+        fill_channel_items(out);
     }
     return status;
 }

@@ -20,7 +20,7 @@ insitu_status session_begin_deep(deep_image *deep, const scene_image *image, bas
                      image->name, (long long)pixels);
 }
 
-static float depth_of(float t, const render_space *space)
+static float depth_from_parameter(float t, const render_space *space)
 {
     return (float)((double)t / space->scale + space->depth_origin);
 }
@@ -33,8 +33,8 @@ void session_finish_deep(deep_image *deep, const render_space *space, int thread
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t i = 0; i < deep->count; i++) {
-            deep->samples[i].z = depth_of(deep->samples[i].z, space);
-            deep->samples[i].z_back = depth_of(deep->samples[i].z_back, space);
+            deep->samples[i].z = depth_from_parameter(deep->samples[i].z, space);
+            deep->samples[i].z_back = depth_from_parameter(deep->samples[i].z_back, space);
         }
         region_leave();
     }

@@ -71,7 +71,7 @@ static insitu_status share_ranges(differing *d, base_error *error)
 
 /* Keeps only the ranks that are near enough to this rank's hits. Hits lie in this rank's box, so that the distance of
  * their samples from it is at most the largest sampling radius. */
-static void keep_near(differing *d)
+static void keep_near_ranks(differing *d)
 {
     const render_box *own = &d->boxes[d->rank];
     double reach = 0;
@@ -92,14 +92,14 @@ static insitu_status share_boxes(differing *d, base_error *error)
     const int doubles = sizeof own / sizeof(double);
     const insitu_status status = session_mpi(
         error, MPI_Allgather(&own, doubles, MPI_DOUBLE, d->boxes, doubles, MPI_DOUBLE, d->comm), "MPI_Allgather");
-    if (!status) keep_near(d);
+    if (!status) keep_near_ranks(d);
     return status;
 }
 
 /* ---- a round ------------------------------------------------------------------------------------------------- */
 
 /* Packs the requests of the round. Returns false if memory runs out. */
-static bool write_questions(differing *d, session_mail *out)
+static bool write_requests(differing *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
     out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
@@ -143,10 +143,10 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
 
 /* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next message exchange passes it
  * to all ranks. */
-static insitu_status ask_others(differing *d, base_error *error)
+static insitu_status exchange_round(differing *d, base_error *error)
 {
     session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};
-    if (!write_questions(d, &asked)) session_no_memory(error, d->count * 24, "samples of other ranks");
+    if (!write_requests(d, &asked)) session_no_memory(error, d->count * 24, "samples of other ranks");
     insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &asked, &questions, error);
     if (!status && !error->status && !write_answers(d, &questions, &answered, error))
         session_no_memory(error, questions.total * 16, "samples for other ranks");
@@ -181,21 +181,21 @@ static void light_round(const differing *d, fragment_list *fragments, base_error
         fragments->count = count;
 }
 
-static insitu_status differ_rounds(differing *d, fragment_list *fragments, base_error *error)
+static insitu_status run_rounds(differing *d, fragment_list *fragments, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int64_t round = 0; round < d->rounds && !status; round++) {
         const int64_t left = d->list->count - d->first;
         d->count = left < d->round_hits ? left : d->round_hits;
         if (!error->status) render_differences_sample(d->job, d->list->items + d->first, d->samples, d->count, error);
-        status = ask_others(d, error);
+        status = exchange_round(d, error);
         if (!status && !error->status) light_round(d, fragments, error);
         d->first += d->count;
     }
     return status;
 }
 
-static insitu_status differ(differing *d, fragment_list *fragments, base_error *error)
+static insitu_status compute_differences(differing *d, fragment_list *fragments, base_error *error)
 {
     const int64_t most = d->list->count < d->round_hits ? d->list->count : d->round_hits;
     d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
@@ -205,7 +205,7 @@ static insitu_status differ(differing *d, fragment_list *fragments, base_error *
         session_no_memory(error, most * 64, "normals by differences");
     insitu_status status = share_ranges(d, error);
     if (!status && d->rounds) status = share_boxes(d, error);
-    if (!status) status = differ_rounds(d, fragments, error);
+    if (!status) status = run_rounds(d, fragments, error);
     base_free(d->samples);
     base_free(d->boxes);
     base_free(d->near);
@@ -220,7 +220,7 @@ insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fra
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
     d.round_hits = session_mail_round(d.ranks, ROUND_HITS);
-    const insitu_status status = differ(&d, fragments, error);
+    const insitu_status status = compute_differences(&d, fragments, error);
     base_free(d.list->items);
     base_free(d.list->looks);
     *d.list = (render_waiting_list){0};

@@ -52,7 +52,7 @@ static void canvas_free(canvas *c, session_writer *writer)
     session_free_decorations(c->decorations);
 }
 
-static bool wants_depth(const session_drawing *d, const scene_image *image)
+static bool needs_depth(const session_drawing *d, const scene_image *image)
 {
     if (d->kept->is_on) return true;
     for (int i = 0; i < image->output_count; i++)
@@ -90,13 +90,13 @@ static void reserve_frame(const session_drawing *d, size_t bytes, canvas *c)
 static insitu_status canvas_create(const session_drawing *d, const scene_image *image, canvas *out, base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
-    const size_t bytes = pixels * (wants_depth(d, image) ? 5 : 4) * sizeof(float);
+    const size_t bytes = pixels * (needs_depth(d, image) ? 5 : 4) * sizeof(float);
     const bool is_summed = image->frames > 1 && !has_edges_alone(image);
     out->frame.width = out->samples.width = image->width;
     out->frame.height = out->samples.height = image->height;
     if (d->team->rank != 0) return INSITU_OK;
     reserve_frame(d, bytes, out);
-    if (wants_depth(d, image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
+    if (needs_depth(d, image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
     if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
     if (!out->frame.rgba || (is_summed && !out->sum))
         return session_no_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
@@ -224,7 +224,7 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .threads = d->team->threads};
 }
 
-static void report_frame(insitu_report *report, const session_frame *frame)
+static void add_frame_to_report(insitu_report *report, const session_frame *frame)
 {
     report->rays += frame->rays;
     report->map_failures += frame->map_failures;
@@ -261,7 +261,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     out->deep = b->deep;
     const insitu_status status = session_draw_frame(&b->target, job, out, &frame, error);
     out->deep = b->deep = NULL;
-    report_frame(&b->drawing->report->numbers, &frame);
+    add_frame_to_report(&b->drawing->report->numbers, &frame);
     if (!status && frame.overlaps > b->overlaps) b->overlaps = frame.overlaps;
     return status;
 }
@@ -300,11 +300,11 @@ static insitu_status draw_samples(frames_basis *b, const scene_image *image, ren
 
 /* Draws all frames of an image. A picture without volumes is drawn once through the pixels' centres, and then again
  * only at edges. With volumes the frame through the centres is used only for depth, and is not averaged. */
-static insitu_status draw_all(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
+static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
     unsigned char *pixels = NULL;
-    if (image->antialias == 1 || !(has_edges_alone(image) || wants_depth(b->drawing, image)))
+    if (image->antialias == 1 || !(has_edges_alone(image) || needs_depth(b->drawing, image)))
         return draw_samples(b, image, job, error);
     insitu_status status = draw_frame(b, job, &c->frame, error);
     if (!status && has_edges_alone(image)) status = share_edges(b, &pixels, error);
@@ -334,7 +334,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
                           0,
                           session_wants_deep(image) ? &canvas->deep : NULL};
     render_job job = make_job(d, image, view, layers);
-    const insitu_status status = draw_all(&basis, image, &job, error);
+    const insitu_status status = draw_all_frames(&basis, image, &job, error);
     if (status) return status;
     warn_of_overlaps(d->report, image, basis.overlaps);
     canvas_finish(canvas, image->frames, &view->space, d->team->threads);
@@ -342,19 +342,19 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     session_frame taken;
     const insitu_status drawn =
         session_draw_channels(&basis.target, d->team, image, &job, &canvas->channels, &taken, error);
-    report_frame(&d->report->numbers, &taken);
+    add_frame_to_report(&d->report->numbers, &taken);
     return drawn;
 }
 
 /* ---- outputs ------------------------------------------------------------------------------------------------- */
 
-static scene_moment moment_of(const session_drawing *d, const scene_image *image)
+static scene_moment make_moment(const session_drawing *d, const scene_image *image)
 {
     return scene_moment_of(image, d->cycle, d->report->numbers.time);
 }
 
 /* Passes the picture to the writer, which becomes the owner of its memory. Called on rank 0 only. */
-static void give_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
+static void queue_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
     session_files *files = base_calloc(1, sizeof *files);
     if (!files) {
@@ -366,7 +366,7 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     files->montages = d->montages;
     files->has_picture = true;
     files->image = *image;
-    files->moment = moment_of(d, image);
+    files->moment = make_moment(d, image);
     files->frame = c->frame;
     files->memory = c->memory;
     files->channels = c->channels;
@@ -389,7 +389,7 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
     const bool is_told_later = d->writes_behind && !d->kept->is_on && !ranges;
     base_error later = {.status = INSITU_OK};
     if (d->team->rank == 0) {
-        give_picture(d, image, c, is_told_later ? &later : error);
+        queue_picture(d, image, c, is_told_later ? &later : error);
         session_writer_note(d->writer, d->cycle, &later);
         if (ranges) session_write_run_ranges(ranges, error);
         d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
@@ -414,11 +414,12 @@ static void warn_of_words(const session_drawing *d, const scene_image *image, co
 
 /* Computes the decorations of an image. Collective if the outline consists of boxes of meshes or ranks. An error that
  * occurs only on rank 0 is shared in the next phase. */
-static insitu_status decorate(const session_drawing *d, const scene_image *image, const session_view *view,
-                              const session_layers *layers, canvas *out, base_error *error)
+static insitu_status make_image_decorations(const session_drawing *d, const scene_image *image,
+                                            const session_view *view, const session_layers *layers, canvas *out,
+                                            base_error *error)
 {
     session_outline outline;
-    const scene_moment moment = moment_of(d, image);
+    const scene_moment moment = make_moment(d, image);
     const insitu_status status =
         session_find_outline(&image->decorations, d->catalogue, d->meshes, &d->space->extent, d->team, &outline, error);
     if (status) return status;
@@ -452,7 +453,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (status) return status;
     if (!error->status) canvas_create(d, image, &canvas, error);
     status = session_make_layers(&basis, image, &layers, error);
-    if (!status) status = decorate(d, image, &view, &layers, &canvas, error);
+    if (!status) status = make_image_decorations(d, image, &view, &layers, &canvas, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
         if (d->kept->is_on && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);

@@ -14,7 +14,7 @@ int64_t session_files_bytes(const session_files *files)
            session_deep_bytes(&files->deep, files->frame.width, files->frame.height);
 }
 
-static insitu_image_format format_of(const scene_output *output)
+static insitu_image_format find_image_format(const scene_output *output)
 {
     if (output->is_deep) return INSITU_DEEP_EXR;
     switch (output->format) {
@@ -50,7 +50,7 @@ static void write_output(session_files *files, const scene_output *output)
             base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
         return;
     }
-    if (session_write_image(&picture, format_of(output), path, &reason) != INSITU_OK)
+    if (session_write_image(&picture, find_image_format(output), path, &reason) != INSITU_OK)
         base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
     else if (output->database >= 0)
         session_note_picture(files->cinema, files->scene, &files->image, output, &files->moment, &files->error);
@@ -58,7 +58,7 @@ static void write_output(session_files *files, const scene_output *output)
 }
 
 /* Returns the time in milliseconds. MPI_Wtime() is not used, because the writing thread must not call MPI. */
-static double milliseconds(void)
+static double read_clock_milliseconds(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
@@ -76,14 +76,14 @@ static void write_tables(session_files *files)
 
 void session_write_files(session_files *files)
 {
-    const double start = milliseconds();
+    const double start = read_clock_milliseconds();
     if (files->news)
         session_write_news(files->scene, files->news, &files->error);
     else if (!files->has_picture)
         write_tables(files);
     for (int i = 0; files->has_picture && i < files->image.output_count; i++)
         write_output(files, &files->image.outputs[i]);
-    files->ms = milliseconds() - start;
+    files->ms = read_clock_milliseconds() - start;
 }
 
 void session_files_free(session_files *files)

@@ -48,8 +48,8 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
 
 /* Traces rays on all ranks. If normals are computed by differences, ranks exchange samples. Other errors of this rank
  * are stored in *error and not returned. */
-static insitu_status trace(const session_frame_target *t, const render_job *job, fragment_list *fragments,
-                           render_statistics *rendered, base_error *error)
+static insitu_status trace_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
+                                     render_statistics *rendered, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
@@ -62,8 +62,8 @@ static insitu_status trace(const session_frame_target *t, const render_job *job,
 }
 
 /* Computes the lighting of the fragments. All turns of a frame use the same occluders, as only their pixels differ. */
-static insitu_status light(const session_frame_target *t, const render_job *job, fragment_list *fragments,
-                           session_frame *frame, render_statistics *rendered, base_error *error)
+static insitu_status light_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
+                                     session_frame *frame, render_statistics *rendered, base_error *error)
 {
     const insitu_status status = session_agree(t->comm, error);
     if (status) return status;
@@ -81,8 +81,8 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
-    insitu_status status = trace(t, job, &fragments, &rendered, error);
-    if (!status && is_unlit) status = light(t, job, &fragments, frame, &rendered, error);
+    insitu_status status = trace_fragments(t, job, &fragments, &rendered, error);
+    if (!status && is_unlit) status = light_fragments(t, job, &fragments, frame, &rendered, error);
     if (status) {
         base_free(fragments.items);
         return status;
@@ -107,7 +107,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
 /* Estimates the number of pixels that produce fragment_limit fragments. For samples the estimate is derived from the
  * length of a ray in the scene, which is about 1 in scaled units, and at most sqrt(3). For segments it is an empirical
  * value. */
-static int64_t first_turn(const render_job *job, int64_t fragment_limit)
+static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
     const bool is_sampled = job->integration == RENDER_SAMPLES;
@@ -121,7 +121,8 @@ static int64_t first_turn(const render_job *job, int64_t fragment_limit)
 /* Computes the number of pixels of the next turn from the number of fragments of the last one on the busiest rank. The
  * growth is bounded, as a few pixels are not representative of all others. Collective; the result is the same on all
  * ranks. */
-static insitu_status next_turn(const session_frame_target *t, int64_t fragments, int64_t *pixels, base_error *error)
+static insitu_status update_turn_pixels(const session_frame_target *t, int64_t fragments, int64_t *pixels,
+                                        base_error *error)
 {
     enum { MOST_GROWTH = 8 };
     int64_t most = 0;
@@ -153,7 +154,7 @@ static int64_t greatest_divisor(int64_t a, int64_t b)
     return a;
 }
 
-static turn_order turn_order_of(const image *out)
+static turn_order make_turn_order(const image *out)
 {
     turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
     order.squares = (int64_t)order.across * ((out->height + SQUARE - 1) / SQUARE);
@@ -163,7 +164,7 @@ static turn_order turn_order_of(const image *out)
 }
 
 /* Returns the k-th pixel of the order, or -1 if it is outside of the picture. */
-static int64_t turn_pixel(const turn_order *order, int64_t k)
+static int64_t turn_order_pixel(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
     const int64_t x = square % order->across * SQUARE + k % SQUARE;
@@ -173,14 +174,14 @@ static int64_t turn_pixel(const turn_order *order, int64_t k)
 
 /* Moves up to `most` pixels of a set into `taken`, beginning at position `first` of the order. Returns the position at
  * which to continue. */
-static int64_t take_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
-                           unsigned char *taken)
+static int64_t take_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
+                                unsigned char *taken)
 {
-    const turn_order order = turn_order_of(out);
+    const turn_order order = make_turn_order(out);
     const int64_t end = order.squares * SQUARE * SQUARE;
     memset(taken, 0, pixel_set_bytes((int64_t)out->width * out->height));
     for (; first < end && most > 0; first++) {
-        const int64_t pixel = turn_pixel(&order, first);
+        const int64_t pixel = turn_order_pixel(&order, first);
         if (pixel < 0 || !pixel_set_has(from, pixel)) continue;
         pixel_set_add(taken, pixel);
         most--;
@@ -199,7 +200,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
 }
 
 /* Removes these pixels' samples from the deep picture on rank 0, because the pixels are drawn again. */
-static void forget_samples(const unsigned char *pixels, const image *out)
+static void remove_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;
     for (int64_t p = 0; p < count; p++)
@@ -212,8 +213,8 @@ typedef struct second_picture {
     unsigned char *turn; /* the set of pixels of the turn, on every rank */
 } second_picture;
 
-static insitu_status second_create(const session_frame_target *t, const comp_overlaps *overlaps, const image *first,
-                                   second_picture *out, base_error *error)
+static insitu_status second_picture_create(const session_frame_target *t, const comp_overlaps *overlaps,
+                                           const image *first, second_picture *out, base_error *error)
 {
     const int64_t pixels = (int64_t)first->width * first->height;
     image *second = &out->picture;
@@ -231,18 +232,19 @@ static insitu_status second_create(const session_frame_target *t, const comp_ove
     return session_agree(t->comm, error);
 }
 
-static void second_free(second_picture *second)
+static void second_picture_free(second_picture *second)
 {
     base_free(second->turn);
     base_free(second->picture.rgba);
     base_free(second->picture.depth);
 }
 
-static insitu_status redraw(const session_frame_target *t, const render_job *job, const comp_overlaps *overlaps,
-                            second_picture *second, image *out, session_frame *frame, base_error *error)
+static insitu_status redraw_overlaps(const session_frame_target *t, const render_job *job,
+                                     const comp_overlaps *overlaps, second_picture *second, image *out,
+                                     session_frame *frame, base_error *error)
 {
     const bool is_sampled = job->integration == RENDER_SAMPLES;
-    int64_t doubled = 0, most = first_turn(job, t->fragment_limit);
+    int64_t doubled = 0, most = estimate_turn_pixels(job, t->fragment_limit);
     render_job again = *job;
     again.pixels = second->turn;
     again.separate_samples = true;
@@ -250,8 +252,8 @@ static insitu_status redraw(const session_frame_target *t, const render_job *job
     for (int64_t left = overlaps->count, at = 0; left > 0;) {
         const int64_t before = frame->fragments;
         comp_overlaps found = {0};
-        at = take_pixels(out, overlaps->pixels, at, most, second->turn);
-        if (out->deep && out->deep->counts) forget_samples(second->turn, out);
+        at = take_turn_pixels(out, overlaps->pixels, at, most, second->turn);
+        if (out->deep && out->deep->counts) remove_samples(second->turn, out);
         insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);
@@ -259,7 +261,7 @@ static insitu_status redraw(const session_frame_target *t, const render_job *job
         if (second->picture.rgba) copy_pixels(second->turn, &second->picture, out);
         frame->turns++;
         left -= most;
-        if (left > 0) status = next_turn(t, frame->fragments - before, &most, error);
+        if (left > 0) status = update_turn_pixels(t, frame->fragments - before, &most, error);
         if (status) return status;
     }
     if (doubled) frame->overlaps = overlaps->count;
@@ -270,9 +272,9 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
                                    image *out, session_frame *frame, base_error *error)
 {
     second_picture second;
-    insitu_status status = second_create(t, overlaps, out, &second, error);
-    if (!status) status = redraw(t, job, overlaps, &second, out, frame, error);
-    second_free(&second);
+    insitu_status status = second_picture_create(t, overlaps, out, &second, error);
+    if (!status) status = redraw_overlaps(t, job, overlaps, &second, out, frame, error);
+    second_picture_free(&second);
     return status;
 }
 
@@ -306,8 +308,8 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
-        /* Samples in cells that share a face may also be found in two cells because of rounding. So redraw() counts the
-         * actual overlaps from the separate samples. */
+        /* Samples in cells that share a face may also be found in two cells because of rounding. So redraw_overlaps()
+         * counts the actual overlaps from the separate samples. */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);

@@ -63,7 +63,7 @@ static bool find_own_folder(char folder[PATH_MAX])
     return slash;
 }
 
-static void *open_beside(const char *own_folder, const char *between, char *why, size_t size)
+static void *open_library_beside(const char *own_folder, const char *between, char *why, size_t size)
 {
     char path[PATH_MAX];
     const int length = snprintf(path, sizeof path, "%s/%s%s", own_folder, between, library);
@@ -83,13 +83,13 @@ static bool searches_working_directory(void)
     }
 }
 
-static void *open_anywhere(char *why, size_t size)
+static void *open_library_anywhere(char *why, size_t size)
 {
     char folder[PATH_MAX];
     void *handle = NULL;
     if (find_own_folder(folder)) {
-        handle = open_beside(folder, "", why, size);
-        if (!handle) handle = open_beside(folder, "../lib/", why, size);
+        handle = open_library_beside(folder, "", why, size);
+        if (!handle) handle = open_library_beside(folder, "../lib/", why, size);
     }
     if (!handle && !searches_working_directory()) handle = open_library(library, why, size);
     return handle;
@@ -107,13 +107,13 @@ static bool has_memory_to_load(void)
     return has_memory;
 }
 
-static insitu_status load(base_error *error)
+static insitu_status load_library(base_error *error)
 {
     char why[400] = "";
     if (!has_memory_to_load())
         return base_fail(error, INSITU_ERROR_MEMORY,
                          "no memory to load %s (512 MiB of addresses); no image can be written", library);
-    void *handle = open_anywhere(why, sizeof why);
+    void *handle = open_library_anywhere(why, sizeof why);
     if (!handle)
         return base_fail(
             error, INSITU_ERROR_IO,
@@ -136,10 +136,10 @@ static insitu_status load(base_error *error)
 
 bool session_writes_behind = true;
 
-static insitu_status load_once(base_error *error, insitu_image_write_function **writer)
+static insitu_status load_library_once(base_error *error, insitu_image_write_function **writer)
 {
     pthread_mutex_lock(&lock);
-    const insitu_status status = loaded_writer ? INSITU_OK : load(error);
+    const insitu_status status = loaded_writer ? INSITU_OK : load_library(error);
     *writer = loaded_writer;
     pthread_mutex_unlock(&lock);
     return status;
@@ -153,7 +153,7 @@ double session_load_image_library(void)
     pthread_mutex_lock(&lock);
     const bool is_there = loaded_writer;
     pthread_mutex_unlock(&lock);
-    load_once(NULL, &unused);
+    load_library_once(NULL, &unused);
     clock_gettime(CLOCK_MONOTONIC, &end);
     return is_there ? 0 : 1e3 * (double)(end.tv_sec - start.tv_sec) + 1e-6 * (double)(end.tv_nsec - start.tv_nsec);
 }
@@ -162,7 +162,7 @@ void session_check_words(const insitu_image *image, insitu_word_faults *out)
 {
     insitu_image_write_function *unused;
     *out = (insitu_word_faults){.font = ""};
-    if (load_once(NULL, &unused) == INSITU_OK && loaded_checker && loaded_checker(image, out) != INSITU_OK)
+    if (load_library_once(NULL, &unused) == INSITU_OK && loaded_checker && loaded_checker(image, out) != INSITU_OK)
         *out = (insitu_word_faults){.font = ""};
 }
 
@@ -170,7 +170,7 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
                                   base_error *error)
 {
     insitu_image_write_function *write;
-    const insitu_status status = load_once(error, &write);
+    const insitu_status status = load_library_once(error, &write);
     if (status != INSITU_OK) return status;
 
     char message[sizeof error->message / 2] = "";
@@ -182,7 +182,7 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
 {
     insitu_image_write_function *write;
-    const insitu_status status = load_once(error, &write);
+    const insitu_status status = load_library_once(error, &write);
     if (status != INSITU_OK) return status;
     if (!loaded_placer)
         return base_fail(error, INSITU_ERROR_IO, "%s has no insitu_image_place, expected the one of this version",

@@ -63,7 +63,7 @@ static insitu_status share_boxes(lighting *l, base_error *error)
 
 /* ---- questions ----------------------------------------------------------------------------------------------- */
 
-static bool grow_questions(questions *q)
+static bool reserve_questions(questions *q)
 {
     const int64_t capacity = q->capacity + q->capacity / 2 + 1024;
     int *ranks = base_realloc(q->ranks, (size_t)capacity * sizeof *ranks);
@@ -86,11 +86,11 @@ static void free_questions(questions *q)
     base_free(q->sent);
 }
 
-static void take_question(void *state, int rank, const render_hit_rays *rays)
+static void add_question(void *state, int rank, const render_hit_rays *rays)
 {
     questions *q = state;
     if (rank == q->of->rank || q->has_no_memory) return;
-    if (q->count == q->capacity && !grow_questions(q)) {
+    if (q->count == q->capacity && !reserve_questions(q)) {
         q->has_no_memory = true;
         return;
     }
@@ -112,7 +112,7 @@ static bool sort_questions(questions *q)
     return true;
 }
 
-static bool write_mail(const lighting *l, const questions *q, session_mail *out)
+static bool write_questions(const lighting *l, const questions *q, session_mail *out)
 {
     out->total = q->count * ASKED_WORDS;
     out->counts = base_alloc((size_t)l->ranks * sizeof *out->counts);
@@ -128,14 +128,14 @@ static bool write_mail(const lighting *l, const questions *q, session_mail *out)
     return true;
 }
 
-static insitu_status ask(const lighting *l, questions *q, session_mail *in, base_error *error)
+static insitu_status send_questions(const lighting *l, questions *q, session_mail *in, base_error *error)
 {
     session_mail out = {0};
     *q = (questions){.of = l};
     for (q->at = 0; q->at < l->count; q->at++)
         if (l->rays[q->at].samples || l->rays[q->at].lights)
-            render_rays_to_boxes(l->job, &l->hits[q->at], &l->rays[q->at], l->boxes, l->ranks, take_question, q);
-    if (q->has_no_memory || !sort_questions(q) || !write_mail(l, q, &out))
+            render_rays_to_boxes(l->job, &l->hits[q->at], &l->rays[q->at], l->boxes, l->ranks, add_question, q);
+    if (q->has_no_memory || !sort_questions(q) || !write_questions(l, q, &out))
         session_no_memory(error, q->count * ASKED_WORDS * 8, "rays to other ranks");
     insitu_status status = session_agree(l->comm, error);
     if (!status) status = session_mail_exchange(l->comm, &out, in, error);
@@ -146,7 +146,7 @@ static insitu_status ask(const lighting *l, questions *q, session_mail *in, base
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
 /* Copies the requests out of the message, whose words are not aligned for these types. */
-static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays **rays)
+static bool read_questions(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / ASKED_WORDS;
     *hits = base_alloc((size_t)count * sizeof **hits);
@@ -161,12 +161,12 @@ static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays
 }
 
 /* Replaces the requests in *in by the answers to them. */
-static insitu_status answer(const lighting *l, session_mail *in, base_error *error)
+static insitu_status answer_questions(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;
     render_hit_rays *rays = NULL;
     const int64_t count = in->total / ASKED_WORDS;
-    if (read_mail(in, &hits, &rays))
+    if (read_questions(in, &hits, &rays))
         render_occlude(l->occluders, hits, rays, count, error);
     else
         session_no_memory(error, in->total * 8, "rays of other ranks");
@@ -178,7 +178,7 @@ static insitu_status answer(const lighting *l, session_mail *in, base_error *err
     return session_agree(l->comm, error);
 }
 
-static void take_answers(lighting *l, const questions *q, const session_mail *answers)
+static void store_answers(lighting *l, const questions *q, const session_mail *answers)
 {
     for (int64_t i = 0; i < q->count; i++) {
         const int64_t k = q->sent[i];
@@ -190,14 +190,14 @@ static void take_answers(lighting *l, const questions *q, const session_mail *an
     }
 }
 
-static insitu_status ask_others(lighting *l, base_error *error)
+static insitu_status exchange_questions(lighting *l, base_error *error)
 {
     questions q;
     session_mail in = {0}, answers = {0};
-    insitu_status status = ask(l, &q, &in, error);
-    if (!status) status = answer(l, &in, error);
+    insitu_status status = send_questions(l, &q, &in, error);
+    if (!status) status = answer_questions(l, &in, error);
     if (!status) status = session_mail_exchange(l->comm, &in, &answers, error);
-    if (!status) take_answers(l, &q, &answers);
+    if (!status) store_answers(l, &q, &answers);
     session_mail_free(&in);
     session_mail_free(&answers);
     free_questions(&q);
@@ -228,7 +228,7 @@ static void shade_hits(const lighting *l, fragment_list *fragments)
 }
 
 /* Determines whether any rank has fragments left for a further round. */
-static insitu_status agree_to_go_on(const lighting *l, bool has_more, bool *out, base_error *error)
+static insitu_status reduce_has_more(const lighting *l, bool has_more, bool *out, base_error *error)
 {
     int own = has_more, all = 0;
     const insitu_status status =
@@ -241,14 +241,14 @@ static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_er
 {
     int64_t at = 0;
     bool goes_on = false;
-    insitu_status status = agree_to_go_on(l, fragments->count > 0, &goes_on, error);
+    insitu_status status = reduce_has_more(l, fragments->count > 0, &goes_on, error);
     while (!status && goes_on) {
         at = collect_hits(l, fragments, at);
         render_occlude(l->occluders, l->hits, l->rays, l->count, error);
         status = session_agree(l->comm, error);
-        if (!status && l->ranks > 1) status = ask_others(l, error);
+        if (!status && l->ranks > 1) status = exchange_questions(l, error);
         if (!status) shade_hits(l, fragments);
-        if (!status) status = agree_to_go_on(l, at < fragments->count, &goes_on, error);
+        if (!status) status = reduce_has_more(l, at < fragments->count, &goes_on, error);
     }
     return status;
 }

@@ -3,28 +3,28 @@
 #include "memory.h"
 #include "session_image.h"
 
-static insitu_status no_memory(const scene_montage *montage, base_error *error)
+static insitu_status fail_for_memory(const scene_montage *montage, base_error *error)
 {
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for a picture of %d x %d others", montage->columns,
                      montage->rows);
 }
 
-static int64_t pixel_count(const scene_montage *montage)
+static int64_t count_pixels(const scene_montage *montage)
 {
     return (int64_t)montage->width * montage->columns * montage->height * montage->rows;
 }
 
 /* Allocates the whole picture, which is transparent at first. */
-static insitu_status begin(session_montages *montages, const scene *scene, int index, base_error *error)
+static insitu_status begin_montage(session_montages *montages, const scene *scene, int index, base_error *error)
 {
     if (!montages->items) {
         montages->items = base_calloc((size_t)scene->montage_count, sizeof *montages->items);
         montages->count = montages->items ? scene->montage_count : 0;
     }
-    if (!montages->items) return no_memory(&scene->montages[index], error);
+    if (!montages->items) return fail_for_memory(&scene->montages[index], error);
     session_montage *m = &montages->items[index];
-    if (!m->rgba) m->rgba = base_calloc(4 * (size_t)pixel_count(&scene->montages[index]), sizeof *m->rgba);
-    return m->rgba ? INSITU_OK : no_memory(&scene->montages[index], error);
+    if (!m->rgba) m->rgba = base_calloc(4 * (size_t)count_pixels(&scene->montages[index]), sizeof *m->rgba);
+    return m->rgba ? INSITU_OK : fail_for_memory(&scene->montages[index], error);
 }
 
 static void end(session_montage *m)
@@ -39,7 +39,7 @@ insitu_status session_add_cell(session_montages *montages, const scene *scene, c
 {
     const scene_montage *of = &scene->montages[output->montage];
     const int cell = output->first_cell + image->variant.view;
-    const insitu_status status = begin(montages, scene, output->montage, error);
+    const insitu_status status = begin_montage(montages, scene, output->montage, error);
     if (status) {
         base_free(path);
         return status;

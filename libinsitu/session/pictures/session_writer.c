@@ -62,7 +62,7 @@ static void wait_at_end(void)
         MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
 }
 
-static void enlist(session_writer *w)
+static void add_to_all_writers(session_writer *w)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     pthread_once(&once, wait_at_end);
@@ -72,7 +72,7 @@ static void enlist(session_writer *w)
     pthread_mutex_unlock(&all_mutex);
 }
 
-static void strike_off(session_writer *w)
+static void remove_from_all_writers(session_writer *w)
 {
     pthread_mutex_lock(&all_mutex);
     for (session_writer **at = &all_writers; *at; at = &(*at)->next)
@@ -162,7 +162,7 @@ int64_t session_writer_bytes(session_writer *w, int *waiting)
 /* ---- the thread ----------------------------------------------------------------------------------------------- */
 
 /* Appends files to a list. The mutex must be held. */
-static void append(session_files **first, session_files **last, session_files *files)
+static void append_files(session_files **first, session_files **last, session_files *files)
 {
     files->next = NULL;
     if (*first)
@@ -173,7 +173,7 @@ static void append(session_files **first, session_files **last, session_files *f
 }
 
 /* Moves the first files of the queue to the finished ones. The mutex must be held. */
-static void finish_first(session_writer *w)
+static void finish_first_files(session_writer *w)
 {
     session_files *files = w->first;
     w->first = files->next;
@@ -182,11 +182,11 @@ static void finish_first(session_writer *w)
     keep_memory(w, &files->memory);
     session_free_channels(&files->channels);
     session_free_deep(&files->deep);
-    append(&w->done, &w->last_done, files);
+    append_files(&w->done, &w->last_done, files);
     pthread_cond_broadcast(&w->has_changed);
 }
 
-static void *run(void *of_writer)
+static void *run_writer(void *of_writer)
 {
     enum { FIRST_PICTURES = 16 };
     session_writer *w = of_writer;
@@ -198,7 +198,7 @@ static void *run(void *of_writer)
         session_write_files(w->first);
         if (w->written++ < FIRST_PICTURES) atexit(wait_for_all);
         pthread_mutex_lock(&w->mutex);
-        finish_first(w);
+        finish_first_files(w);
     }
     pthread_mutex_unlock(&w->mutex);
     return NULL;
@@ -222,10 +222,10 @@ static void start_thread(session_writer *w)
     atexit(wait_for_all);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    w->is_running = pthread_create(&w->thread, NULL, run, w) == 0;
+    w->is_running = pthread_create(&w->thread, NULL, run_writer, w) == 0;
     w->is_refused = !w->is_running;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (w->is_running) enlist(w);
+    if (w->is_running) add_to_all_writers(w);
 }
 
 double session_writer_begin(session_writer *w, const scene *scene)
@@ -244,7 +244,7 @@ void session_writer_give(session_writer *w, session_files *files, base_error *er
     const bool is_behind = w->is_running && files->scene->writing == SCENE_WRITE_BEHIND;
     if (is_behind) {
         pthread_mutex_lock(&w->mutex);
-        append(&w->first, &w->last, files);
+        append_files(&w->first, &w->last, files);
         w->waiting += files->has_picture;
         w->waiting_bytes += session_files_bytes(files);
         pthread_cond_broadcast(&w->has_changed);
@@ -263,7 +263,7 @@ void session_writer_note(session_writer *w, int64_t cycle, const base_error *err
     base_fail(&w->failure, error->status, "cycle %lld: %.1000s", (long long)cycle, error->message);
 }
 
-static void collect_one(session_writer *w, const session_files *files, session_report *report)
+static void collect_files(session_writer *w, const session_files *files, session_report *report)
 {
     report->numbers.background_ms += files->ms;
     session_writer_note(w, files->moment.cycle, &files->error);
@@ -280,7 +280,7 @@ void session_writer_collect(session_writer *w, session_report *report)
     w->loading_ms = 0;
     while (files) {
         session_files *next = files->next;
-        collect_one(w, files, report);
+        collect_files(w, files, report);
         session_files_free(files);
         files = next;
     }
@@ -307,7 +307,7 @@ void session_writer_drain(session_writer *w)
 void session_writer_end(session_writer *w)
 {
     if (w->is_running) {
-        strike_off(w);
+        remove_from_all_writers(w);
         pthread_mutex_lock(&w->mutex);
         w->is_ending = true;
         pthread_cond_broadcast(&w->has_changed);
