@@ -40,7 +40,7 @@ static void convert_background(const scene_file_image *in, float background[4])
 
 /* Returns whether the scene leaves the sampling of volumes unspecified. Any key other than method and max_error
  * specifies it, even a key that only applies to samples. */
-static bool is_unsaid(const scene_file_sampling *in)
+static bool is_sampling_unspecified(const scene_file_sampling *in)
 {
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
@@ -51,9 +51,9 @@ static bool is_unsaid(const scene_file_sampling *in)
 static void choose_method(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
-    const bool by_default = is_unsaid(in) && out->volume_count == 1;
+    const bool by_default = is_sampling_unspecified(in) && out->volume_count == 1;
     out->max_error = in->max_error ? *in->max_error : by_default ? default_error : 0;
-    out->has_default_samples = is_unsaid(in) && out->volume_count > 1;
+    out->has_default_samples = is_sampling_unspecified(in) && out->volume_count > 1;
     out->method = in->method ? (scene_sampling_method)*in->method : out->max_error > 0 ? SCENE_SEGMENTS : SCENE_SAMPLES;
 }
 

@@ -11,7 +11,7 @@
 
 enum { path_size = SCENE_PATH_SIZE + 64 };
 
-__attribute__((format(printf, 2, 3))) static void set_path(char path[path_size], const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void format_path(char path[path_size], const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -32,7 +32,7 @@ static insitu_status make_table(const scene_document *d, const char *name, int c
     return out->name && out->colours ? INSITU_OK : scene_no_memory(d);
 }
 
-static insitu_status take_built_in(const scene_document *d, const char *name, scene_colour_map *out)
+static insitu_status use_built_in_map(const scene_document *d, const char *name, scene_colour_map *out)
 {
     int count = 0;
     const float *table = colour_map_table(name, &count);
@@ -41,8 +41,8 @@ static insitu_status take_built_in(const scene_document *d, const char *name, sc
     return status;
 }
 
-static insitu_status take_bands(const scene_document *d, const scene_colour_points *bands, const char *name,
-                                scene_colour_map *out)
+static insitu_status use_bands(const scene_document *d, const scene_colour_points *bands, const char *name,
+                               scene_colour_map *out)
 {
     const insitu_status status = make_table(d, name, bands->count, out);
     out->is_banded = true;
@@ -51,10 +51,10 @@ static insitu_status take_bands(const scene_document *d, const scene_colour_poin
     return status;
 }
 
-static insitu_status take_points(const scene_document *d, const scene_colour_points *points, const char *name,
-                                 scene_colour_map *out)
+static insitu_status use_points(const scene_document *d, const scene_colour_points *points, const char *name,
+                                scene_colour_map *out)
 {
-    if (points->is_banded) return take_bands(d, points, name, out);
+    if (points->is_banded) return use_bands(d, points, name, out);
     const insitu_status status = make_table(d, name, colour_points_entries(points->items, points->count), out);
     if (status == INSITU_OK) colour_points_fill(points->items, points->count, points->space, out->colours, out->count);
     return status;
@@ -62,17 +62,17 @@ static insitu_status take_points(const scene_document *d, const scene_colour_poi
 
 /* ---- lists ----------------------------------------------------------------------------------------------------- */
 
-static insitu_status read_places(const scene_document *d, const char *path, scene_colour_points *points)
+static insitu_status read_positions(const scene_document *d, const char *path, scene_colour_points *points)
 {
     const int last = points->count - 1;
     char key[path_size];
-    set_path(key, "%s.at", path);
+    format_path(key, "%s.at", path);
     const int count = scene_document_length(d, key);
     if (count && count != points->count)
         return scene_bad(d, key, "", "%d places for %d colours, expected one each", count, points->count);
     for (int i = 0; i <= last; i++) {
         colour_point *p = &points->items[i];
-        set_path(key, "%s.at[%d]", path, i);
+        format_path(key, "%s.at[%d]", path, i);
         p->at = count ? scene_document_number(d, key) : (double)i / last;
         if (i > 0 && p->at < p[-1].at)
             return scene_bad(d, key, "", "%g comes after %g, expected places that do not fall", p->at, p[-1].at);
@@ -82,21 +82,21 @@ static insitu_status read_places(const scene_document *d, const char *path, scen
     return INSITU_OK;
 }
 
-static insitu_status take_list(const scene_document *d, const char *path, scene_colour_map *out)
+static insitu_status use_list(const scene_document *d, const char *path, scene_colour_map *out)
 {
     char key[path_size];
     scene_colour_points points = {.space = COLOUR_RGB};
-    set_path(key, "%s.colours", path);
+    format_path(key, "%s.colours", path);
     points.count = scene_document_length(d, key);
     points.items = base_calloc((size_t)points.count, sizeof *points.items);
     if (!points.items) return scene_no_memory(d);
     for (int i = 0; i < points.count; i++)
         for (int c = 0; c < 3; c++) {
-            set_path(key, "%s.colours[%d][%d]", path, i, c);
+            format_path(key, "%s.colours[%d][%d]", path, i, c);
             points.items[i].srgb[c] = scene_document_number(d, key);
         }
-    insitu_status status = read_places(d, path, &points);
-    if (status == INSITU_OK) status = take_points(d, &points, "", out);
+    insitu_status status = read_positions(d, path, &points);
+    if (status == INSITU_OK) status = use_points(d, &points, "", out);
     base_free(points.items);
     return status;
 }
@@ -140,7 +140,8 @@ static insitu_status read_attachment(const scene_document *d, const char *key, c
     return INSITU_OK;
 }
 
-static insitu_status attach(const scene_document *d, const char *key, const char *name, const scene_attachment **out)
+static insitu_status attach_file(const scene_document *d, const char *key, const char *name,
+                                 const scene_attachment **out)
 {
     const scene_attachments *all = d->attachments;
     if (!all) return scene_bad(d, key, "", "\"%s\": no file can be read here", name);
@@ -155,22 +156,22 @@ static insitu_status attach(const scene_document *d, const char *key, const char
     return status;
 }
 
-static insitu_status take_file(const scene_document *d, const char *path, scene_colour_map *out)
+static insitu_status use_file(const scene_document *d, const char *path, scene_colour_map *out)
 {
     char key[path_size], name_key[path_size];
     const char *file = NULL, *name = NULL;
     const scene_attachment *attachment = NULL;
     scene_colour_points points = {0};
     base_error reason = {.status = INSITU_OK};
-    set_path(key, "%s.file", path);
-    set_path(name_key, "%s.name", path);
+    format_path(key, "%s.file", path);
+    format_path(name_key, "%s.name", path);
     scene_document_texts(d, key, &file, 1);
     scene_document_texts(d, name_key, &name, 1);
-    insitu_status status = attach(d, key, file, &attachment);
+    insitu_status status = attach_file(d, key, file, &attachment);
     if (status != INSITU_OK) return status;
     status = scene_read_colour_file(attachment, file, name, &points, &reason);
     if (status == INSITU_OK)
-        status = take_points(d, &points, name ? name : "", out);
+        status = use_points(d, &points, name ? name : "", out);
     else if (status == INSITU_ERROR_MEMORY)
         status = scene_no_memory(d);
     else
@@ -181,10 +182,10 @@ static insitu_status take_file(const scene_document *d, const char *path, scene_
 
 /* ---- the map --------------------------------------------------------------------------------------------------- */
 
-static bool is_given(const scene_document *d, const char *path, const char *key)
+static bool has_key(const scene_document *d, const char *path, const char *key)
 {
     char whole[path_size];
-    set_path(whole, "%s.%s", path, key);
+    format_path(whole, "%s.%s", path, key);
     return scene_document_kind(d, whole) != SCENE_NOTHING;
 }
 
@@ -192,22 +193,21 @@ static insitu_status convert_map(const scene_document *d, const char *parent, sc
 {
     char path[path_size];
     const char *name = "viridis";
-    set_path(path, "%s.map", parent);
+    format_path(path, "%s.map", parent);
     if (scene_document_kind(d, path) != SCENE_MAPPING) {
         scene_document_texts(d, path, &name, 1);
-        return take_built_in(d, name, out);
+        return use_built_in_map(d, name, out);
     }
-    const bool has_list = is_given(d, path, "colours"), has_file = is_given(d, path, "file");
+    const bool has_list = has_key(d, path, "colours"), has_file = has_key(d, path, "file");
     if (has_list == has_file)
         return scene_bad(d, path, "", "holds %s, expected one of colours and file", has_list ? "both" : "neither");
-    if (has_file && is_given(d, path, "at"))
-        return scene_bad(d, path, "at", "given beside file, expected with colours");
-    if (has_list && is_given(d, path, "name"))
+    if (has_file && has_key(d, path, "at")) return scene_bad(d, path, "at", "given beside file, expected with colours");
+    if (has_list && has_key(d, path, "name"))
         return scene_bad(d, path, "name", "given beside colours, expected with file");
-    return has_list ? take_list(d, path, out) : take_file(d, path, out);
+    return has_list ? use_list(d, path, out) : use_file(d, path, out);
 }
 
-static void reverse(scene_colour_map *map)
+static void reverse_map(scene_colour_map *map)
 {
     for (int i = 0, j = map->count - 1; i < j; i++, j--) {
         float kept[3];
@@ -237,7 +237,7 @@ static insitu_status cut_into_bands(const scene_document *d, int bands, scene_co
     return INSITU_OK;
 }
 
-static void set_linear(float to[3], const double *srgb)
+static void set_linear_rgb(float to[3], const double *srgb)
 {
     for (int c = 0; c < 3; c++) to[c] = colour_linear_from_srgb((float)srgb[c]);
 }
@@ -250,18 +250,18 @@ static void convert_outside(const scene_file_colour_map *in, scene_colour_map *o
     out->has_nan = in->nan != NULL;
     memcpy(out->outside[0], out->colours, sizeof out->outside[0]);
     memcpy(out->outside[1], out->colours + 3 * (size_t)(out->count - 1), sizeof out->outside[1]);
-    if (in->below) set_linear(out->outside[0], in->below);
-    if (in->above) set_linear(out->outside[1], in->above);
-    set_linear(out->outside[2], in->nan ? in->nan : grey);
+    if (in->below) set_linear_rgb(out->outside[0], in->below);
+    if (in->above) set_linear_rgb(out->outside[1], in->above);
+    set_linear_rgb(out->outside[2], in->nan ? in->nan : grey);
 }
 
 /* ---- ranges and scales ----------------------------------------------------------------------------------------- */
 
-static insitu_status read_ends(const scene_document *d, const char *path, double ends[2])
+static insitu_status read_range_ends(const scene_document *d, const char *path, double ends[2])
 {
     char key[path_size];
     for (int i = 0; i < 2; i++) {
-        set_path(key, "%s[%d]", path, i);
+        format_path(key, "%s[%d]", path, i);
         ends[i] = scene_document_number(d, key);
     }
     if (ends[0] < ends[1]) return INSITU_OK;
@@ -281,11 +281,11 @@ static insitu_status convert_range(const scene_document *d, const char *parent, 
     const char *word = "data";
     double ends[2] = {0, 0};
     insitu_status status = INSITU_OK;
-    set_path(path, "%s.range", parent);
-    set_path(percentile, "%s.range.percentile", parent);
+    format_path(path, "%s.range", parent);
+    format_path(percentile, "%s.range.percentile", parent);
     const scene_node kind = scene_document_kind(d, path);
-    if (kind == SCENE_LIST) status = read_ends(d, path, ends);
-    if (kind == SCENE_MAPPING) status = read_ends(d, percentile, ends);
+    if (kind == SCENE_LIST) status = read_range_ends(d, path, ends);
+    if (kind == SCENE_MAPPING) status = read_range_ends(d, percentile, ends);
     if (kind == SCENE_SCALAR) scene_document_texts(d, path, &word, 1);
     *out = (scene_range){.is_fixed = kind == SCENE_LIST,
                          .low = ends[0],
@@ -324,7 +324,7 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
 {
     insitu_status status = convert_map(d, path, out);
     if (status != INSITU_OK) return status;
-    if (in->reversed && *in->reversed) reverse(out);
+    if (in->reversed && *in->reversed) reverse_map(out);
     if (in->discrete && out->is_banded)
         return scene_bad(d, path, "discrete", "given beside a map of %d bands, expected one of the two", out->count);
     if (in->discrete) status = cut_into_bands(d, *in->discrete, out);

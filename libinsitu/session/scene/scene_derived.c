@@ -32,7 +32,7 @@ static insitu_status add_input(const scene_document *d, const char *path, const 
     return inputs[out->input_count++].name ? INSITU_OK : scene_no_memory(d);
 }
 
-static insitu_status take_expression(const scene_document *d, const char *path, const char *text, scene_derived *out)
+static insitu_status store_expression(const scene_document *d, const char *path, const char *text, scene_derived *out)
 {
     char fault[SCENE_FAULT_SIZE];
     insitu_status status = INSITU_OK;
@@ -67,7 +67,7 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
 }
 
 /* Reads the fields at the path: one field, or the components of a vector, each of which is a scalar. */
-static insitu_status take_references(const scene_document *d, const char *path, scene_derived *out)
+static insitu_status read_references(const scene_document *d, const char *path, scene_derived *out)
 {
     const char *texts[SPACE];
     const int count = scene_document_texts(d, path, texts, SPACE);
@@ -87,7 +87,7 @@ static insitu_status take_references(const scene_document *d, const char *path, 
 
 /* Reads a scalar of a field for the keys `field` and `magnitude`, and stores it as an expression of this field
  * alone. */
-static insitu_status take_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
+static insitu_status read_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
 {
     const char *text = NULL;
     if (scene_document_kind(d, path) == SCENE_LIST)
@@ -140,8 +140,8 @@ static insitu_status check_name(const scene_document *d, const char *path, const
     return INSITU_OK;
 }
 
-static insitu_status convert_one(const scene_document *d, const char *path, const scene_file_derived *in, scene *s,
-                                 scene_derived *out)
+static insitu_status convert_derived(const scene_document *d, const char *path, const scene_file_derived *in, scene *s,
+                                     scene_derived *out)
 {
     char key_path[KEY_SIZE];
     int key = -1;
@@ -161,10 +161,10 @@ static insitu_status convert_one(const scene_document *d, const char *path, cons
     out->key = key < 0 ? "" : keys[key].key;
     out->kind = key < 0 ? SCENE_EXPRESSION : keys[key].kind;
     snprintf(key_path, sizeof key_path, "%s%s%s", path, key < 0 ? "" : ".", out->key);
-    if (key < 0) return take_expression(d, path, in->expression, out);
+    if (key < 0) return store_expression(d, path, in->expression, out);
     if (out->kind == SCENE_EXPRESSION)
-        return take_scalar(d, key_path, takes_component(key) ? out->component : SCENE_COMPONENT_MAGNITUDE, out);
-    return take_references(d, key_path, out);
+        return read_scalar(d, key_path, takes_component(key) ? out->component : SCENE_COMPONENT_MAGNITUDE, out);
+    return read_references(d, key_path, out);
 }
 
 /* ---- dependencies between derived fields
@@ -186,7 +186,7 @@ typedef struct search {
     bool is_done[SCENE_MAX_DERIVED];
 } search;
 
-static insitu_status refuse_circle(const search *w, int first)
+static insitu_status refuse_cycle(const search *w, int first)
 {
     char circle[300] = "";
     const scene_derived *fields = w->s->derived;
@@ -200,17 +200,17 @@ static insitu_status refuse_circle(const search *w, int first)
                      w->length == first + 1 ? "itself" : fields[w->path[first]].name);
 }
 
-static insitu_status visit(search *w, int at)
+static insitu_status visit_field(search *w, int at)
 {
     scene_derived *field = &w->s->derived[at];
     insitu_status status = INSITU_OK;
     if (w->is_done[at]) return INSITU_OK;
     for (int i = 0; i < w->length; i++)
-        if (w->path[i] == at) return refuse_circle(w, i);
+        if (w->path[i] == at) return refuse_cycle(w, i);
     w->path[w->length++] = at;
     for (int i = 0; i < field->input_count && !status; i++) {
         const int source = find_derived(w->s, field->inputs[i].name);
-        if (source >= 0) status = visit(w, source);
+        if (source >= 0) status = visit_field(w, source);
     }
     w->length--;
     w->is_done[at] = true;
@@ -224,7 +224,7 @@ static insitu_status sort_fields(const scene_document *d, scene *s)
     insitu_status status = INSITU_OK;
     scene_derived *sorted = base_calloc((size_t)s->derived_count, sizeof *sorted);
     if (!sorted) return scene_no_memory(d);
-    for (int i = 0; i < s->derived_count && !status; i++) status = visit(&w, i);
+    for (int i = 0; i < s->derived_count && !status; i++) status = visit_field(&w, i);
     for (int i = 0; i < s->derived_count && !status; i++) sorted[i] = s->derived[w.order[i]];
     if (!status) memcpy(s->derived, sorted, (size_t)s->derived_count * sizeof *sorted);
     base_free(sorted);
@@ -250,7 +250,7 @@ insitu_status scene_convert_derived(const scene_document *d, const scene_file *i
             snprintf(path, sizeof path, "fields.%s", name);
         else
             snprintf(path, sizeof path, "fields[%d]", i);
-        status = convert_one(d, path, &in->fields[i], out, &out->derived[out->derived_count]);
+        status = convert_derived(d, path, &in->fields[i], out, &out->derived[out->derived_count]);
         out->derived_count++;
     }
     return status ? status : sort_fields(d, out);

@@ -24,21 +24,22 @@ struct scene_block {
     max_align_t room[];
 };
 
-static insitu_status bad_line(const scene_document *d, size_t line, const char *what)
+static insitu_status fail_at_line(const scene_document *d, size_t line, const char *what)
 {
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%zu: %s", d->file_name, line, what);
 }
 
 /* ---- text to tree ---- */
 
-static size_t lines_before(const char *text, size_t size, size_t offset)
+static size_t count_lines_before(const char *text, size_t size, size_t offset)
 {
     size_t lines = 0;
     for (size_t i = 0; i < size && i < offset; i++) lines += text[i] == '\n';
     return lines;
 }
 
-static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text, size_t size)
+static insitu_status fail_for_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text,
+                                     size_t size)
 {
     /* libyaml does not report every failed allocation as such. */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
@@ -47,15 +48,15 @@ static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *pa
     size_t line;
     char what[SCENE_SYNTAX_SIZE];
     if (parser->error == YAML_READER_ERROR) { /* reader errors have an offset, but no line */
-        line = lines_before(text, size, parser->problem_offset) + 1;
+        line = count_lines_before(text, size, parser->problem_offset) + 1;
         snprintf(what, sizeof what, "not valid YAML: %.100s", parser->problem ? parser->problem : "unreadable");
     } else {
         scene_syntax_words(parser, text, size, &line, what);
     }
-    return bad_line(d, line, what);
+    return fail_at_line(d, line, what);
 }
 
-static const char *event_fault(const yaml_event_t *event, int *depth, int *documents)
+static const char *find_event_fault(const yaml_event_t *event, int *depth, int *documents)
 {
     const yaml_char_t *anchor = NULL, *tag = NULL;
     switch (event->type) {
@@ -90,16 +91,17 @@ static insitu_status scan_events(const scene_document *d, const char *text, size
     for (bool is_end = false; status == INSITU_OK && !is_end;) {
         yaml_event_t event;
         if (!yaml_parser_parse(&parser, &event)) {
-            status = bad_syntax(d, &parser, text, size);
+            status = fail_for_syntax(d, &parser, text, size);
             break;
         }
-        const char *fault = event_fault(&event, &depth, &documents);
-        if (fault) status = bad_line(d, event.start_mark.line + 1, fault);
+        const char *fault = find_event_fault(&event, &depth, &documents);
+        if (fault) status = fail_at_line(d, event.start_mark.line + 1, fault);
         is_end = event.type == YAML_STREAM_END_EVENT;
         yaml_event_delete(&event);
     }
     yaml_parser_delete(&parser);
-    if (status == INSITU_OK && documents == 0) status = bad_line(d, 1, "the file is empty, expected the key images");
+    if (status == INSITU_OK && documents == 0)
+        status = fail_at_line(d, 1, "the file is empty, expected the key images");
     return status;
 }
 
@@ -119,7 +121,7 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
         return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", file_name);
     }
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, size);
-    if (!yaml_parser_load(&parser, &d->yaml)) status = bad_syntax(d, &parser, text, size);
+    if (!yaml_parser_load(&parser, &d->yaml)) status = fail_for_syntax(d, &parser, text, size);
     yaml_parser_delete(&parser);
     if (status == INSITU_OK && !scene_expand_shorthand(&d->yaml)) {
         scene_document_close(d);
@@ -140,28 +142,28 @@ void scene_document_close(scene_document *d)
 
 /* ---- nodes ---- */
 
-static yaml_node_t *node_of(const scene_document *d, int index)
+static yaml_node_t *find_node_by_index(const scene_document *d, int index)
 {
     return yaml_document_get_node((yaml_document_t *)&d->yaml, index);
 }
 
-static int line_of(const yaml_node_t *node)
+static int node_line(const yaml_node_t *node)
 {
     return (int)node->start_mark.line + 1;
 }
 
-static int item_count(const yaml_node_t *list)
+static int count_items(const yaml_node_t *list)
 {
     return (int)(list->data.sequence.items.top - list->data.sequence.items.start);
 }
 
-static const char *text_of(const yaml_node_t *scalar)
+static const char *node_text(const yaml_node_t *scalar)
 {
     return (const char *)scalar->data.scalar.value;
 }
 
 /* Writes the node's text in quotes, shortened to a length that suits a message. */
-static void quote(const yaml_node_t *node, char quoted[quote_size])
+static void quote_node(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {
         snprintf(quoted, quote_size, "a list");
@@ -171,7 +173,7 @@ static void quote(const yaml_node_t *node, char quoted[quote_size])
         snprintf(quoted, quote_size, "nothing");
     } else {
         const bool is_long = node->data.scalar.length > 36;
-        snprintf(quoted, quote_size, "\"%.36s%s\"", text_of(node), is_long ? "..." : "");
+        snprintf(quoted, quote_size, "\"%.36s%s\"", node_text(node), is_long ? "..." : "");
     }
 }
 
@@ -179,7 +181,7 @@ static const yaml_node_pair_t *find_pair(const scene_document *d, const yaml_nod
                                          size_t length)
 {
     for (const yaml_node_pair_t *p = mapping->data.mapping.pairs.start; p < mapping->data.mapping.pairs.top; p++) {
-        const yaml_node_t *key = node_of(d, p->key);
+        const yaml_node_t *key = find_node_by_index(d, p->key);
         const bool is_it = key->type == YAML_SCALAR_NODE && key->data.scalar.length == length &&
                            memcmp(key->data.scalar.value, name, length) == 0;
         if (is_it) return p;
@@ -195,10 +197,10 @@ bool scene_is_plain_name(const char *name)
 /* Returns the entry of a list whose key `name` has this text, or NULL if there is none. */
 static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t *list, const char *name, size_t length)
 {
-    for (int i = 0; i < item_count(list); i++) {
-        const yaml_node_t *entry = node_of(d, list->data.sequence.items.start[i]);
+    for (int i = 0; i < count_items(list); i++) {
+        const yaml_node_t *entry = find_node_by_index(d, list->data.sequence.items.start[i]);
         const yaml_node_pair_t *pair = entry->type == YAML_MAPPING_NODE ? find_pair(d, entry, "name", 4) : NULL;
-        const yaml_node_t *text = pair ? node_of(d, pair->value) : NULL;
+        const yaml_node_t *text = pair ? find_node_by_index(d, pair->value) : NULL;
         if (text && text->type == YAML_SCALAR_NODE && text->data.scalar.length == length &&
             memcmp(text->data.scalar.value, name, length) == 0)
             return entry;
@@ -211,14 +213,14 @@ static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t 
 static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
-    *line = line_of(node);
+    *line = node_line(node);
     while (*path) {
         if (*path == '[') {
             char *end;
             const long index = strtol(path + 1, &end, 10);
-            if (node->type != YAML_SEQUENCE_NODE || index >= item_count(node)) return NULL;
-            node = node_of(d, node->data.sequence.items.start[index]);
-            *line = line_of(node);
+            if (node->type != YAML_SEQUENCE_NODE || index >= count_items(node)) return NULL;
+            node = find_node_by_index(d, node->data.sequence.items.start[index]);
+            *line = node_line(node);
             path = end + 1;
         } else {
             path += *path == '.';
@@ -226,15 +228,15 @@ static const yaml_node_t *find_node(const scene_document *d, const char *path, i
             if (node->type == YAML_SEQUENCE_NODE) {
                 node = find_named(d, node, path, length);
                 if (!node) return NULL;
-                *line = line_of(node);
+                *line = node_line(node);
                 path += length;
                 continue;
             }
             if (node->type != YAML_MAPPING_NODE) return NULL;
             const yaml_node_pair_t *pair = find_pair(d, node, path, length);
             if (!pair) return NULL;
-            *line = line_of(node_of(d, pair->key));
-            node = node_of(d, pair->value);
+            *line = node_line(find_node_by_index(d, pair->key));
+            node = find_node_by_index(d, pair->value);
             path += length;
         }
     }
@@ -254,11 +256,12 @@ int scene_document_texts(const scene_document *d, const char *path, const char *
     const yaml_node_t *node = find_node(d, path, &line);
     if (!node) return 0;
     if (node->type == YAML_SCALAR_NODE) {
-        if (most > 0) texts[0] = text_of(node);
+        if (most > 0) texts[0] = node_text(node);
         return 1;
     }
-    const int count = item_count(node);
-    for (int i = 0; i < count && i < most; i++) texts[i] = text_of(node_of(d, node->data.sequence.items.start[i]));
+    const int count = count_items(node);
+    for (int i = 0; i < count && i < most; i++)
+        texts[i] = node_text(find_node_by_index(d, node->data.sequence.items.start[i]));
     return count;
 }
 
@@ -268,7 +271,7 @@ int scene_document_names(const scene_document *d, const char *path, const char *
     const yaml_node_t *node = find_node(d, path, &line);
     if (!node || node->type != YAML_MAPPING_NODE) return 0;
     for (const yaml_node_pair_t *p = node->data.mapping.pairs.start; p < node->data.mapping.pairs.top; p++, count++)
-        if (count < most) names[count] = text_of(node_of(d, p->key));
+        if (count < most) names[count] = node_text(find_node_by_index(d, p->key));
     return count;
 }
 
@@ -286,14 +289,14 @@ int scene_document_length(const scene_document *d, const char *path)
 {
     int line;
     const yaml_node_t *node = find_node(d, path, &line);
-    return node && node->type == YAML_SEQUENCE_NODE ? item_count(node) : 0;
+    return node && node->type == YAML_SEQUENCE_NODE ? count_items(node) : 0;
 }
 
 double scene_document_number(const scene_document *d, const char *path)
 {
     int line;
     const yaml_node_t *node = find_node(d, path, &line);
-    return node && node->type == YAML_SCALAR_NODE ? strtod(text_of(node), NULL) : 0;
+    return node && node->type == YAML_SCALAR_NODE ? strtod(node_text(node), NULL) : 0;
 }
 
 insitu_status scene_no_memory(const scene_document *d)
@@ -319,7 +322,7 @@ insitu_status scene_bad(const scene_document *d, const char *parent, const char 
 static void ask_for_meant(const yaml_node_t *word, const char *const *candidates, int count,
                           char question[question_size])
 {
-    const char *meant = word->type == YAML_SCALAR_NODE ? scene_nearest_word(text_of(word), candidates, count) : NULL;
+    const char *meant = word->type == YAML_SCALAR_NODE ? scene_nearest_word(node_text(word), candidates, count) : NULL;
     question[0] = '\0';
     if (meant) snprintf(question, question_size, " (did you mean %.64s?)", meant);
 }
@@ -374,7 +377,7 @@ static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, con
                            char question[question_size])
 {
     size_t length;
-    const char *colour = scene_syntax_comment(d->text, d->size, (size_t)line_of(node), &length);
+    const char *colour = scene_syntax_comment(d->text, d->size, (size_t)node_line(node), &length);
     if (colour)
         snprintf(question, question_size, " (did you mean \"%.*s\" in quotes?)", (int)length, colour);
     else if (value->type == CYAML_MAPPING)
@@ -392,7 +395,7 @@ static void ask_for_form(const scene_document *d, const yaml_node_t *node, const
     if (node->type == YAML_SCALAR_NODE && node->data.scalar.length == 0) {
         ask_of_nothing(d, node, value, question);
     } else if (node->type == YAML_SCALAR_NODE && is_list) {
-        const char *text = text_of(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
+        const char *text = node_text(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
         if (entry == CYAML_INT || entry == CYAML_FLOAT) list_of_numbers(text, value, list);
         if (scene_is_colour(value, key) && strspn(digits, "0123456789abcdefABCDEF") == 6 && !digits[6])
             snprintf(question, question_size, " (did you mean \"#%s\" in quotes?)", digits);
@@ -404,19 +407,19 @@ static void ask_for_form(const scene_document *d, const yaml_node_t *node, const
     } else if (node->type == YAML_MAPPING_NODE && entry == CYAML_MAPPING) {
         snprintf(question, question_size, " (is a \"- \" missing before its first key?)");
     } else if (node->type == YAML_MAPPING_NODE && node->data.mapping.pairs.top - node->data.mapping.pairs.start == 1) {
-        const yaml_node_t *name = node_of(d, node->data.mapping.pairs.start->key);
-        const yaml_node_t *rest = node_of(d, node->data.mapping.pairs.start->value);
+        const yaml_node_t *name = find_node_by_index(d, node->data.mapping.pairs.start->key);
+        const yaml_node_t *rest = find_node_by_index(d, node->data.mapping.pairs.start->value);
         if (name->type == YAML_SCALAR_NODE && rest->type == YAML_SCALAR_NODE && rest->data.scalar.length == 0)
-            snprintf(question, question_size, " (did you mean \"{%.32s}\" in quotes?)", text_of(name));
+            snprintf(question, question_size, " (did you mean \"{%.32s}\" in quotes?)", node_text(name));
     }
 }
 
-static insitu_status bad_value(const scene_document *d, const char *path, const yaml_node_t *node,
-                               const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status fail_for_value(const scene_document *d, const char *path, const yaml_node_t *node,
+                                    const cyaml_schema_value_t *value, const scene_key *key)
 {
     const char *words[most_words];
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
-    quote(node, quoted);
+    quote_node(node, quoted);
     scene_expected_words(path, value, key, expected);
     int count = list_choices(value, key, words, most_words);
     const bool is_switch = count == 0 && strstr(expected, "true or false");
@@ -458,7 +461,7 @@ static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_va
 static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t *value, const scene_key *key)
 {
     if (node->type != YAML_SCALAR_NODE) return false;
-    const char *text = text_of(node);
+    const char *text = node_text(node);
     const size_t length = strlen(text);
     if (length != node->data.scalar.length) return false; /* lengths differ if the text contains a NUL */
     double number;
@@ -474,7 +477,7 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
 
 /* Allocates memory for `count` values at *to, or, if the schema has a pointer there, at its target. If *to is NULL, the
  * value is not stored, but read from the document later. */
-static bool make_room(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
+static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
     scene_block *block = base_calloc(1, sizeof *block + (size_t)count * value->data_size);
@@ -491,10 +494,10 @@ static bool make_room(scene_document *d, const cyaml_schema_value_t *value, int 
 static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                   void *to)
 {
-    const char *text = text_of(node);
+    const char *text = node_text(node);
     if (to && value->type == CYAML_STRING) memcpy(to, &text, sizeof text);
     if (!to || value->type == CYAML_STRING) return INSITU_OK;
-    if (!make_room(d, value, 1, &to)) return scene_no_memory(d);
+    if (!allocate_values(d, value, 1, &to)) return scene_no_memory(d);
     switch (value->type) {
     case CYAML_INT: *(int *)to = (int)strtol(text, NULL, 10); break;
     case CYAML_ENUM: *(int *)to = (int)find_choice(text, value)->val; break;
@@ -511,12 +514,12 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
 static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
                             int index, char out[path_size])
 {
-    const yaml_node_t *entry = node_of(d, list->data.sequence.items.start[index]);
+    const yaml_node_t *entry = find_node_by_index(d, list->data.sequence.items.start[index]);
     const yaml_node_pair_t *pair =
         key->is_named && entry->type == YAML_MAPPING_NODE ? find_pair(d, entry, "name", 4) : NULL;
-    const yaml_node_t *name = pair ? node_of(d, pair->value) : NULL;
-    if (name && name->type == YAML_SCALAR_NODE && scene_is_plain_name(text_of(name)))
-        snprintf(out, path_size, "%s.%s", path, text_of(name));
+    const yaml_node_t *name = pair ? find_node_by_index(d, pair->value) : NULL;
+    if (name && name->type == YAML_SCALAR_NODE && scene_is_plain_name(node_text(name)))
+        snprintf(out, path_size, "%s.%s", path, node_text(name));
     else
         snprintf(out, path_size, "%s[%d]", path, index);
 }
@@ -524,21 +527,21 @@ static void write_item_path(const scene_document *d, const char *path, const yam
 static insitu_status check_list(scene_document *d, const char *path, const yaml_node_t *node,
                                 const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
-    if (node->type != YAML_SEQUENCE_NODE) return bad_value(d, path, node, value, key);
-    const int count = item_count(node);
+    if (node->type != YAML_SEQUENCE_NODE) return fail_for_value(d, path, node, value, key);
+    const int count = count_items(node);
     if ((uint32_t)count < value->sequence.min || (uint32_t)count > value->sequence.max) {
         char expected[SCENE_WORDS_SIZE];
         scene_value_words(value, key, expected);
         return scene_bad(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
     }
-    if (!make_room(d, value, count, &to)) return scene_no_memory(d);
+    if (!allocate_values(d, value, count, &to)) return scene_no_memory(d);
     insitu_status status = INSITU_OK;
     for (int i = 0; i < count && status == INSITU_OK; i++) {
         char item_path[path_size];
         write_item_path(d, path, node, key, i, item_path);
         void *item = to ? (char *)to + (size_t)i * value->data_size : NULL;
-        status =
-            check_value(d, item_path, node_of(d, node->data.sequence.items.start[i]), value->sequence.entry, key, item);
+        status = check_value(d, item_path, find_node_by_index(d, node->data.sequence.items.start[i]),
+                             value->sequence.entry, key, item);
     }
     return status;
 }
@@ -548,14 +551,15 @@ static insitu_status check_names(scene_document *d, const char *path, const yaml
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
     const bool is_list = node->type == YAML_SEQUENCE_NODE;
-    const int count = is_list ? item_count(node) : 1;
+    const int count = is_list ? count_items(node) : 1;
     bool is_right = count >= 1 && count <= SCENE_MAX_NAMES;
     for (int i = 0; i < count && is_right; i++)
-        is_right = is_scalar_right(is_list ? node_of(d, node->data.sequence.items.start[i]) : node, value, key);
-    return is_right ? INSITU_OK : bad_value(d, path, node, value, key);
+        is_right =
+            is_scalar_right(is_list ? find_node_by_index(d, node->data.sequence.items.start[i]) : node, value, key);
+    return is_right ? INSITU_OK : fail_for_value(d, path, node, value, key);
 }
 
-static bool takes(const cyaml_schema_value_t *value, const yaml_node_t *node)
+static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *node)
 {
     switch (value->type) {
     case CYAML_MAPPING: return node->type == YAML_MAPPING_NODE;
@@ -571,11 +575,11 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
 {
     for (int i = 0; i < key->form_count; i++) {
         const scene_form *form = &key->forms[i];
-        if (!takes(&form->value, node)) continue;
+        if (!accepts_node(&form->value, node)) continue;
         if (node->type == YAML_SCALAR_NODE && !is_scalar_right(node, &form->value, &form->key)) break;
         return check_value(d, path, node, &form->value, &form->key, NULL);
     }
-    return bad_value(d, path, node, value, key);
+    return fail_for_value(d, path, node, value, key);
 }
 
 /* Returns whether a name that the scene chooses is allowed; such names appear in paths of messages and in calls by
@@ -585,7 +589,7 @@ static bool is_own_name(const yaml_node_t *name)
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
     if (name->type != YAML_SCALAR_NODE || name->data.scalar.length > SCENE_KEY_BYTES) return false;
     size_t i = 0;
-    for (const char *text = text_of(name); i < name->data.scalar.length; i++)
+    for (const char *text = node_text(name); i < name->data.scalar.length; i++)
         if (!text[i] || !(strchr(letters, text[i]) || (i && strchr(digits, text[i])))) return false;
     return i > 0;
 }
@@ -594,27 +598,27 @@ static bool is_own_name(const yaml_node_t *name)
 static insitu_status check_named(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
-    if (node->type != YAML_MAPPING_NODE) return bad_value(d, path, node, value, key);
+    if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
     const yaml_node_pair_t *first = node->data.mapping.pairs.start, *end = node->data.mapping.pairs.top;
     if (end - first > SCENE_MAX_NAMES)
         return scene_bad(d, path, "", "%d names are not allowed, expected at most %d", (int)(end - first),
                          SCENE_MAX_NAMES);
     insitu_status status = INSITU_OK;
     for (const yaml_node_pair_t *p = first; p < end && !status; p++) {
-        const yaml_node_t *name = node_of(d, p->key);
+        const yaml_node_t *name = find_node_by_index(d, p->key);
         char quoted[quote_size], own_path[path_size];
-        quote(name, quoted);
+        quote_node(name, quoted);
         if (!is_own_name(name))
             return base_fail(d->error, INSITU_ERROR_SCENE,
                              "%.300s:%d: %s: the name %s is not allowed, expected a letter or _ and then letters, "
                              "digits, _ or -, at most %d bytes",
-                             d->file_name, line_of(name), path, quoted, SCENE_KEY_BYTES);
-        if (find_pair(d, node, text_of(name), name->data.scalar.length) != p)
+                             d->file_name, node_line(name), path, quoted, SCENE_KEY_BYTES);
+        if (find_pair(d, node, node_text(name), name->data.scalar.length) != p)
             return base_fail(d->error, INSITU_ERROR_SCENE,
-                             "%.300s:%d: %s: the name %s is given twice, expected it once", d->file_name, line_of(name),
-                             path, quoted);
-        snprintf(own_path, sizeof own_path, "%s.%s", path, text_of(name));
-        status = check_value(d, own_path, node_of(d, p->value), &key->named->value, &key->named->key, NULL);
+                             "%.300s:%d: %s: the name %s is given twice, expected it once", d->file_name,
+                             node_line(name), path, quoted);
+        snprintf(own_path, sizeof own_path, "%s.%s", path, node_text(name));
+        status = check_value(d, own_path, find_node_by_index(d, p->value), &key->named->value, &key->named->key, NULL);
     }
     return status;
 }
@@ -623,7 +627,7 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
  * that has such a key. */
 static void ask_for_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
-    const char *text = name->type == YAML_SCALAR_NODE ? text_of(name) : "", *holder = NULL;
+    const char *text = name->type == YAML_SCALAR_NODE ? node_text(name) : "", *holder = NULL;
     int holders = 0;
     for (int i = 0; mapping->fields[i].key; i++) {
         const scene_mapping *child = mapping->keys[i].child;
@@ -639,25 +643,25 @@ static void ask_for_place(const yaml_node_t *name, const scene_mapping *mapping,
             snprintf(question, question_size, " (it stands at the top of the file, beside images)");
 }
 
-static insitu_status bad_key(scene_document *d, const char *path, const yaml_node_t *name, const scene_mapping *mapping,
-                             const char *fault)
+static insitu_status fail_for_key(scene_document *d, const char *path, const yaml_node_t *name,
+                                  const scene_mapping *mapping, const char *fault)
 {
     const scene_key holder = {.child = mapping};
     const cyaml_schema_value_t value = {.type = CYAML_MAPPING};
     const char *words[most_words];
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
     int count = 0;
-    quote(name, quoted);
+    quote_node(name, quoted);
     scene_value_words(&value, &holder, expected);
     for (const cyaml_schema_field_t *f = mapping->fields; f->key && count < most_words; f++) words[count++] = f->key;
     ask_for_meant(name, words, count, question);
     if (!*question) ask_for_place(name, mapping, question);
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s%s, expected %s", d->file_name,
-                     line_of(name), path, *path ? ": " : "", quoted, fault, question, expected);
+                     node_line(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
 
 /* Returns the reason why a key of earlier versions was removed, or NULL if there never was such a key. */
-static const char *why_gone(const char *key)
+static const char *find_removal_reason(const char *key)
 {
     static const char *const gone[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},
                                           {"root_steps", "gone (roots are polished until they stay)"},
@@ -670,27 +674,27 @@ static const char *why_gone(const char *key)
 static insitu_status check_pair(scene_document *d, const char *path, const yaml_node_pair_t *pair,
                                 const scene_mapping *mapping, unsigned *seen, void *to)
 {
-    const yaml_node_t *name = node_of(d, pair->key);
+    const yaml_node_t *name = find_node_by_index(d, pair->key);
     int i = 0;
     while (mapping->fields[i].key &&
-           (name->type != YAML_SCALAR_NODE || strcmp(text_of(name), mapping->fields[i].key) != 0)) {
+           (name->type != YAML_SCALAR_NODE || strcmp(node_text(name), mapping->fields[i].key) != 0)) {
         i++;
     }
     if (!mapping->fields[i].key) {
-        const char *fault = name->type == YAML_SCALAR_NODE ? why_gone(text_of(name)) : NULL;
-        return bad_key(d, path, name, mapping, fault ? fault : "unknown");
+        const char *fault = name->type == YAML_SCALAR_NODE ? find_removal_reason(node_text(name)) : NULL;
+        return fail_for_key(d, path, name, mapping, fault ? fault : "unknown");
     }
     if (*seen & 1u << i)
         return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key \"%s\" is given twice, expected it once",
-                         d->file_name, line_of(name), path, *path ? ": " : "", mapping->fields[i].key);
+                         d->file_name, node_line(name), path, *path ? ": " : "", mapping->fields[i].key);
     *seen |= 1u << i;
     char value_path[path_size];
     snprintf(value_path, sizeof value_path, "%s%s%s", path, *path ? "." : "", mapping->fields[i].key);
     const cyaml_schema_field_t *field = &mapping->fields[i];
-    const yaml_node_t *node = node_of(d, pair->value);
+    const yaml_node_t *node = find_node_by_index(d, pair->value);
     if (field->value.type == CYAML_IGNORE) to = NULL;
     if (to && field->value.type == CYAML_SEQUENCE && node->type == YAML_SEQUENCE_NODE)
-        *(int *)((char *)to + field->count_offset) = item_count(node);
+        *(int *)((char *)to + field->count_offset) = count_items(node);
     void *place = to ? (char *)to + field->data_offset : NULL;
     return check_value(d, value_path, node, &field->value, &mapping->keys[i], place);
 }
@@ -718,8 +722,8 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
 {
     switch (value->type) {
     case CYAML_MAPPING:
-        if (node->type != YAML_MAPPING_NODE) return bad_value(d, path, node, value, key);
-        if (!make_room(d, value, 1, &to)) return scene_no_memory(d);
+        if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
+        if (!allocate_values(d, value, 1, &to)) return scene_no_memory(d);
         return check_mapping(d, path, node, key->child, to);
     case CYAML_SEQUENCE:
     case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key, to);
@@ -727,7 +731,7 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
         return (key->named ? check_named : key->forms ? check_forms : check_names)(d, path, node, value, key);
     default:
         return is_scalar_right(node, value, key) ? store_scalar(d, node, value, to)
-                                                 : bad_value(d, path, node, value, key);
+                                                 : fail_for_value(d, path, node, value, key);
     }
 }
 

@@ -79,15 +79,15 @@ static bool is_letter(char c)
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (unsigned char)c >= 0x80;
 }
 
-static char peek(parser *p)
+static char peek_character(parser *p)
 {
     while (is_blank(*p->at)) p->at++;
     return *p->at;
 }
 
-static bool take(parser *p, char c)
+static bool accept_character(parser *p, char c)
 {
-    if (peek(p) != c) return false;
+    if (peek_character(p) != c) return false;
     p->at++;
     return true;
 }
@@ -100,9 +100,9 @@ static int word_length(const char *at)
     return length ? length : *at != '\0';
 }
 
-static bool fail_at(parser *p, const char *expected)
+static bool fail_expecting(parser *p, const char *expected)
 {
-    if (peek(p) == '\0') return fail(p, "\"%.60s\" ends too early, expected %s", p->text, expected);
+    if (peek_character(p) == '\0') return fail(p, "\"%.60s\" ends too early, expected %s", p->text, expected);
     const int before = (int)(p->at - p->text);
     return fail(p, "\"%.*s\" stands behind \"%.*s\", expected %s", word_length(p->at), p->at, before > 40 ? 40 : before,
                 before > 40 ? p->at - 40 : p->text, expected);
@@ -110,7 +110,7 @@ static bool fail_at(parser *p, const char *expected)
 
 /* ---- instructions ----------------------------------------------------------------------------------------------- */
 
-static bool add(parser *p, scene_operation operation, int input, double number)
+static bool add_instruction(parser *p, scene_operation operation, int input, double number)
 {
     scene_expression *out = p->out;
     if (out->count % 16 == 0) {
@@ -123,18 +123,18 @@ static bool add(parser *p, scene_operation operation, int input, double number)
     return true;
 }
 
-static bool push(parser *p, scene_operation operation, int input, double number)
+static bool push_operand(parser *p, scene_operation operation, int input, double number)
 {
     if (++p->used > SCENE_STACK)
         return fail(p, "more than %d intermediate values are open at once, expected fewer brackets", SCENE_STACK);
     if (p->used > p->out->depth) p->out->depth = p->used;
-    return add(p, operation, input, number);
+    return add_instruction(p, operation, input, number);
 }
 
 static bool add_binary(parser *p, scene_operation operation)
 {
     p->used--;
-    return add(p, operation, 0, 0);
+    return add_instruction(p, operation, 0, 0);
 }
 
 /* Emits a power. An exponent that is a small whole number gets an instruction that needs no logarithm. */
@@ -146,7 +146,7 @@ static bool add_power(parser *p)
         return add_binary(p, SCENE_OP_POWER);
     p->out->count--;
     p->used--;
-    return add(p, SCENE_OP_WHOLE_POWER, 0, exponent);
+    return add_instruction(p, SCENE_OP_WHOLE_POWER, 0, exponent);
 }
 
 /* ---- fields ----------------------------------------------------------------------------------------------------- */
@@ -156,13 +156,13 @@ static bool push_input(parser *p, const char *name, int component)
     scene_expression *out = p->out;
     for (int i = 0; i < out->input_count; i++)
         if (strcmp(out->inputs[i].name, name) == 0 && out->inputs[i].component == component)
-            return push(p, SCENE_OP_PUSH_INPUT, i, 0);
+            return push_operand(p, SCENE_OP_PUSH_INPUT, i, 0);
     scene_reference *inputs = base_realloc(out->inputs, (size_t)(out->input_count + 1) * sizeof *inputs);
     if (!inputs) return fail_for_memory(p);
     out->inputs = inputs;
     inputs[out->input_count] = (scene_reference){base_strdup(name), component};
     if (!inputs[out->input_count].name) return fail_for_memory(p);
-    return push(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
+    return push_operand(p, SCENE_OP_PUSH_INPUT, out->input_count++, 0);
 }
 
 /* Reads the component that follows a point. */
@@ -206,9 +206,9 @@ static bool is_name(char c)
 static bool parse_magnitude(parser *p)
 {
     char name[NAME_SIZE];
-    if (!is_name(peek(p))) return fail_at(p, "the name of a field, as in mag(velocity)");
+    if (!is_name(peek_character(p))) return fail_expecting(p, "the name of a field, as in mag(velocity)");
     if (!parse_name(p, name)) return false;
-    if (!take(p, ')')) return fail_at(p, ") behind the field's name: mag takes a field alone");
+    if (!accept_character(p, ')')) return fail_expecting(p, ") behind the field's name: mag takes a field alone");
     return push_input(p, name, SCENE_COMPONENT_MAGNITUDE);
 }
 
@@ -219,11 +219,12 @@ static bool parse_operands(parser *p, int function)
     do {
         if (!parse_sum(p)) return false;
         found++;
-    } while (take(p, ','));
-    if (!take(p, ')')) return fail_at(p, "an operator, a comma or )");
+    } while (accept_character(p, ','));
+    if (!accept_character(p, ')')) return fail_expecting(p, "an operator, a comma or )");
     if (found != expected) return fail(p, "%s has %d operands, expected %d", functions[function].name, found, expected);
     if (functions[function].operation == SCENE_OP_POWER) return add_power(p);
-    return expected == 2 ? add_binary(p, functions[function].operation) : add(p, functions[function].operation, 0, 0);
+    return expected == 2 ? add_binary(p, functions[function].operation)
+                         : add_instruction(p, functions[function].operation, 0, 0);
 }
 
 static bool fail_for_function(parser *p, const char *name)
@@ -251,7 +252,7 @@ static bool parse_field(parser *p)
     const bool is_quoted = !is_letter(*p->at);
     int component = SCENE_COMPONENT_ONLY;
     if (!parse_name(p, name)) return false;
-    if (!is_quoted && take(p, '(')) return parse_function(p, name);
+    if (!is_quoted && accept_character(p, '(')) return parse_function(p, name);
     if (*p->at == '.') {
         p->at++;
         if (!parse_component(p, name, &component)) return false;
@@ -279,17 +280,17 @@ static bool parse_number(parser *p)
     const double number = strtod(digits, NULL);
     if (!isfinite(number)) return fail(p, "the number %s is too large, expected one below 1.8e308", digits);
     p->at = end;
-    return push(p, SCENE_OP_PUSH_NUMBER, 0, number);
+    return push_operand(p, SCENE_OP_PUSH_NUMBER, 0, number);
 }
 
 static bool parse_primary(parser *p)
 {
-    const char c = peek(p);
+    const char c = peek_character(p);
     if (is_digit(c) || (c == '.' && is_digit(p->at[1]))) return parse_number(p);
     if (is_name(c)) return parse_field(p);
-    if (!take(p, '(')) return fail_at(p, "a number, a field or (");
+    if (!accept_character(p, '(')) return fail_expecting(p, "a number, a field or (");
     if (!parse_sum(p)) return false;
-    return take(p, ')') || fail_at(p, "an operator or )");
+    return accept_character(p, ')') || fail_expecting(p, "an operator or )");
 }
 
 static bool parse_sign(parser *p);
@@ -299,7 +300,7 @@ static bool parse_power(parser *p)
     if (!parse_primary(p)) return false;
     if (p->at[0] == '*' && p->at[1] == '*')
         return fail(p, "** is no operator (did you mean ^?), expected + - * / or ^");
-    if (!take(p, '^')) return true;
+    if (!accept_character(p, '^')) return true;
     const int before = p->out->count;
     if (!parse_sign(p)) return false;
     const scene_instruction *last = &p->out->instructions[p->out->count - 1];
@@ -314,17 +315,17 @@ static bool parse_power(parser *p)
 static bool parse_sign(parser *p)
 {
     bool is_negative = false;
-    for (; peek(p) == '-' || *p->at == '+'; p->at++) is_negative = is_negative != (*p->at == '-');
+    for (; peek_character(p) == '-' || *p->at == '+'; p->at++) is_negative = is_negative != (*p->at == '-');
     if (++p->nested > MOST_NESTED) return fail(p, "more than %d brackets are open, expected fewer", MOST_NESTED);
     if (!parse_power(p)) return false;
     p->nested--;
-    return !is_negative || add(p, SCENE_OP_NEGATE, 0, 0);
+    return !is_negative || add_instruction(p, SCENE_OP_NEGATE, 0, 0);
 }
 
 static bool parse_product(parser *p)
 {
     if (!parse_sign(p)) return false;
-    while (peek(p) == '*' || *p->at == '/') {
+    while (peek_character(p) == '*' || *p->at == '/') {
         const scene_operation operation = *p->at++ == '*' ? SCENE_OP_MULTIPLY : SCENE_OP_DIVIDE;
         if (!parse_sign(p) || !add_binary(p, operation)) return false;
     }
@@ -334,7 +335,7 @@ static bool parse_product(parser *p)
 static bool parse_sum(parser *p)
 {
     if (!parse_product(p)) return false;
-    while (peek(p) == '+' || *p->at == '-') {
+    while (peek_character(p) == '+' || *p->at == '-') {
         const scene_operation operation = *p->at++ == '+' ? SCENE_OP_ADD : SCENE_OP_SUBTRACT;
         if (!parse_product(p) || !add_binary(p, operation)) return false;
     }
@@ -347,8 +348,8 @@ scene_parse_result scene_parse_expression(const char *text, scene_expression *ou
     *out = (scene_expression){0};
     if (strlen(text) > SCENE_EXPRESSION_BYTES)
         fail(&p, "an expression of %zu bytes stands there, expected at most %d", strlen(text), SCENE_EXPRESSION_BYTES);
-    else if (parse_sum(&p) && peek(&p) != '\0')
-        fail_at(&p, "an operator (+ - * / ^) or the end");
+    else if (parse_sum(&p) && peek_character(&p) != '\0')
+        fail_expecting(&p, "an operator (+ - * / ^) or the end");
     if (p.result != SCENE_PARSED) scene_expression_free(out);
     return p.result;
 }
@@ -366,7 +367,7 @@ void scene_expression_free(scene_expression *expression)
 #define FOR_EACH(...)                                                                                                  \
     for (int i = 0; i < count; i++) __VA_ARGS__
 
-static double whole_power(double base, int exponent)
+static double integer_power(double base, int exponent)
 {
     double power = 1;
     for (int left = abs(exponent); left; left >>= 1, base *= base)
@@ -374,12 +375,12 @@ static double whole_power(double base, int exponent)
     return exponent < 0 ? 1 / power : power;
 }
 
-static void raise_whole(double *restrict a, int exponent, int count)
+static void raise_to_integer(double *restrict a, int exponent, int count)
 {
     if (exponent == 2)
         FOR_EACH(a[i] *= a[i]);
     else
-        FOR_EACH(a[i] = whole_power(a[i], exponent));
+        FOR_EACH(a[i] = integer_power(a[i], exponent));
 }
 
 static void apply_function(scene_operation operation, double *restrict a, int count)
@@ -430,7 +431,7 @@ void scene_evaluate(const scene_expression *expression, const double *const *inp
             top += SCENE_BLOCK;
             memcpy(top, inputs[at->input], (size_t)count * sizeof *top);
         } else if (at->operation == SCENE_OP_WHOLE_POWER) {
-            raise_whole(top, (int)at->number, count);
+            raise_to_integer(top, (int)at->number, count);
         } else if (is_operator(at->operation)) {
             top -= SCENE_BLOCK;
             apply_operator(at->operation, top, top + SCENE_BLOCK, count);

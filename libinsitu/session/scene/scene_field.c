@@ -84,7 +84,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
  * ----------------------------------------------------------------------------------------- */
 
 /* Returns the layer's contour lines; NULL for a volume, which has none. */
-static scene_lines *lines_of(const scene_image *image, scene_layer_kind kind, int layer)
+static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind kind, int layer)
 {
     switch (kind) {
     case SCENE_ISOSURFACE: return &image->isosurfaces[layer].lines;
@@ -95,11 +95,11 @@ static scene_lines *lines_of(const scene_image *image, scene_layer_kind kind, in
 }
 
 /* Returns the layer's field with this role; NULL if it has none. */
-static scene_field *field_of(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
+static scene_field *find_role_field(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
 {
     scene_isosurface *isosurface = kind == SCENE_ISOSURFACE ? &image->isosurfaces[layer] : NULL;
     scene_surface *surface = kind == SCENE_SURFACE ? &image->surfaces[layer] : NULL;
-    scene_lines *lines = role == SCENE_LINES ? lines_of(image, kind, layer) : NULL;
+    scene_lines *lines = role == SCENE_LINES ? find_layer_lines(image, kind, layer) : NULL;
     if (role == SCENE_LINES) return lines && lines->is_given ? &lines->field : NULL;
     if (role == SCENE_THRESHOLD) return surface && surface->threshold.is_given ? &surface->threshold.field : NULL;
     if (surface) return role == SCENE_COLOURS && surface->has_colour_by ? &surface->colour_by : NULL;
@@ -119,7 +119,7 @@ scene_field *scene_next_field(scene_field_walk *walk)
         if (kind == KINDS) return NULL;
         walk->kind = (scene_layer_kind)kind;
         walk->role = (scene_field_role)(walk->place++ % ROLES);
-        scene_field *field = field_of(image, walk->kind, layer, walk->role);
+        scene_field *field = find_role_field(image, walk->kind, layer, walk->role);
         if (field) return field;
     }
 }
@@ -132,7 +132,7 @@ const char *scene_layer_word(scene_layer_kind kind)
 
 /* ---- materials --------------------------------------------------------------------------------------------------- */
 
-static float given_or(const double *given, float otherwise)
+static float value_or_default(const double *given, float otherwise)
 {
     return given ? (float)*given : otherwise;
 }
@@ -141,6 +141,6 @@ scene_material scene_convert_material(const scene_file_material *in)
 {
     static const scene_file_material none;
     if (!in) in = &none;
-    return (scene_material){given_or(in->ambient, 0.15F), given_or(in->diffuse, 0.75F), given_or(in->specular, 0.25F),
-                            given_or(in->shininess, 32)};
+    return (scene_material){value_or_default(in->ambient, 0.15F), value_or_default(in->diffuse, 0.75F),
+                            value_or_default(in->specular, 0.25F), value_or_default(in->shininess, 32)};
 }

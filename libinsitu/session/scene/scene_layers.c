@@ -165,8 +165,8 @@ static const char *layer_word(const scene_file_layer *layer)
 }
 
 /* Converts the clips of a layer, which must be the last layer of its kind that was converted. */
-static insitu_status convert_clip_of(const scene_document *d, const char *path, const scene_file_layer *in,
-                                     scene_image *out)
+static insitu_status convert_layer_clip(const scene_document *d, const char *path, const scene_file_layer *in,
+                                        scene_image *out)
 {
     scene_volume *volume = in->volume ? &out->volumes[out->volume_count - 1] : NULL;
     if (in->slice)
@@ -183,7 +183,7 @@ static insitu_status convert_clip_of(const scene_document *d, const char *path, 
 }
 
 /* Stores the index of a layer, which must be the last layer of its kind that was converted. */
-static void number_layer(const scene_file_layer *in, int number, scene_image *out)
+static void set_layer_number(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;
     if (in->surface) out->surfaces[out->surface_count - 1].number = number;
@@ -219,8 +219,8 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
         char layer_path[SCENE_PATH_SIZE - 16];
         snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);
-        if (!status) status = convert_clip_of(d, layer_path, layer, out);
-        if (!status) number_layer(layer, i, out);
+        if (!status) status = convert_layer_clip(d, layer_path, layer, out);
+        if (!status) set_layer_number(layer, i, out);
         values += layer->isosurface ? layer->isosurface->values_count : 0;
     }
     return status;

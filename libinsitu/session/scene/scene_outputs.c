@@ -31,7 +31,7 @@ typedef struct placeholder {
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
 /* Parses "{WORD:0N}"; text[at] is its ":". */
-static placeholder read_whole(const char *text, size_t at, placeholder_kind kind)
+static placeholder parse_integer_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '0') return no_placeholder;
     const size_t count = strspn(text + at + 2, "0123456789");
@@ -41,7 +41,7 @@ static placeholder read_whole(const char *text, size_t at, placeholder_kind kind
 }
 
 /* Parses "{WORD:.Nf}", or the same with e or g; text[at] is its ":". */
-static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
+static placeholder parse_real_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '.') return no_placeholder;
     const size_t count = strspn(text + at + 2, "0123456789");
@@ -52,7 +52,7 @@ static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
 }
 
 /* Parses the placeholder at the start of the text, which begins with '{'. */
-static placeholder read_placeholder(const char *text)
+static placeholder parse_placeholder(const char *text)
 {
     static const struct {
         const char *word;
@@ -68,7 +68,8 @@ static placeholder read_placeholder(const char *text)
         if (strncmp(text, known[i].word, length) != 0) continue;
         if (text[length] == '}') return (placeholder){known[i].kind, known[i].digits, known[i].conversion, length + 1};
         if (text[length] != ':' || known[i].conversion == 't') continue;
-        return known[i].conversion ? read_real(text, length, known[i].kind) : read_whole(text, length, known[i].kind);
+        return known[i].conversion ? parse_real_format(text, length, known[i].kind)
+                                   : parse_integer_format(text, length, known[i].kind);
     }
     return no_placeholder;
 }
@@ -98,11 +99,11 @@ static int write_value(const placeholder *p, const scene_moment *moment, char *o
 
 /* Writes the expanded text to out and returns its length. size: bytes at out; with NULL and 0 only the length is
  * computed. */
-static size_t expand(const char *pattern, const scene_moment *moment, char *out, size_t size)
+static size_t expand_pattern(const char *pattern, const scene_moment *moment, char *out, size_t size)
 {
     size_t length = 0;
     while (*pattern) {
-        const placeholder p = *pattern == '{' ? read_placeholder(pattern) : no_placeholder;
+        const placeholder p = *pattern == '{' ? parse_placeholder(pattern) : no_placeholder;
         char *at = out ? out + length : NULL;
         int written = 1;
         if (p.kind != PLACEHOLDER_NONE)
@@ -120,16 +121,16 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
 {
     c_numbers numbers;
     if (!c_numbers_begin(&numbers)) return NULL;
-    const size_t size = expand(pattern, moment, NULL, 0) + 1;
+    const size_t size = expand_pattern(pattern, moment, NULL, 0) + 1;
     char *text = base_alloc(size);
-    if (text) expand(pattern, moment, text, size);
+    if (text) expand_pattern(pattern, moment, text, size);
     c_numbers_end(&numbers);
     return text;
 }
 
 /* Returns the key without which the placeholder has no value, if the image lacks this key; else NULL. image: the path
  * of the image in the file. */
-static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
+static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
         placeholder_kind kind;
@@ -149,7 +150,7 @@ static const char *what_lacks(const scene_document *d, const char *image, placeh
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text)
 {
     for (const char *open = strchr(text, '{'); open; open = strchr(open + 1, '{')) {
-        const placeholder_kind kind = read_placeholder(open).kind;
+        const placeholder_kind kind = parse_placeholder(open).kind;
         const int length = (int)strcspn(open, "}") + 1 < 40 ? (int)strcspn(open, "}") + 1 : 40;
         if (kind == PLACEHOLDER_NONE)
             return scene_bad(d, path, key,
@@ -159,7 +160,7 @@ insitu_status scene_check_placeholders(const scene_document *d, const char *path
                              length, open);
         char image[SCENE_PATH_SIZE];
         snprintf(image, sizeof image, "%.*s", (int)strcspn(path, "."), path);
-        const char *lack = what_lacks(d, image, kind);
+        const char *lack = find_missing_key(d, image, kind);
         if (lack) return scene_bad(d, path, key, "\"%.*s\" is of images with %s alone", length, open, lack);
     }
     return INSITU_OK;
@@ -294,7 +295,7 @@ static insitu_status refuse_file(const scene_document *d, const scene *s, const 
                      word);
 }
 
-static const scene_output *output_of(const scene *s, const written_file *file)
+static const scene_output *find_output(const scene *s, const written_file *file)
 {
     return &s->images[file->image].outputs[file->output];
 }
@@ -306,7 +307,7 @@ static insitu_status check_files(const scene_document *d, const scene *s, const 
     int found = -1;
     for (int i = 1; i < count; i++) {
         if (strcmp(files[i - 1].path, files[i].path) != 0) continue;
-        if (output_of(s, &files[i - 1])->montage >= 0 && output_of(s, &files[i])->montage >= 0) continue;
+        if (find_output(s, &files[i - 1])->montage >= 0 && find_output(s, &files[i])->montage >= 0) continue;
         if (found < 0 || files[i].number < files[found].number) found = i;
     }
     return found < 0 ? INSITU_OK : refuse_file(d, s, &files[found - 1], &files[found]);

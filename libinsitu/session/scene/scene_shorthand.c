@@ -17,14 +17,14 @@ typedef struct rewrite {
     bool has_memory;
 } rewrite;
 
-static yaml_node_t *node_of(const rewrite *r, int number)
+static yaml_node_t *find_node_by_index(const rewrite *r, int number)
 {
     return yaml_document_get_node(r->document, number);
 }
 
-static const char *text_of(const rewrite *r, int number)
+static const char *node_text(const rewrite *r, int number)
 {
-    const yaml_node_t *node = node_of(r, number);
+    const yaml_node_t *node = find_node_by_index(r, number);
     return node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : NULL;
 }
 
@@ -33,7 +33,7 @@ static const char *text_of(const rewrite *r, int number)
 static int made(rewrite *r, int number)
 {
     if (number)
-        node_of(r, number)->start_mark = r->mark;
+        find_node_by_index(r, number)->start_mark = r->mark;
     else
         r->has_memory = false;
     return number;
@@ -87,7 +87,7 @@ static int make_list_of(rewrite *r, int item)
 
 /* ---- colours and axes ------------------------------------------------------------------------------------------- */
 
-static int by_name(const void *name, const void *entry)
+static int compare_name(const void *name, const void *entry)
 {
     return strcmp(name, ((const scene_colour_name *)entry)->name);
 }
@@ -102,7 +102,7 @@ static bool read_colour(const char *text, double colour[3])
     } else {
         const scene_colour_name *named =
             bsearch(text, scene_colour_names, sizeof scene_colour_names / sizeof *scene_colour_names,
-                    sizeof *scene_colour_names, by_name);
+                    sizeof *scene_colour_names, compare_name);
         if (!named) return false;
         rgb = named->rgb;
     }
@@ -123,7 +123,7 @@ static bool read_axis(const char *text, double axis[3])
 static void expand_colour(rewrite *r, int *value)
 {
     double colour[3];
-    const char *text = text_of(r, *value);
+    const char *text = node_text(r, *value);
     if (text && read_colour(text, colour)) *value = make_vector(r, colour);
 }
 
@@ -131,18 +131,18 @@ static void expand_colour(rewrite *r, int *value)
 static void expand_colours(rewrite *r, int *value)
 {
     double colour[3];
-    const char *text = text_of(r, *value);
+    const char *text = node_text(r, *value);
     if (text && read_colour(text, colour)) *value = make_list_of(r, make_vector(r, colour));
-    if (text || node_of(r, *value)->type != YAML_SEQUENCE_NODE) return;
-    yaml_node_item_t *items = node_of(r, *value)->data.sequence.items.start;
-    const yaml_node_item_t *end = node_of(r, *value)->data.sequence.items.top;
+    if (text || find_node_by_index(r, *value)->type != YAML_SEQUENCE_NODE) return;
+    yaml_node_item_t *items = find_node_by_index(r, *value)->data.sequence.items.start;
+    const yaml_node_item_t *end = find_node_by_index(r, *value)->data.sequence.items.top;
     for (; items < end && r->has_memory; items++) expand_colour(r, items);
 }
 
 static void expand_axis(rewrite *r, int *value)
 {
     double axis[3];
-    const char *text = text_of(r, *value);
+    const char *text = node_text(r, *value);
     if (text && read_axis(text, axis)) *value = make_vector(r, axis);
 }
 
@@ -152,7 +152,7 @@ static void expand_axis(rewrite *r, int *value)
 static void expand_text(rewrite *r, const char *key, int *value)
 {
     const int text = *value;
-    if (!text_of(r, text) || !*text_of(r, text)) return;
+    if (!node_text(r, text) || !*node_text(r, text)) return;
     *value = make_mapping(r);
     append_pair(r, *value, key, text);
 }
@@ -166,21 +166,21 @@ static void expand_field(rewrite *r, int *value)
 static void expand_outputs(rewrite *r, int *value)
 {
     expand_text(r, "path", value);
-    if (r->has_memory && node_of(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
-    if (!r->has_memory || node_of(r, *value)->type != YAML_SEQUENCE_NODE) return;
-    for (int i = 0; r->has_memory &&
-                    node_of(r, *value)->data.sequence.items.start + i < node_of(r, *value)->data.sequence.items.top;
+    if (r->has_memory && find_node_by_index(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
+    if (!r->has_memory || find_node_by_index(r, *value)->type != YAML_SEQUENCE_NODE) return;
+    for (int i = 0; r->has_memory && find_node_by_index(r, *value)->data.sequence.items.start + i <
+                                         find_node_by_index(r, *value)->data.sequence.items.top;
          i++) {
-        int item = node_of(r, *value)->data.sequence.items.start[i];
+        int item = find_node_by_index(r, *value)->data.sequence.items.start[i];
         expand_text(r, "path", &item);
-        if (item) node_of(r, *value)->data.sequence.items.start[i] = item;
+        if (item) find_node_by_index(r, *value)->data.sequence.items.start[i] = item;
     }
 }
 
 /* Expands true to an empty mapping, which means all defaults. For false the pair is removed: *value becomes 0. */
 static void expand_switch(rewrite *r, int *value)
 {
-    const char *text = text_of(r, *value);
+    const char *text = node_text(r, *value);
     if (!text) return;
     if (strcmp(text, "true") == 0) *value = make_mapping(r);
     if (strcmp(text, "false") == 0) *value = 0;
@@ -189,7 +189,7 @@ static void expand_switch(rewrite *r, int *value)
 /* Expands `automatic` to {automatic: {}}. */
 static void expand_camera(rewrite *r, int *value)
 {
-    const char *text = text_of(r, *value);
+    const char *text = node_text(r, *value);
     if (!text || strcmp(text, "automatic") != 0) return;
     *value = make_mapping(r);
     append_pair(r, *value, "automatic", make_mapping(r));
@@ -198,24 +198,24 @@ static void expand_camera(rewrite *r, int *value)
 /* Expands a single number to a list of this number. */
 static void expand_values(rewrite *r, int *value)
 {
-    const char *text = text_of(r, *value);
+    const char *text = node_text(r, *value);
     if (text && *text && !text[strspn(text, "+-.0123456789eE")]) *value = make_list_of(r, *value);
 }
 
 /* Expands a single mapping to a list of this mapping. */
 static void expand_mappings(rewrite *r, int *value)
 {
-    if (node_of(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
+    if (find_node_by_index(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
 }
 
 /* Adds a plane perpendicular to z to a slice that gives no planes. */
 static void expand_slice(rewrite *r, int *value)
 {
     static const double z[3] = {0, 0, 1};
-    const yaml_node_t *slice = node_of(r, *value);
+    const yaml_node_t *slice = find_node_by_index(r, *value);
     if (slice->type != YAML_MAPPING_NODE) return;
     for (const yaml_node_pair_t *p = slice->data.mapping.pairs.start; p < slice->data.mapping.pairs.top; p++) {
-        const char *key = text_of(r, p->key);
+        const char *key = node_text(r, p->key);
         if (key && strcmp(key, "planes") == 0) return;
     }
     const int plane = make_mapping(r);
@@ -226,13 +226,14 @@ static void expand_slice(rewrite *r, int *value)
 /* Expands a mapping from names to a list of mappings with the key `name`. A text becomes an expression. */
 static void expand_fields(rewrite *r, int *value)
 {
-    if (node_of(r, *value)->type != YAML_MAPPING_NODE) return;
+    if (find_node_by_index(r, *value)->type != YAML_MAPPING_NODE) return;
     const int list = make_list(r), from = *value;
-    const int count = (int)(node_of(r, from)->data.mapping.pairs.top - node_of(r, from)->data.mapping.pairs.start);
+    const int count = (int)(find_node_by_index(r, from)->data.mapping.pairs.top -
+                            find_node_by_index(r, from)->data.mapping.pairs.start);
     for (int i = 0; i < count && r->has_memory; i++) {
-        const yaml_node_pair_t pair = node_of(r, from)->data.mapping.pairs.start[i];
-        const bool is_mapping = node_of(r, pair.value)->type == YAML_MAPPING_NODE;
-        r->mark = node_of(r, pair.key)->start_mark;
+        const yaml_node_pair_t pair = find_node_by_index(r, from)->data.mapping.pairs.start[i];
+        const bool is_mapping = find_node_by_index(r, pair.value)->type == YAML_MAPPING_NODE;
+        r->mark = find_node_by_index(r, pair.key)->start_mark;
         const int entry = is_mapping ? pair.value : make_mapping(r);
         if (!is_mapping) append_pair(r, entry, "expression", pair.value);
         append_pair(r, entry, "name", pair.key);
@@ -286,7 +287,7 @@ const char *scene_shorthand_words(const char *key, size_t length)
 
 /* Replaces the first word `from` in a text, whose words are joined by _, by the word `to`, which is at least as
  * long. */
-static void respell(char *text, size_t size, const char *from, const char *to)
+static void replace_word(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
@@ -301,22 +302,22 @@ static void respell(char *text, size_t size, const char *from, const char *to)
 static void expand_key(rewrite *r, int *key)
 {
     char text[64];
-    const char *written = text_of(r, *key);
+    const char *written = node_text(r, *key);
     if (!written || strlen(written) >= sizeof text - 2) return;
     snprintf(text, sizeof text, "%s", written);
-    respell(text, sizeof text, "color", "colour");
-    respell(text, sizeof text, "center", "centre");
-    r->mark = node_of(r, *key)->start_mark;
+    replace_word(text, sizeof text, "color", "colour");
+    replace_word(text, sizeof text, "center", "centre");
+    r->mark = find_node_by_index(r, *key)->start_mark;
     if (strcmp(text, written) != 0) *key = make_text(r, text);
 }
 
 static void expand_pair(rewrite *r, yaml_node_pair_t *pair)
 {
     expand_key(r, &pair->key);
-    const char *key = r->has_memory ? text_of(r, pair->key) : NULL;
+    const char *key = r->has_memory ? node_text(r, pair->key) : NULL;
     for (size_t i = 0; key && i < sizeof rules / sizeof *rules; i++) {
         if (strcmp(key, rules[i].key) != 0) continue;
-        r->mark = node_of(r, pair->value)->start_mark;
+        r->mark = find_node_by_index(r, pair->value)->start_mark;
         rules[i].expand(r, &pair->value);
         return;
     }
@@ -324,22 +325,22 @@ static void expand_pair(rewrite *r, yaml_node_pair_t *pair)
 
 static void expand_mapping(rewrite *r, int number)
 {
-    yaml_node_pair_t *kept = node_of(r, number)->data.mapping.pairs.start;
-    yaml_node_pair_t *pair = kept, *end = node_of(r, number)->data.mapping.pairs.top;
+    yaml_node_pair_t *kept = find_node_by_index(r, number)->data.mapping.pairs.start;
+    yaml_node_pair_t *pair = kept, *end = find_node_by_index(r, number)->data.mapping.pairs.top;
     for (; pair < end && r->has_memory; pair++) {
         expand_pair(r, pair);
         if (pair->value) *kept++ = *pair;
     }
-    if (r->has_memory) node_of(r, number)->data.mapping.pairs.top = kept;
+    if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;
 }
 
 /* Returns the node of a mapping whose keys are chosen by the scene, or 0 if there is none. */
-static int find_own(const rewrite *r, const char *name)
+static int find_named_mapping(const rewrite *r, const char *name)
 {
-    const yaml_node_t *root = node_of(r, 1);
+    const yaml_node_t *root = find_node_by_index(r, 1);
     if (!root || root->type != YAML_MAPPING_NODE) return 0;
     for (const yaml_node_pair_t *p = root->data.mapping.pairs.start; p < root->data.mapping.pairs.top; p++) {
-        const char *key = text_of(r, p->key);
+        const char *key = node_text(r, p->key);
         if (key && strcmp(key, name) == 0) return p->value;
     }
     return 0;
@@ -350,9 +351,9 @@ bool scene_expand_shorthand(yaml_document_t *document)
     rewrite r = {.document = document, .has_memory = true};
     const int count = (int)(document->nodes.top - document->nodes.start);
     /* In these mappings keys are names that the scene chooses, which have no short forms. */
-    const int parameters = find_own(&r, "parameters"), fields = find_own(&r, "fields");
+    const int parameters = find_named_mapping(&r, "parameters"), fields = find_named_mapping(&r, "fields");
     for (int number = 1; number <= count && r.has_memory; number++)
-        if (number != parameters && number != fields && node_of(&r, number)->type == YAML_MAPPING_NODE)
+        if (number != parameters && number != fields && find_node_by_index(&r, number)->type == YAML_MAPPING_NODE)
             expand_mapping(&r, number);
     return r.has_memory;
 }
@@ -362,7 +363,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 
 enum { LONGEST_WORD = 63 };
 
-static int least(int a, int b)
+static int least_of(int a, int b)
 {
     return a < b ? a : b;
 }
@@ -378,9 +379,9 @@ static int count_edits(const char *a, const char *b)
         const int *above = rows[(i + 2) % 3], *second = rows[(i + 1) % 3];
         row[0] = i;
         for (int j = 1; j <= n; j++) {
-            row[j] = least(least(above[j], row[j - 1]) + 1, above[j - 1] + (a[i - 1] != b[j - 1]));
+            row[j] = least_of(least_of(above[j], row[j - 1]) + 1, above[j - 1] + (a[i - 1] != b[j - 1]));
             if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-                row[j] = least(row[j], second[j - 2] + 1);
+                row[j] = least_of(row[j], second[j - 2] + 1);
         }
     }
     return rows[m % 3][n];

@@ -10,7 +10,7 @@ static const scene_material no_light = {.ambient = 1, .shininess = 1};
 
 /* Scales a vector to unit length. It is divided by its largest number first, because the squares of very large or very
  * small numbers may be infinite or 0. */
-static bool make_unit(const double in[3], double out[3])
+static bool normalize_vector(const double in[3], double out[3])
 {
     const double largest = fmax(fabs(in[0]), fmax(fabs(in[1]), fabs(in[2])));
     if (!(largest > 0)) return false;
@@ -27,7 +27,7 @@ insitu_status scene_convert_plane(const scene_document *d, const char *path, int
 {
     char key[32];
     snprintf(key, sizeof key, "planes[%d].normal", index);
-    if (!make_unit(in->normal, out->normal))
+    if (!normalize_vector(in->normal, out->normal))
         return scene_bad(d, path, key, "[0, 0, 0] has no direction, expected a vector of any length but 0");
     out->has_point = in->point != NULL;
     if (in->point) memcpy(out->point, in->point, sizeof out->point);
@@ -45,7 +45,7 @@ int scene_count_planes(const scene_file_slice *in)
     return count;
 }
 
-static insitu_status check_places(const scene_document *d, const char *path, int index, const scene_file_plane *in)
+static insitu_status check_positions(const scene_document *d, const char *path, int index, const scene_file_plane *in)
 {
     char plane[SCENE_PATH_SIZE];
     snprintf(plane, sizeof plane, "%s.planes[%d]", path, index);
@@ -64,7 +64,7 @@ static insitu_status add_planes(const scene_document *d, const char *path, int i
                                 scene_slice *out)
 {
     scene_plane plane = {.share = 0};
-    insitu_status status = check_places(d, path, index, in);
+    insitu_status status = check_positions(d, path, index, in);
     if (!status) status = scene_convert_plane(d, path, index, in, &plane);
     const int count = in->offsets ? in->offsets_count : in->count ? *in->count : 1;
     for (int i = 0; i < count && !status; i++) {

@@ -31,7 +31,7 @@ typedef struct fault {
     char *words;
 } fault;
 
-static text_line line_from(const char *start, const char *end, size_t number)
+static text_line make_line(const char *start, const char *end, size_t number)
 {
     const char *stop = memchr(start, '\n', (size_t)(end - start));
     text_line l = {.start = start, .length = (size_t)((stop ? stop : end) - start), .number = number};
@@ -41,16 +41,16 @@ static text_line line_from(const char *start, const char *end, size_t number)
 }
 
 /* Returns the next line; after the last line, an empty one. */
-static text_line line_behind(text_line l, const char *end)
+static text_line find_next_line(text_line l, const char *end)
 {
     const char *stop = memchr(l.start, '\n', (size_t)(end - l.start));
-    return line_from(stop ? stop + 1 : end, end, l.number + 1);
+    return make_line(stop ? stop + 1 : end, end, l.number + 1);
 }
 
-static text_line line_at(const char *text, size_t size, size_t number)
+static text_line find_line(const char *text, size_t size, size_t number)
 {
-    text_line l = line_from(text, text + size, 0);
-    while (l.number < number) l = line_behind(l, text + size);
+    text_line l = make_line(text, text + size, 0);
+    while (l.number < number) l = find_next_line(l, text + size);
     return l;
 }
 
@@ -60,7 +60,7 @@ static bool has_content(text_line l)
 }
 
 /* Writes the message and the line of the error. Returns true, so that a rule can end with this call. */
-__attribute__((format(printf, 3, 4))) static bool tell(const fault *f, size_t line, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static bool set_fault(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -78,12 +78,12 @@ static int quoted_length(size_t length)
 /* ---- rules: each writes a message about one kind of mistake and returns true, or returns false
  * -------------------- */
 
-static bool is_tab(const fault *f, text_line l)
+static bool is_tab_indent(const fault *f, text_line l)
 {
     const char *tab = memchr(l.start, '\t', l.indent);
     if (!tab || !has_content(l)) return false;
-    return tell(f, l.number, "a tab stands before \"%.*s\", expected blanks: tabs are not allowed there",
-                quoted_length(l.length - l.indent), l.start + l.indent);
+    return set_fault(f, l.number, "a tab stands before \"%.*s\", expected blanks: tabs are not allowed there",
+                     quoted_length(l.length - l.indent), l.start + l.indent);
 }
 
 /* Returns whether p is within quotes or is a quote itself. *quote: the quote that was open at the previous character;
@@ -113,7 +113,7 @@ static const char *find_colour_comment(text_line l, size_t *length)
 
 const char *scene_syntax_comment(const char *text, size_t size, size_t line, size_t *length)
 {
-    return find_colour_comment(line_at(text, size, line - 1), length);
+    return find_colour_comment(find_line(text, size, line - 1), length);
 }
 
 static bool is_colour_comment(const fault *f, text_line l)
@@ -121,8 +121,8 @@ static bool is_colour_comment(const fault *f, text_line l)
     size_t length;
     const char *colour = find_colour_comment(l, &length);
     if (!colour) return false;
-    return tell(f, l.number, "a # behind a blank begins a comment, expected the colour in quotes: \"%.*s\"",
-                (int)length, colour);
+    return set_fault(f, l.number, "a # behind a blank begins a comment, expected the colour in quotes: \"%.*s\"",
+                     (int)length, colour);
 }
 
 /* Returns the length of a placeholder such as {cycle:04} at the start of a text, or 0 if there is none. */
@@ -170,8 +170,8 @@ static bool is_bare_placeholder(const fault *f, text_line l)
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
         if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* it may be a mapping */
-        return tell(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
-                    (int)(f->is_flow ? length : text_length(p, length, end)), p);
+        return set_fault(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
+                         (int)(f->is_flow ? length : text_length(p, length, end)), p);
     }
     return false;
 }
@@ -182,13 +182,13 @@ static bool is_unended_quote(const fault *f, text_line l)
     if (!strstr(context, "quoted scalar")) return false;
     const char *problem = f->parser->problem ? f->parser->problem : "";
     if (strstr(problem, "escape"))
-        return tell(
+        return set_fault(
             f, f->parser->problem_mark.line,
             "a \\ in double quotes begins a special character, expected \\\\, or single quotes around the text");
     const size_t column = f->parser->context_mark.column;
     const size_t length = column < l.length ? l.length - column : 0;
-    return tell(f, l.number, "the text %.*s has no end, expected %c at its end", quoted_length(length),
-                l.start + column, column < l.length ? l.start[column] : '"');
+    return set_fault(f, l.number, "the text %.*s has no end, expected %c at its end", quoted_length(length),
+                     l.start + column, column < l.length ? l.start[column] : '"');
 }
 
 /* Finds a " in an earlier line that only the " of this line closes. */
@@ -196,27 +196,27 @@ static bool is_unended_before(const fault *f, text_line l)
 {
     const char *quote = NULL; /* the quote that is open */
     text_line opened = l;
-    for (text_line other = line_at(f->text, f->size, 0); other.number < l.number;
-         other = line_behind(other, f->text + f->size))
+    for (text_line other = find_line(f->text, f->size, 0); other.number < l.number;
+         other = find_next_line(other, f->text + f->size))
         for (size_t i = 0; i < other.length && has_content(other); i++) {
             if (other.start[i] != '"') continue;
             quote = quote ? NULL : other.start + i;
             opened = other;
         }
     if (!quote) return false;
-    return tell(f, opened.number, "the text %.*s has no end, expected \" at its end",
-                quoted_length((size_t)(opened.start + opened.length - quote)), quote);
+    return set_fault(f, opened.number, "the text %.*s has no end, expected \" at its end",
+                     quoted_length((size_t)(opened.start + opened.length - quote)), quote);
 }
 
 /* Finds an earlier line that ends with an opening bracket that is never closed. */
 static bool is_left_open(const fault *f)
 {
     bool is_told = false;
-    for (text_line l = line_at(f->text, f->size, 0); l.number < f->last; l = line_behind(l, f->text + f->size)) {
+    for (text_line l = find_line(f->text, f->size, 0); l.number < f->last; l = find_next_line(l, f->text + f->size)) {
         const char last = has_content(l) ? l.start[l.length - 1] : ' ';
         if (last == '[' || last == '{')
             is_told =
-                tell(f, l.number, "the %c of this line is not closed, expected %c", last, last == '[' ? ']' : '}');
+                set_fault(f, l.number, "the %c of this line is not closed, expected %c", last, last == '[' ? ']' : '}');
     }
     return is_told;
 }
@@ -227,27 +227,27 @@ static bool is_unended_bracket(const fault *f, text_line l)
     if (f->is_flow && strstr(problem, "node content")) return is_left_open(f);
     if (!f->is_flow || !strstr(problem, "expected ','")) return false;
     const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
-    const text_line stop = line_at(f->text, f->size, f->last);
+    const text_line stop = find_line(f->text, f->size, f->last);
     size_t column = f->parser->problem_mark.column;
     if (column < stop.length && stop.start[column] == ':') /* the key in front of this colon is indented too little */
         while (column > stop.indent && !strchr(" {[,", stop.start[column - 1])) column--;
     const size_t length = column < stop.length ? stop.length - column : 0;
     if (l.number == stop.number && length > 0)
-        return tell(f, l.number, "expected a comma or %c before \"%.*s\"", close, quoted_length(length),
-                    stop.start + column);
-    return tell(f, l.number, "the %c of this line is not closed, expected %c", open, close);
+        return set_fault(f, l.number, "expected a comma or %c before \"%.*s\"", close, quoted_length(length),
+                         stop.start + column);
+    return set_fault(f, l.number, "the %c of this line is not closed, expected %c", open, close);
 }
 
 /* Returns the last line before `number` that has content, or the line itself if there is none. */
-static text_line line_before(const fault *f, size_t number)
+static text_line find_previous_line(const fault *f, size_t number)
 {
-    text_line found = line_at(f->text, f->size, number);
-    for (text_line l = line_at(f->text, f->size, 0); l.number < number; l = line_behind(l, f->text + f->size))
+    text_line found = find_line(f->text, f->size, number);
+    for (text_line l = find_line(f->text, f->size, 0); l.number < number; l = find_next_line(l, f->text + f->size))
         if (has_content(l)) found = l;
     return found;
 }
 
-static bool is_item(text_line l)
+static bool is_list_item(text_line l)
 {
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
@@ -258,10 +258,10 @@ static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;
     size_t least = (size_t)-1;
-    for (text_line other = line_at(f->text, f->size, 0); other.number < l.number;
-         other = line_behind(other, f->text + f->size)) {
-        if (!has_content(other) || (is_item(l) && !is_item(other))) continue;
-        const size_t at = other.indent + (is_item(other) && !is_item(l) ? 2 : 0);
+    for (text_line other = find_line(f->text, f->size, 0); other.number < l.number;
+         other = find_next_line(other, f->text + f->size)) {
+        if (!has_content(other) || (is_list_item(l) && !is_list_item(other))) continue;
+        const size_t at = other.indent + (is_list_item(other) && !is_list_item(l) ? 2 : 0);
         const size_t distance = at > l.indent ? at - l.indent : l.indent - at;
         if (distance > least) continue;
         least = distance;
@@ -276,19 +276,19 @@ static bool is_bad_line_above(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     if (!strstr(problem, "not allowed") && !strstr(problem, "did not find expected")) return false;
-    const text_line other = line_before(f, l.number);
+    const text_line other = find_previous_line(f, l.number);
     const char *start = other.start + other.indent, *end = other.start + other.length;
     if (other.number == l.number || strchr("\"'[]{}", end[-1])) return false;
     if (start + 1 < end && *start == '-' && isalpha((unsigned char)start[1]))
-        return tell(f, other.number, "no blank behind the - of a list, expected \"- %.*s\"",
-                    quoted_length((size_t)(end - start) - 1), start + 1);
-    start += is_item(other) ? 2 : 0;
+        return set_fault(f, other.number, "no blank behind the - of a list, expected \"- %.*s\"",
+                         quoted_length((size_t)(end - start) - 1), start + 1);
+    start += is_list_item(other) ? 2 : 0;
     if (memchr(start, ':', (size_t)(end - start))) return false;
-    return tell(f, other.number, "\"%.*s\" has no colon, expected \"%.*s:\"", quoted_length((size_t)(end - start)),
-                start, (int)strcspn(start, " =;\r\n"), start);
+    return set_fault(f, other.number, "\"%.*s\" has no colon, expected \"%.*s:\"", quoted_length((size_t)(end - start)),
+                     start, (int)strcspn(start, " =;\r\n"), start);
 }
 
-static const char *plural(size_t count)
+static const char *plural_ending(size_t count)
 {
     return count == 1 ? "" : "s";
 }
@@ -304,8 +304,9 @@ static bool is_bad_indent(const fault *f, text_line l)
     size_t expected = l.indent;
     const text_line other = nearest_indent(f, l, &expected);
     if (expected == l.indent) return false;
-    return tell(f, l.number, "wrong indentation: %zu blank%s before \"%.*s\", expected %zu, as in line %zu", l.indent,
-                plural(l.indent), quoted_length(key_length), l.start + l.indent, expected, other.number + 1);
+    return set_fault(f, l.number, "wrong indentation: %zu blank%s before \"%.*s\", expected %zu, as in line %zu",
+                     l.indent, plural_ending(l.indent), quoted_length(key_length), l.start + l.indent, expected,
+                     other.number + 1);
 }
 
 /* Finds text behind a complete value, as in title: "a" b, or a text with a colon, as in title: a: b. */
@@ -322,42 +323,47 @@ static bool is_bare_text(const fault *f, text_line l)
     const size_t length = (size_t)(l.start + l.length - value);
     if (length == 0) return false;
     if (has_colon)
-        return tell(f, l.number, "a text with \": \" needs quotes, expected \"%.*s\"", quoted_length(length), value);
-    return tell(f, l.number, "the value ends before the line does, found %.*s, expected quotes around all of it",
-                quoted_length(length), value);
+        return set_fault(f, l.number, "a text with \": \" needs quotes, expected \"%.*s\"", quoted_length(length),
+                         value);
+    return set_fault(f, l.number, "the value ends before the line does, found %.*s, expected quotes around all of it",
+                     quoted_length(length), value);
 }
 
 static bool is_key_without_colon(const fault *f)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     if (!strstr(problem, "could not find expected ':'")) return false;
-    const text_line l = line_at(f->text, f->size, f->parser->context_mark.line);
+    const text_line l = find_line(f->text, f->size, f->parser->context_mark.line);
     const size_t column = f->parser->context_mark.column;
     const size_t length = column < l.length ? l.length - column : 0;
     const char *colon = memchr(l.start + column, ':', length);
     if (colon)
-        return tell(f, l.number, "no blank behind the colon in \"%.*s\", expected \"%.*s: ...\"", quoted_length(length),
-                    l.start + column, quoted_length((size_t)(colon - l.start) - column), l.start + column);
-    return tell(f, l.number, "\"%.*s\" has no colon, expected \"key: value\"", quoted_length(length), l.start + column);
+        return set_fault(f, l.number, "no blank behind the colon in \"%.*s\", expected \"%.*s: ...\"",
+                         quoted_length(length), l.start + column, quoted_length((size_t)(colon - l.start) - column),
+                         l.start + column);
+    return set_fault(f, l.number, "\"%.*s\" has no colon, expected \"key: value\"", quoted_length(length),
+                     l.start + column);
 }
 
 static bool is_bad_start(const fault *f)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
-    const text_line l = line_at(f->text, f->size, f->parser->problem_mark.line);
+    const text_line l = find_line(f->text, f->size, f->parser->problem_mark.line);
     const size_t column = f->parser->problem_mark.column;
     if (strstr(problem, "block sequence entries are not allowed"))
-        return tell(f, l.number, "a list's \"-\" behind a key, expected it on a line of its own, or the list in [ ]");
+        return set_fault(f, l.number,
+                         "a list's \"-\" behind a key, expected it on a line of its own, or the list in [ ]");
     if (!strstr(problem, "cannot start any token") || column >= l.length) return false;
-    return tell(f, l.number, "no text begins with %c, expected quotes around \"%.*s\"", l.start[column],
-                (int)word_length(l.start + column, l.start + l.length), l.start + column);
+    return set_fault(f, l.number, "no text begins with %c, expected quotes around \"%.*s\"", l.start[column],
+                     (int)word_length(l.start + column, l.start + l.length), l.start + column);
 }
 
 /* ---- the search ------------------------------------------------------------------------------------------------- */
 
 static bool is_in_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
 {
-    for (text_line l = line_at(f->text, f->size, f->first); l.number <= f->last; l = line_behind(l, f->text + f->size))
+    for (text_line l = find_line(f->text, f->size, f->first); l.number <= f->last;
+         l = find_next_line(l, f->text + f->size))
         if (rule(f, l)) return true;
     return false;
 }
@@ -371,10 +377,11 @@ void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t si
     f.last = parser->problem_mark.line;
     const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last;
     f.first = is_before ? parser->context_mark.line : f.last;
-    const text_line begin = line_at(text, size, f.first), stop = line_at(text, size, f.last);
-    if (is_in_lines(&f, is_tab) || is_in_lines(&f, is_colour_comment) || is_in_lines(&f, is_bare_placeholder)) return;
+    const text_line begin = find_line(text, size, f.first), stop = find_line(text, size, f.last);
+    if (is_in_lines(&f, is_tab_indent) || is_in_lines(&f, is_colour_comment) || is_in_lines(&f, is_bare_placeholder))
+        return;
     if (is_unended_quote(&f, begin) || is_unended_bracket(&f, begin) || is_bad_line_above(&f, stop)) return;
     if (is_bad_indent(&f, stop) || is_key_without_colon(&f) || is_bad_start(&f) || is_bare_text(&f, stop)) return;
-    tell(&f, f.last, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
-         *context ? " " : "", context);
+    set_fault(&f, f.last, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
+              *context ? " " : "", context);
 }

@@ -80,8 +80,8 @@ static insitu_status convert_automatic(const scene_document *d, const char *path
 }
 
 /* Converts the camera's position and up direction. */
-static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_camera *in,
-                                   scene_camera *out)
+static insitu_status convert_position(const scene_document *d, const char *path, const scene_file_camera *in,
+                                      scene_camera *out)
 {
     const bool is_explicit = (in->position || in->focal) && !in->path && !in->orbit;
     insitu_status status = INSITU_OK;
@@ -102,7 +102,7 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
     if (!in) in = &none;
     if (in->angle) out->angle = *in->angle;
     out->has_up = in->up != NULL;
-    insitu_status status = convert_place(d, path, in, out);
+    insitu_status status = convert_position(d, path, in, out);
     out->has_projection = in->projection != NULL;
     out->is_orthographic = in->projection && *in->projection == SCENE_ORTHOGRAPHIC;
     out->height = in->height ? *in->height : 0;

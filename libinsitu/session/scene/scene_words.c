@@ -6,7 +6,7 @@
 
 #include "scene_shorthand.h"
 
-__attribute__((format(printf, 2, 3))) static void append(char words[SCENE_WORDS_SIZE], const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void append_words(char words[SCENE_WORDS_SIZE], const char *format, ...)
 {
     const size_t used = strlen(words);
     va_list arguments;
@@ -18,24 +18,24 @@ __attribute__((format(printf, 2, 3))) static void append(char words[SCENE_WORDS_
 static void append_range(char words[SCENE_WORDS_SIZE], const scene_key *key)
 {
     if (!key || (key->low == 0 && key->high == 0)) return;
-    append(words, key->is_low_excluded ? " above %.10g" : " from %.10g", key->low);
+    append_words(words, key->is_low_excluded ? " above %.10g" : " from %.10g", key->low);
     const char *const high = key->is_high_excluded ? " and below" : key->is_low_excluded ? " and at most" : " to";
-    append(words, "%s %.10g", high, key->high);
+    append_words(words, "%s %.10g", high, key->high);
 }
 
 static void append_choices(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *value)
 {
-    append(words, "one of");
+    append_words(words, "one of");
     for (uint32_t i = 0; i < value->enumeration.count; i++) {
-        append(words, "%s %s", i ? "," : "", value->enumeration.strings[i].str);
+        append_words(words, "%s %s", i ? "," : "", value->enumeration.strings[i].str);
     }
 }
 
 static void append_mapping(char words[SCENE_WORDS_SIZE], const scene_mapping *mapping)
 {
-    append(words, "a mapping with the keys");
+    append_words(words, "a mapping with the keys");
     for (const cyaml_schema_field_t *f = mapping->fields; f->key; f++) {
-        append(words, "%s %s", f == mapping->fields ? "" : ",", f->key);
+        append_words(words, "%s %s", f == mapping->fields ? "" : ",", f->key);
     }
 }
 
@@ -48,16 +48,16 @@ bool scene_is_colour(const cyaml_schema_value_t *list, const scene_key *key)
 static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *list, const scene_key *key)
 {
     const cyaml_schema_value_t *entry = list->sequence.entry;
-    append(words, "a list of %u", list->sequence.min);
-    if (list->sequence.max != list->sequence.min) append(words, " to %u", list->sequence.max);
+    append_words(words, "a list of %u", list->sequence.min);
+    if (list->sequence.max != list->sequence.min) append_words(words, " to %u", list->sequence.max);
     switch (entry->type) {
-    case CYAML_MAPPING: append(words, " mappings"); return;
-    case CYAML_INT: append(words, " whole numbers"); break;
-    case CYAML_SEQUENCE_FIXED: append(words, " lists of %u numbers", entry->sequence.max); break;
-    default: append(words, " numbers"); break;
+    case CYAML_MAPPING: append_words(words, " mappings"); return;
+    case CYAML_INT: append_words(words, " whole numbers"); break;
+    case CYAML_SEQUENCE_FIXED: append_words(words, " lists of %u numbers", entry->sequence.max); break;
+    default: append_words(words, " numbers"); break;
     }
     append_range(words, key);
-    if (scene_is_colour(list, key)) append(words, ", or the name of a colour, or \"#rrggbb\" in quotes");
+    if (scene_is_colour(list, key)) append_words(words, ", or the name of a colour, or \"#rrggbb\" in quotes");
 }
 
 static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)
@@ -65,7 +65,7 @@ static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)
     for (int i = 0; i < key->form_count; i++) {
         char form[SCENE_WORDS_SIZE];
         scene_value_words(&key->forms[i].value, &key->forms[i].key, form);
-        append(words, "%s%s", i ? "; or " : "", form);
+        append_words(words, "%s%s", i ? "; or " : "", form);
     }
 }
 
@@ -74,28 +74,28 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
     words[0] = '\0';
     switch (value->type) {
     case CYAML_INT:
-        append(words, "a whole number");
+        append_words(words, "a whole number");
         append_range(words, key);
         break;
     case CYAML_FLOAT:
-        append(words, "a number");
+        append_words(words, "a number");
         append_range(words, key);
         break;
-    case CYAML_BOOL: append(words, "true or false"); break;
-    case CYAML_STRING: append(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
+    case CYAML_BOOL: append_words(words, "true or false"); break;
+    case CYAML_STRING: append_words(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
     case CYAML_ENUM: append_choices(words, value); break;
     case CYAML_IGNORE:
         if (key->named) {
             char each[SCENE_WORDS_SIZE];
             scene_value_words(&key->named->value, &key->named->key, each);
-            append(words, "a mapping of at most %d names of your own, each with %s", SCENE_MAX_NAMES, each);
+            append_words(words, "a mapping of at most %d names of your own, each with %s", SCENE_MAX_NAMES, each);
             break;
         }
         if (key->forms) {
             append_forms(words, key);
             break;
         }
-        append(words, "a text of 1 to %d bytes or a list of 1 to %d of them", SCENE_NAME_BYTES, SCENE_MAX_NAMES);
+        append_words(words, "a text of 1 to %d bytes or a list of 1 to %d of them", SCENE_NAME_BYTES, SCENE_MAX_NAMES);
         break;
     case CYAML_MAPPING: append_mapping(words, key->child); break;
     default: append_list(words, value, key); break;
@@ -117,8 +117,8 @@ void scene_expected_words(const char *path, const cyaml_schema_value_t *value, c
         const scene_key entry = {.child = key->child};
         char keys[SCENE_WORDS_SIZE];
         scene_value_words(value->sequence.entry, &entry, keys);
-        append(expected, "%s", keys + strlen("a mapping"));
+        append_words(expected, "%s", keys + strlen("a mapping"));
     }
     const char *name = last_key(path), *short_form = scene_shorthand_words(name, strlen(name));
-    if (short_form) append(expected, ", or %s", short_form);
+    if (short_form) append_words(expected, ", or %s", short_form);
 }

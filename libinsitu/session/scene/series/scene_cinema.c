@@ -46,7 +46,7 @@ static const char *default_file(const scene_image *image, char file[96])
 }
 
 /* Joins folder and file name to the output's path. */
-static insitu_status join(const scene_document *d, const char *folder, const char *file, scene_output *out)
+static insitu_status join_output_path(const scene_document *d, const char *folder, const char *file, scene_output *out)
 {
     const size_t size = strlen(folder) + strlen(file) + 2;
     out->path = base_alloc(size);
@@ -67,7 +67,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
     if (!status) status = check_file(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)
         status = scene_bad(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
-    return status ? status : join(d, folder, in->path ? in->path : default_file(image, file), out);
+    return status ? status : join_output_path(d, folder, in->path ? in->path : default_file(image, file), out);
 }
 
 /* ---- databases ------------------------------------------------------------------------------------------------- */
@@ -93,7 +93,7 @@ static int find_database(scene *s, const scene_image *image, const scene_output 
     return s->database_count++;
 }
 
-static void note_columns(scene_database *database, const scene_image *image)
+static void set_database_columns(scene_database *database, const scene_image *image)
 {
     database->has_images = database->has_images || image->variant.source != database->first_image;
     database->has_orbits = database->has_orbits || image->camera.orbit.view_count > 0;
@@ -102,14 +102,14 @@ static void note_columns(scene_database *database, const scene_image *image)
     database->has_fields = database->has_fields || image->swept_field;
 }
 
-static insitu_status place_output(const scene_document *d, scene *s, scene_image *image, int index)
+static insitu_status put_output_in_database(const scene_document *d, scene *s, scene_image *image, int index)
 {
     scene_output *output = &image->outputs[index];
     output->database = -1;
     if (output->folder_bytes == 0) return INSITU_OK;
     output->database = find_database(s, image, output);
     if (output->database < 0) return scene_no_memory(d);
-    note_columns(&s->databases[output->database], image);
+    set_database_columns(&s->databases[output->database], image);
     for (int i = 0; i < index; i++) {
         if (image->outputs[i].database != output->database) continue;
         char path[64];
@@ -125,6 +125,6 @@ insitu_status scene_find_databases(const scene_document *d, scene *s)
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count; i++)
         for (int o = 0; o < s->images[i].output_count && !status && s->images[i].variant.view == 0; o++)
-            status = place_output(d, s, &s->images[i], o);
+            status = put_output_in_database(d, s, &s->images[i], o);
     return status;
 }

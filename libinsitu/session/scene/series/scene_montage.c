@@ -50,8 +50,8 @@ static int find_montage(scene *s, const scene_image *image, const scene_output *
     return s->montage_count++;
 }
 
-static insitu_status check_cells(const scene_document *d, const char *path, const scene_image *image,
-                                 const scene_output *output, const scene_montage *m)
+static insitu_status check_panels(const scene_document *d, const char *path, const scene_image *image,
+                                  const scene_output *output, const scene_montage *m)
 {
     if (output->columns != m->columns || output->rows != m->rows)
         return scene_bad(d, path, "grid", "[%d, %d] differs from that of the file's first picture, expected [%d, %d]",
@@ -68,7 +68,7 @@ static insitu_status check_cells(const scene_document *d, const char *path, cons
     return INSITU_OK;
 }
 
-static insitu_status place_output(const scene_document *d, scene *s, scene_image *image, int index)
+static insitu_status put_output_in_montage(const scene_document *d, scene *s, scene_image *image, int index)
 {
     scene_output *output = &image->outputs[index];
     char path[64], *name = output->columns ? name_at_sample(image, output, 0) : NULL;
@@ -88,13 +88,14 @@ static insitu_status place_output(const scene_document *d, scene *s, scene_image
     scene_montage *m = &s->montages[output->montage];
     output->first_cell = m->cell_count;
     m->cell_count += views;
-    return check_cells(d, path, image, output, m);
+    return check_panels(d, path, image, output, m);
 }
 
 insitu_status scene_find_montages(const scene_document *d, scene *s)
 {
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count && !status; i++)
-        for (int o = 0; o < s->images[i].output_count && !status; o++) status = place_output(d, s, &s->images[i], o);
+        for (int o = 0; o < s->images[i].output_count && !status; o++)
+            status = put_output_in_montage(d, s, &s->images[i], o);
     return status;
 }

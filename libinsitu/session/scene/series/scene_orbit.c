@@ -10,7 +10,7 @@
 /* Finds the directions perpendicular to the axis at phi = 0 and 90 degrees. Let a be the coordinate axis nearest to the
  * axis; the first direction is as near as possible to the coordinate axis that follows a (x -> y -> z -> x). For an
  * axis along z, phi is the longitude of spherical coordinates. */
-static void find_plane(const double axis[3], double first[3], double second[3])
+static void find_perpendiculars(const double axis[3], double first[3], double second[3])
 {
     int nearest = 0;
     for (int a = 1; a < 3; a++)
@@ -29,7 +29,7 @@ void scene_place_view(scene_camera *camera, int view)
     static const double degree = 3.14159265358979323846 / 180;
     const scene_orbit *o = &camera->orbit;
     double first[3], second[3];
-    find_plane(o->axis, first, second);
+    find_perpendiculars(o->axis, first, second);
     camera->phi = o->start + 360.0 * (view % o->view_count) / o->view_count;
     camera->theta = o->elevations[view / o->view_count];
     const double phi = camera->phi * degree, theta = camera->theta * degree;
@@ -64,7 +64,7 @@ static void convert_elevations(const scene_document *d, const char *path, scene_
 }
 
 /* Rejects the keys that an orbit replaces. */
-static insitu_status refuse_others(const scene_document *d, const char *path, const scene_file_camera *in)
+static insitu_status refuse_replaced_keys(const scene_document *d, const char *path, const scene_file_camera *in)
 {
     static const char words[] = "given beside orbit, expected one of the two";
     if (in->position) return scene_bad(d, path, "position", words);
@@ -81,7 +81,7 @@ insitu_status scene_convert_orbit(const scene_document *d, const char *path, con
 {
     static const double upwards[3] = {0, 1, 0};
     scene_orbit *orbit = &out->orbit;
-    const insitu_status status = refuse_others(d, path, in);
+    const insitu_status status = refuse_replaced_keys(d, path, in);
     if (status) return status;
     orbit->view_count = in->orbit->views;
     orbit->start = in->orbit->start ? *in->orbit->start : 0;

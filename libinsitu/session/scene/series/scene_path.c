@@ -51,7 +51,7 @@ static double cubic_value(const cubic_points *p, double share)
     return fmax(fmin(a, b), fmin(fmax(a, b), value));
 }
 
-static void take_point(const scene_camera_point *p, scene_camera *out)
+static void set_camera_to_point(const scene_camera_point *p, scene_camera *out)
 {
     memcpy(out->eye, p->eye, sizeof out->eye);
     memcpy(out->focal, p->focal, sizeof out->focal);
@@ -60,7 +60,7 @@ static void take_point(const scene_camera_point *p, scene_camera *out)
 }
 
 /* Interpolates the camera between points i and i + 1. */
-static void take_between(const scene_camera *camera, int i, double at, scene_camera *out)
+static void interpolate_camera(const scene_camera *camera, int i, double at, scene_camera *out)
 {
     double numbers[4][NUMBERS_OF_POINT], found[NUMBERS_OF_POINT];
     cubic_points p = {.has_first = i > 0, .has_last = i + 2 < camera->point_count};
@@ -89,9 +89,9 @@ scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double t
     int i = 0;
     while (i < camera->point_count - 1 && at >= points[i + 1].at) i++;
     if (i == camera->point_count - 1 || !(at > points[0].at))
-        take_point(&points[i], &out);
+        set_camera_to_point(&points[i], &out);
     else
-        take_between(camera, i, at, &out);
+        interpolate_camera(camera, i, at, &out);
     return out;
 }
 

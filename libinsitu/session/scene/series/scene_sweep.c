@@ -143,7 +143,7 @@ static bool replace_fields(scene_image *image, const char *name, int line, int *
     return is_done;
 }
 
-static void keep_value(scene_image *image, int index)
+static void select_isovalue(scene_image *image, int index)
 {
     scene_isosurface *layer = &image->isosurfaces[0];
     layer->values[0] = layer->values[index];
@@ -153,7 +153,7 @@ static void keep_value(scene_image *image, int index)
     image->isovalue = layer->values[0];
 }
 
-static void keep_plane(scene_image *image, int index)
+static void select_plane(scene_image *image, int index)
 {
     scene_slice *layer = &image->slices[0];
     layer->planes[0] = layer->planes[index];
@@ -165,8 +165,8 @@ insitu_status scene_apply_sweep(const scene_document *d, const char *path, const
 {
     const char *fields[SCENE_MAX_NAMES];
     const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
-    if (is_over_isovalues(in)) keep_value(out, out->variant.isovalue);
-    if (is_over_planes(in)) keep_plane(out, out->variant.plane);
+    if (is_over_isovalues(in)) select_isovalue(out, out->variant.isovalue);
+    if (is_over_planes(in)) select_plane(out, out->variant.plane);
     if (field_count == 0) return INSITU_OK;
     char key[SCENE_PATH_SIZE];
     int replaced;
