@@ -17,7 +17,7 @@ typedef struct seen_point {
     double at[3];
 } seen_point;
 
-static seen_point see(const render_camera *c, const double p[3])
+static seen_point transform_to_camera(const render_camera *c, const double p[3])
 {
     const double *const axes[3] = {c->right, c->up, c->forward};
     seen_point out;
@@ -28,7 +28,7 @@ static seen_point see(const render_camera *c, const double p[3])
     return out;
 }
 
-static void project(const render_camera *c, const seen_point *p, double pixel[2])
+static void project_to_pixel(const render_camera *c, const seen_point *p, double pixel[2])
 {
     const double depth = c->is_orthographic ? 1 : p->at[2], scale = 0.5 * c->height / (c->half_height * depth);
     pixel[0] = 0.5 * c->width + p->at[0] * scale;
@@ -36,7 +36,7 @@ static void project(const render_camera *c, const seen_point *p, double pixel[2]
 }
 
 /* Clips the edge at the plane with depth `near`. Returns false if all of the edge is nearer. */
-static bool cut_near(seen_point *a, seen_point *b, double near)
+static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
 {
     if (a->at[2] < near && b->at[2] < near) return false;
     if (a->at[2] >= near && b->at[2] >= near) return true;
@@ -69,11 +69,11 @@ int session_box_strokes(const double lower[3], const double upper[3], const rend
         to[axis] = upper[axis];
         from[b] = to[b] = high_b ? upper[b] : lower[b];
         from[c] = to[c] = high_c ? upper[c] : lower[c];
-        seen_point p = see(camera, from), q = see(camera, to);
-        if (!camera->is_orthographic && !cut_near(&p, &q, 1e-3 * size)) continue;
+        seen_point p = transform_to_camera(camera, from), q = transform_to_camera(camera, to);
+        if (!camera->is_orthographic && !clip_at_near_plane(&p, &q, 1e-3 * size)) continue;
         insitu_stroke *stroke = &strokes[count++];
-        project(camera, &p, stroke->from);
-        project(camera, &q, stroke->to);
+        project_to_pixel(camera, &p, stroke->from);
+        project_to_pixel(camera, &q, stroke->to);
         stroke->is_behind =
             !is_seen_outside(lower, upper, camera, b, high_b) && !is_seen_outside(lower, upper, camera, c, high_c);
     }
@@ -103,12 +103,13 @@ static ruled_edge find_edge(const double lower[3], const double upper[3], const 
     e.from[b] = e.to[b] = high_b ? upper[b] : lower[b];
     e.from[d] = e.to[d] = high_d ? upper[d] : lower[d];
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * lower[a] + 0.5 * upper[a];
-    const seen_point ends[3] = {see(c, e.from), see(c, e.to), see(c, middle)};
+    const seen_point ends[3] = {transform_to_camera(c, e.from), transform_to_camera(c, e.to),
+                                transform_to_camera(c, middle)};
     for (int i = 0; i < 3; i++) e.is_there = e.is_there && (c->is_orthographic || ends[i].at[2] > 0);
     if (!e.is_there) return e;
-    project(c, &ends[0], e.pixels[0]);
-    project(c, &ends[1], e.pixels[1]);
-    project(c, &ends[2], centre);
+    project_to_pixel(c, &ends[0], e.pixels[0]);
+    project_to_pixel(c, &ends[1], e.pixels[1]);
+    project_to_pixel(c, &ends[2], centre);
     const double x = e.pixels[1][0] - e.pixels[0][0], y = e.pixels[1][1] - e.pixels[0][1], length = hypot(x, y);
     e.is_there = length > 1;
     if (!e.is_there) return e;
@@ -126,7 +127,7 @@ static bool is_lower(const ruled_edge *a, const ruled_edge *b)
     return a->pixels[0][1] + a->pixels[1][1] > b->pixels[0][1] + b->pixels[1][1];
 }
 
-static insitu_label label_at(const double at[2], const double away[2], double gap, const char *text)
+static insitu_label make_label(const double at[2], const double away[2], double gap, const char *text)
 {
     insitu_label out = {{at[0], at[1]}, {away[0], away[1]}, gap, ""};
     snprintf(out.text, sizeof out.text, "%s", text);
@@ -136,7 +137,7 @@ static insitu_label label_at(const double at[2], const double away[2], double ga
 /* Computes the position of an axis's name. It is the middle of the edge. If the numbers are beside the edge rather than
  * below it, it is instead the point between two neighbouring ticks that is nearest to the middle, so that the name does
  * not overlap a number. */
-static void place_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
+static void place_axis_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
 {
     double middle[2], least = INFINITY;
     for (int a = 0; a < 2; a++) at[a] = middle[a] = 0.5 * (e->pixels[0][a] + e->pixels[1][a]);
@@ -153,8 +154,8 @@ static void place_name(const ruled_edge *e, const insitu_stroke *ticks, int coun
 
 /* Draws ticks, numbers and the axis's name along an edge. The number of ticks is limited by the space for their
  * numbers. */
-static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
-                      insitu_stroke *strokes, insitu_label *labels)
+static void draw_ruler(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
+                       insitu_stroke *strokes, insitu_label *labels)
 {
     static const char *const names[] = {"x", "y", "z"};
     insitu_tick ticks[SESSION_MAX_TICKS];
@@ -167,14 +168,14 @@ static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, dou
     for (int i = 0; i < count; i++) {
         double place[3], at[2];
         for (int a = 0; a < 3; a++) place[a] = (1 - ticks[i].place) * e->from[a] + ticks[i].place * e->to[a];
-        const seen_point seen = see(c, place);
-        project(c, &seen, at);
+        const seen_point seen = transform_to_camera(c, place);
+        project_to_pixel(c, &seen, at);
         strokes[out->stroke_count++] = (insitu_stroke){
             {at[0], at[1]}, {at[0] + 0.35 * size * e->away[0], at[1] + 0.35 * size * e->away[1]}, false};
-        labels[out->label_count++] = label_at(at, e->away, 0.55, ticks[i].text);
+        labels[out->label_count++] = make_label(at, e->away, 0.55, ticks[i].text);
     }
-    place_name(e, first, count, name_at);
-    labels[out->label_count++] = label_at(name_at, e->away, 2.4, names[axis]);
+    place_axis_name(e, first, count, name_at);
+    labels[out->label_count++] = make_label(name_at, e->away, 2.4, names[axis]);
 }
 
 void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
@@ -186,14 +187,14 @@ void session_box_rulers(const double lower[3], const double upper[3], const rend
             const ruled_edge e = find_edge(lower, upper, camera, axis, corner);
             if (is_lower(&e, &best)) best = e;
         }
-        if (best.is_there) rule_edge(&best, axis, camera, size, out, strokes, labels);
+        if (best.is_there) draw_ruler(&best, axis, camera, size, out, strokes, labels);
     }
 }
 
 insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit)
 {
     insitu_scale_bar out = {.length = 0};
-    const double depth = camera->is_orthographic ? 1 : see(camera, point).at[2];
+    const double depth = camera->is_orthographic ? 1 : transform_to_camera(camera, point).at[2];
     const double pixel = 2 * camera->half_height * depth / camera->height;
     if (!(pixel > 0)) return out;
     const double room = 0.2 * camera->width * pixel, power = pow(10, floor(log10(room)));
@@ -210,7 +211,7 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
 /* ---- texts and bars ------------------------------------------------------------------------------------------ */
 
 /* Chooses a light colour on a dark background, and a dark one on a light or transparent background. */
-static void choose_colour(const scene_image *image, float colour[3])
+static void choose_text_colour(const scene_image *image, float colour[3])
 {
     const float *b = image->background;
     const double luminance = 0.2126 * (double)b[0] + 0.7152 * (double)b[1] + 0.0722 * (double)b[2];
@@ -220,25 +221,24 @@ static void choose_colour(const scene_image *image, float colour[3])
 }
 
 /* Adds a text to the decorations. Returns false if memory runs out. */
-static bool add_words(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at,
-                      float size)
+static bool add_text(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at, float size)
 {
     char *expanded = scene_expand(text, moment);
     if (expanded) d->words[d->all.words_count++] = (insitu_words){expanded, at, size};
     return expanded != NULL;
 }
 
-static bool fill_words(session_decorations *d, const scene_decorations *scene, const scene_moment *moment)
+static bool add_scene_texts(session_decorations *d, const scene_decorations *scene, const scene_moment *moment)
 {
-    bool well = !scene->title || add_words(d, scene->title, moment, INSITU_TOP, 1.4F);
+    bool well = !scene->title || add_text(d, scene->title, moment, INSITU_TOP, 1.4F);
     for (int i = 0; i < scene->words_count && well; i++)
-        well = add_words(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].at, 1);
+        well = add_text(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].at, 1);
     return well;
 }
 
 /* Returns whether the layer shows the magnitude of the field: either the scene requests it, or the field has several
  * components. */
-static bool is_magnitude(const session_catalogue *catalogue, const scene_field *field)
+static bool shows_magnitude(const session_catalogue *catalogue, const scene_field *field)
 {
     int components = 1;
     for (int m = 0; m < catalogue->mesh_count; m++) {
@@ -255,7 +255,7 @@ static bool is_magnitude(const session_catalogue *catalogue, const scene_field *
 static void write_name(const session_catalogue *catalogue, const scene_field *field, char *out, size_t size)
 {
     static const char *const axes[] = {"x", "y", "z"};
-    if (is_magnitude(catalogue, field))
+    if (shows_magnitude(catalogue, field))
         snprintf(out, size, "|%s|", field->name);
     else if (field->component > 2)
         snprintf(out, size, "%s %d", field->name, field->component);
@@ -279,7 +279,7 @@ static void write_label(const scene_decorations *scene, int bar, const session_c
 
 /* Returns whether an earlier colour bar has the same field, colours and numbers, since several layers may show one
  * field. */
-static bool is_repeated(const session_decorations *d, int bar)
+static bool is_repeated_bar(const session_decorations *d, int bar)
 {
     const insitu_colour_bar *b = &d->bars[bar];
     bool is_found = false;
@@ -324,7 +324,7 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
                                      .at = (insitu_anchor)scene->bars_at,
                                      .tick_count = tick_count,
                                      .ticks = d->ticks[i]};
-    if (!is_repeated(d, i)) d->all.bar_count++;
+    if (!is_repeated_bar(d, i)) d->all.bar_count++;
 }
 
 static void fill_bars(session_decorations *d, const scene_image *image, const session_decoration_basis *given)
@@ -357,8 +357,8 @@ static void fill_axes(session_decorations *d, const render_camera *c)
 }
 
 /* Computes the decorations that show lengths. */
-static void fill_lengths(session_decorations *d, const scene_decorations *scene, const session_extent *extent,
-                         const render_camera *camera)
+static void fill_length_decorations(session_decorations *d, const scene_decorations *scene,
+                                    const session_extent *extent, const render_camera *camera)
 {
     double middle[3];
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
@@ -392,13 +392,13 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     memcpy(d->all.background, image->background, sizeof d->all.background);
     d->background = d->all;
     d->background.has_axes = false;
-    choose_colour(image, d->all.colour);
+    choose_text_colour(image, d->all.colour);
     fill_axes(d, &basis->view->camera);
     if (scene->has_bars) fill_bars(d, image, basis);
     if (d->strokes) {
         fill_outline(d, basis->outline, &basis->view->camera);
-        if (basis->extent->cell_count) fill_lengths(d, scene, basis->extent, &basis->view->camera);
-        if (fill_words(d, scene, basis->moment)) return d;
+        if (basis->extent->cell_count) fill_length_decorations(d, scene, basis->extent, &basis->view->camera);
+        if (add_scene_texts(d, scene, basis->moment)) return d;
     }
     session_free_decorations(d);
     return NULL;

@@ -10,7 +10,7 @@ typedef struct round_step {
     int factor, exponent;
 } round_step;
 
-static double size_of(round_step step)
+static double round_step_size(round_step step)
 {
     return step.factor * pow(10, step.exponent);
 }
@@ -23,21 +23,21 @@ static round_step next_step(round_step step)
 
 /* Computes the first and the last multiple of the step in [low, high]. A bound that is a multiple up to rounding is
  * included. */
-static void multiples(double low, double high, double step, double *first, double *last)
+static void find_multiples(double low, double high, double step, double *first, double *last)
 {
     const double slack = 1e-9 * (high - low) / step;
     *first = ceil(low / step - slack);
     *last = floor(high / step + slack);
 }
 
-static round_step choose_step(double low, double high, int most)
+static round_step choose_round_step(double low, double high, int most)
 {
     round_step step = {1, (int)floor(log10((high - low) / most))};
     double first, last;
-    multiples(low, high, size_of(step), &first, &last);
+    find_multiples(low, high, round_step_size(step), &first, &last);
     while (last - first >= most) {
         step = next_step(step);
-        multiples(low, high, size_of(step), &first, &last);
+        find_multiples(low, high, round_step_size(step), &first, &last);
     }
     return step;
 }
@@ -79,7 +79,7 @@ static void write_in_form(double value, const scene_number_form *form, bool is_p
     write_number(value, is_plain, wanted, tick->text, sizeof tick->text);
 }
 
-static double place_of(const session_scale *s, double value)
+static double scale_position(const session_scale *s, double value)
 {
     const double low = render_scaled(s->kind, s->threshold, s->low);
     const double high = render_scaled(s->kind, s->threshold, s->high);
@@ -90,7 +90,7 @@ static double place_of(const session_scale *s, double value)
 
 static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 {
-    const round_step step = choose_step(s->low, s->high, most);
+    const round_step step = choose_round_step(s->low, s->high, most);
     const double largest = fmax(fabs(s->low), fabs(s->high));
     const bool is_short = largest < 1e6 && largest >= 1e-3 && step.exponent > -9;
     const scene_notation notation = s->numbers.notation;
@@ -98,10 +98,10 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
     const int digits = is_plain ? -step.exponent : (int)floor(log10(largest)) - step.exponent;
     double first, last;
     int count = 0;
-    multiples(s->low, s->high, size_of(step), &first, &last);
+    find_multiples(s->low, s->high, round_step_size(step), &first, &last);
     for (double n = first; n <= last && count < SESSION_MAX_TICKS; n++) {
-        const double value = n * size_of(step);
-        ticks[count].place = place_of(s, value);
+        const double value = n * round_step_size(step);
+        ticks[count].place = scale_position(s, value);
         write_in_form(value, &s->numbers, is_plain, digits, &ticks[count]);
         count++;
     }
@@ -116,7 +116,7 @@ typedef struct decade_choice {
     int every;
 } decade_choice;
 
-static void add_value(const session_scale *s, double value, insitu_tick *ticks, int *count)
+static void add_tick(const session_scale *s, double value, insitu_tick *ticks, int *count)
 {
     const double size = fabs(value), slack = 1e-9 * size;
     if (value < s->low - slack || value > s->high + slack) return;
@@ -124,7 +124,7 @@ static void add_value(const session_scale *s, double value, insitu_tick *ticks, 
         insitu_tick *tick = &ticks[*count];
         const bool is_short = size < 1e4 && size > 9e-4;
         const bool is_plain = s->numbers.notation == SCENE_SHORTEST ? is_short : s->numbers.notation == SCENE_FIXED;
-        tick->place = place_of(s, value);
+        tick->place = scale_position(s, value);
         write_in_form(value, &s->numbers, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0,
                       tick);
     }
@@ -140,9 +140,9 @@ static void add_decades(const session_scale *s, double sign, decade_choice choic
     for (int n = first; n <= last; n++) {
         if (n % choice.every) continue;
         const double power = pow(10, n);
-        if (power >= smallest * (1 - 1e-9)) add_value(s, sign * power, ticks, count);
-        if (choice.has_2_and_5 && 2 * power >= smallest) add_value(s, sign * 2 * power, ticks, count);
-        if (choice.has_2_and_5 && 5 * power >= smallest) add_value(s, sign * 5 * power, ticks, count);
+        if (power >= smallest * (1 - 1e-9)) add_tick(s, sign * power, ticks, count);
+        if (choice.has_2_and_5 && 2 * power >= smallest) add_tick(s, sign * 2 * power, ticks, count);
+        if (choice.has_2_and_5 && 5 * power >= smallest) add_tick(s, sign * 5 * power, ticks, count);
     }
 }
 
@@ -151,7 +151,7 @@ static int fill_decades(const session_scale *s, decade_choice choice, insitu_tic
     int count = 0;
     if (s->kind == RENDER_SYMLOG) {
         add_decades(s, -1, choice, ticks, &count);
-        add_value(s, 0, ticks, &count);
+        add_tick(s, 0, ticks, &count);
     }
     add_decades(s, 1, choice, ticks, &count);
     return count;
@@ -170,7 +170,7 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
 
 /* Adds one tick in the centre of each band if the bands correspond to the integers of the range, that is, if the range
  * ends at integers or half a band beyond them. Otherwise returns 0. */
-static int fill_ids(const session_scale *s, int bands, insitu_tick *ticks)
+static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;
     const int every = (bands + SESSION_MAX_TICKS - 1) / SESSION_MAX_TICKS;
@@ -187,7 +187,7 @@ static int fill_ids(const session_scale *s, int bands, insitu_tick *ticks)
 
 int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS])
 {
-    const int count = fill_ids(scale, bands, ticks);
+    const int count = fill_integer_ticks(scale, bands, ticks);
     return count ? count : session_make_ticks(scale, most, ticks);
 }
 

@@ -37,7 +37,7 @@ typedef struct camera_tangents {
     double across, up;
 } camera_tangents;
 
-static camera_tangents tangents_of(const scene_image *image)
+static camera_tangents find_tangents(const scene_image *image)
 {
     const double up = tan(image->camera.angle * (3.14159265358979323846 / 360));
     return (camera_tangents){up * image->width / image->height, up};
@@ -67,7 +67,7 @@ typedef struct camera_fit {
 static const double bar_room = 6.5, title_room = 2.4, line_room = 1.5, ruler_room = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
-static double less_room(double most, double words, double pixels)
+static double reduce_fraction(double most, double words, double pixels)
 {
     return fmax(most - 2 * words / pixels, 0.5);
 }
@@ -86,7 +86,7 @@ static int count_bars(const scene_image *image, double *letters)
 }
 
 /* Returns the width of all columns of colour bars, as a multiple of the height of text. */
-static double room_of_bars(const scene_image *image)
+static double find_bar_width(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
     double letters;
@@ -99,7 +99,7 @@ static double room_of_bars(const scene_image *image)
 
 /* Returns the height of the lines at the middle of the top or bottom, or of those at its corners, whichever is larger,
  * as a multiple of the height of text. Lines at corners count only if they extend far into the picture. */
-static double room_of_lines(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
+static double find_lines_height(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
     const double long_line = 0.3 * image->width / (d->size * image->height * letter_width);
@@ -120,19 +120,20 @@ static double room_of_lines(const scene_image *image, scene_anchor middle, scene
 
 /* Returns the part of the frame that decorations leave free. It is at most the fraction `most` of its half on each
  * side. */
-static camera_frame free_frame(const scene_image *image, double most)
+static camera_frame find_free_frame(const scene_image *image, double most)
 {
     const scene_decorations *d = &image->decorations;
     if (!d->is_given) return (camera_frame){most, most, most, most};
-    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_room : 0, bars = room_of_bars(image);
-    const double top = (d->title ? title_room : 0) + room_of_lines(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
-    const double foot = room_of_lines(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
+    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_room : 0, bars = find_bar_width(image);
+    const double top =
+        (d->title ? title_room : 0) + find_lines_height(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
+    const double foot = find_lines_height(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
     const double right = rulers + (d->bars_at == SCENE_RIGHT ? bars : 0);
     const double left = rulers + (d->bars_at == SCENE_LEFT ? bars : 0);
-    return (camera_frame){.right = less_room(most, right * size, image->width),
-                          .left = less_room(most, left * size, image->width),
-                          .up = less_room(most, top * size, image->height),
-                          .down = less_room(most, (rulers + foot) * size, image->height)};
+    return (camera_frame){.right = reduce_fraction(most, right * size, image->width),
+                          .left = reduce_fraction(most, left * size, image->width),
+                          .up = reduce_fraction(most, top * size, image->height),
+                          .down = reduce_fraction(most, (rulers + foot) * size, image->height)};
 }
 
 static corner_reach reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)
@@ -160,9 +161,9 @@ static corner_reach reach_of_sphere(double radius, const camera_frame *f)
 static camera_fit make_fit(const session_extent *e, const render_camera *axes, const scene_image *image)
 {
     static const camera_frame nothing;
-    const camera_tangents t = tangents_of(image);
+    const camera_tangents t = find_tangents(image);
     const bool by_box = image->camera.fits_box && e->half_diagonal > 0;
-    const camera_frame share = free_frame(image, by_box ? filled : 1);
+    const camera_frame share = find_free_frame(image, by_box ? filled : 1);
     const double radius = e->half_diagonal > 0 ? e->half_diagonal : 1;
     camera_fit fit = {.shares = share, .is_centred = by_box};
     fit.tangents = (camera_frame){share.right * t.across, share.left * t.across, share.up * t.up, share.down * t.up};
@@ -172,7 +173,7 @@ static camera_fit make_fit(const session_extent *e, const render_camera *axes, c
 }
 
 /* Returns the distance of the eye from the centre of the bounds. */
-static double back_of(const camera_fit *fit, double half_diagonal)
+static double find_eye_distance(const camera_fit *fit, double half_diagonal)
 {
     const corner_reach *near = &fit->near;
     const camera_frame *f = &fit->tangents;
@@ -192,14 +193,14 @@ static double fitting_height(const camera_fit *fit, double aspect)
 
 /* Returns a position of the eye between low and high. It is in the middle if is_centred, and otherwise as near to 0 as
  * allowed. */
-static double place_between(double low, double high, bool is_centred)
+static double choose_eye_position(double low, double high, bool is_centred)
 {
     if (is_centred || low > high) return 0.5 * (low + high);
     return fmin(fmax(0, low), high);
 }
 
 /* Returns half the height of an orthographic picture, in scene units. */
-static double half_height_of(const scene_image *image, double fitting)
+static double find_half_height(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
@@ -210,7 +211,7 @@ static void set_orthographic(const scene_image *image, double half_height, rende
 {
     if (!image->camera.is_orthographic) return;
     camera->is_orthographic = true;
-    camera->half_height = half_height_of(image, half_height);
+    camera->half_height = find_half_height(image, half_height);
 }
 
 /* Computes an automatic camera. Positions are relative to the centre of the bounds until the camera is complete, so
@@ -228,14 +229,14 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     const camera_fit fit = make_fit(extent, &axes, image);
     const bool is_flat = c->is_orthographic;
     const double aspect = (double)image->width / image->height;
-    const double back = is_flat ? 2 * radius : back_of(&fit, extent->half_diagonal) / c->zoom;
-    const double half_height = half_height_of(image, fitting_height(&fit, aspect) / c->zoom);
+    const double back = is_flat ? 2 * radius : find_eye_distance(&fit, extent->half_diagonal) / c->zoom;
+    const double half_height = find_half_height(image, fitting_height(&fit, aspect) / c->zoom);
     const corner_reach *reach = is_flat ? &fit.flat : &fit.near;
     const camera_frame *f = is_flat ? &fit.shares : &fit.tangents;
     const double across = is_flat ? half_height * aspect : back, high = is_flat ? half_height : back;
     const double right =
-        place_between(reach->right - f->right * across, f->left * across - reach->left, fit.is_centred);
-    const double above = place_between(reach->up - f->up * high, f->down * high - reach->down, fit.is_centred);
+        choose_eye_position(reach->right - f->right * across, f->left * across - reach->left, fit.is_centred);
+    const double above = choose_eye_position(reach->up - f->up * high, f->down * high - reach->down, fit.is_centred);
     for (int a = 0; a < 3; a++) {
         focal[a] = right * axes.right[a] + above * axes.up[a];
         eye[a] = focal[a] + c->direction[a] / vector3_length(c->direction) * back;

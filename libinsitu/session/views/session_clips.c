@@ -44,17 +44,17 @@ typedef struct clip_box {
     double lower[3], upper[3];
 } clip_box;
 
-static bool is_nothing(const clip_box *box)
+static bool is_empty_box(const clip_box *box)
 {
     return box->lower[0] > box->upper[0] || box->lower[1] > box->upper[1] || box->lower[2] > box->upper[2];
 }
 
-static void make_nothing(clip_box *box)
+static void make_empty_box(clip_box *box)
 {
     box->lower[0] = INFINITY;
 }
 
-static void meet_box(clip_box *box, const double lower[3], const double upper[3])
+static void intersect_box(clip_box *box, const double lower[3], const double upper[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         box->lower[axis] = fmax(box->lower[axis], lower[axis]);
@@ -64,7 +64,7 @@ static void meet_box(clip_box *box, const double lower[3], const double upper[3]
 
 /* Clips the box to the half space normal . x <= distance. Each axis is limited by the distance that remains after the
  * least contributions of the other two axes are subtracted. */
-static void meet_plane(clip_box *box, const render_clip *clip)
+static void intersect_plane(clip_box *box, const render_clip *clip)
 {
     double least[3], left = clip->distance;
     for (int axis = 0; axis < 3; axis++) {
@@ -72,7 +72,7 @@ static void meet_plane(clip_box *box, const render_clip *clip)
         least[axis] = n * (n > 0 ? box->lower[axis] : box->upper[axis]);
         left -= least[axis];
     }
-    if (left < 0) make_nothing(box);
+    if (left < 0) make_empty_box(box);
     for (int axis = 0; axis < 3 && left >= 0; axis++) {
         const double n = clip->normal[axis], reach = (least[axis] + left) / n;
         if (n > 0) box->upper[axis] = fmin(box->upper[axis], reach);
@@ -93,50 +93,50 @@ static void find_distances(const clip_box *box, const double centre[3], double *
     *farthest = sqrt(vector3_dot(far, far));
 }
 
-static void meet_sphere(clip_box *box, const render_clip *clip)
+static void intersect_sphere(clip_box *box, const render_clip *clip)
 {
     double nearest, farthest, lower[3], upper[3];
     find_distances(box, clip->centre, &nearest, &farthest);
-    if (clip->is_outside ? farthest < clip->radius : nearest > clip->radius) make_nothing(box);
+    if (clip->is_outside ? farthest < clip->radius : nearest > clip->radius) make_empty_box(box);
     if (clip->is_outside) return;
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = clip->centre[axis] - clip->radius;
         upper[axis] = clip->centre[axis] + clip->radius;
     }
-    meet_box(box, lower, upper);
+    intersect_box(box, lower, upper);
 }
 
-static void leave_box(clip_box *box, const render_clip *clip)
+static void subtract_box(clip_box *box, const render_clip *clip)
 {
     bool is_within = true;
     for (int axis = 0; axis < 3; axis++)
         is_within = is_within && clip->lower[axis] < box->lower[axis] && box->upper[axis] < clip->upper[axis];
-    if (is_within) make_nothing(box);
+    if (is_within) make_empty_box(box);
 }
 
-static void meet(clip_box *box, const render_clip *clip)
+static void intersect_clip(clip_box *box, const render_clip *clip)
 {
     switch (clip->kind) {
-    case RENDER_CLIP_PLANE: meet_plane(box, clip); break;
-    case RENDER_CLIP_SPHERE: meet_sphere(box, clip); break;
+    case RENDER_CLIP_PLANE: intersect_plane(box, clip); break;
+    case RENDER_CLIP_SPHERE: intersect_sphere(box, clip); break;
     case RENDER_CLIP_BOX:
         if (clip->is_outside)
-            leave_box(box, clip);
+            subtract_box(box, clip);
         else
-            meet_box(box, clip->lower, clip->upper);
+            intersect_box(box, clip->lower, clip->upper);
     }
 }
 
-static bool leave_nothing(const session_extent *e, const render_clip *clips, int count, uint32_t set)
+static bool do_clips_remove_all(const session_extent *e, const render_clip *clips, int count, uint32_t set)
 {
     enum { TURNS = 8 };
     clip_box box;
     memcpy(box.lower, e->lower, sizeof box.lower);
     memcpy(box.upper, e->upper, sizeof box.upper);
     for (int turn = 0; turn < TURNS; turn++)
-        for (int i = 0; i < count && !is_nothing(&box); i++)
-            if (set >> i & 1) meet(&box, &clips[i]);
-    return is_nothing(&box);
+        for (int i = 0; i < count && !is_empty_box(&box); i++)
+            if (set >> i & 1) intersect_clip(&box, &clips[i]);
+    return is_empty_box(&box);
 }
 
 /* ---- warnings -------------------------------------------------------------------------------------------------- */
@@ -153,7 +153,7 @@ static void warn_of_layer(const clip_basis *b, const char *layer, const char *fi
 {
     const session_extent *e = b->extent;
     const session_warning warning = {WARNING_CLIP, b->image->name, layer, number};
-    const bool holds = !b->has_nothing && leave_nothing(e, b->clips, b->image->clip_count, set);
+    const bool holds = !b->has_nothing && do_clips_remove_all(e, b->clips, b->image->clip_count, set);
     session_warn(b->report, &warning, holds,
                  "image \"%s\": clip leaves nothing of %s%s%s%s: the cells lie between (%g, %g, %g) and (%g, %g, %g)",
                  b->image->name, layer, field ? " of \"" : "", field ? field : "", field ? "\"" : "", e->lower[0],
@@ -166,7 +166,7 @@ void session_warn_of_clips(const session_extent *extent, const scene_image *imag
     clip_basis basis = {extent, image, clips, report, extent->cell_count == 0};
     if (image->variant.view > 0 || image->clip_count == 0) return;
     warn_of_layer(&basis, "the picture", NULL, 0, image->clips_of_all);
-    basis.has_nothing = basis.has_nothing || leave_nothing(extent, clips, image->clip_count, image->clips_of_all);
+    basis.has_nothing = basis.has_nothing || do_clips_remove_all(extent, clips, image->clip_count, image->clips_of_all);
     for (int i = 0; i < image->isosurface_count; i++)
         warn_of_layer(&basis, "the isosurface", image->isosurfaces[i].field.name, i, image->isosurfaces[i].clips);
     for (int i = 0; i < image->volume_count; i++)

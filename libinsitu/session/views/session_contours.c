@@ -8,7 +8,7 @@
 _Static_assert((int)RENDER_MAX_LINES == (int)SCENE_MAX_LINES, "a scene's lines have room");
 
 /* Divides the range into parts of equal width on its scale. Values that are equal after rounding are stored once. */
-static void cut_range(const render_transfer *range, int count, session_contours *out)
+static void divide_range(const render_transfer *range, int count, session_contours *out)
 {
     const double low = render_scaled(range->scale, range->threshold, range->low);
     const double high = render_scaled(range->scale, range->threshold, range->high);
@@ -35,6 +35,6 @@ insitu_status session_make_contours(const session_meshes *meshes, const session_
     render_transfer range = {.scale = RENDER_LINEAR};
     const session_range_subject values = {&in->field, NULL, false};
     if (!colours) status = session_find_extremes(meshes, team, &values, &range.low, &range.high, error);
-    if (!status) cut_range(colours ? colours : &range, in->count, out);
+    if (!status) divide_range(colours ? colours : &range, in->count, out);
     return status;
 }

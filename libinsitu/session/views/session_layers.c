@@ -83,24 +83,24 @@ static void fill_parts(const session_meshes *meshes, session_layers *layers)
 static const double no_number = NAN;
 
 /* Returns a field that is NaN at all vertices. */
-static grid_field absent_field(void)
+static grid_field make_absent_field(void)
 {
     return (grid_field){.values = {.data = (const char *)&no_number, .stride = 0, .is_wide = true},
                         .component_count = 1};
 }
 
 /* Sets the field and the ranges of a part. scalar is NULL if the part does not have the field. */
-static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mesh *mesh, const session_scalar *scalar,
-                         bool wants_ranges)
+static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
+                             const session_scalar *scalar, bool wants_ranges)
 {
-    layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
+    layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : make_absent_field();
     if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
 /* Sets a layer's field, which consists of the fields of all parts and is stored as the slot-th section of part_count
  * fields. If plane is not NULL, the values are the distances from it instead of the field's values. */
-static render_field place_field(const session_meshes *meshes, session_layers *layers, int slot,
-                                const scene_field *field, const scene_plane *plane, bool wants_ranges)
+static render_field set_layer_field(const session_meshes *meshes, session_layers *layers, int slot,
+                                    const scene_field *field, const scene_plane *plane, bool wants_ranges)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
@@ -110,14 +110,14 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar && plane) scalar = session_find_distance(mesh, plane);
-        place_scalar(layers, at++, mesh, scalar, wants_ranges);
+        set_scalar_field(layers, at++, mesh, scalar, wants_ranges);
     }
     return out;
 }
 
 /* Sets the gradients at the vertices of the meshes that have the field. */
-static const render_vertex_gradients *place_gradients(const session_meshes *meshes, session_layers *layers, int index,
-                                                      const scene_field *field)
+static const render_vertex_gradients *set_gradients(const session_meshes *meshes, session_layers *layers, int index,
+                                                    const scene_field *field)
 {
     render_vertex_gradients *const out = layers->gradients + (ptrdiff_t)index * layers->part_count;
     int at = 0;
@@ -169,7 +169,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
 }
 
 /* Returns the slot of the field of a surface's contour lines. */
-static int lines_slot(const session_layers *layers, const scene_image *image, int surface)
+static int find_lines_slot(const session_layers *layers, const scene_image *image, int surface)
 {
     return 2 * layers->surface_count + image->volume_count + surface;
 }
@@ -191,12 +191,12 @@ static insitu_status make_lines(const session_layer_basis *basis, const scene_li
 
 /* Sets the field of the contour lines of a surface that lies in the meshes' own cells, and computes the lines.
  * Collective. */
-static insitu_status place_lines(const session_layer_basis *basis, const scene_lines *in, int surface,
-                                 session_layers *layers, base_error *error)
+static insitu_status set_lines(const session_layer_basis *basis, const scene_lines *in, int surface,
+                               session_layers *layers, base_error *error)
 {
     if (!in->is_given) return INSITU_OK;
-    const int slot = lines_slot(layers, basis->image, surface);
-    const render_field field = place_field(basis->meshes, layers, slot, &in->field, NULL, false);
+    const int slot = find_lines_slot(layers, basis->image, surface);
+    const render_field field = set_layer_field(basis->meshes, layers, slot, &in->field, NULL, false);
     return make_lines(basis, in, field, surface, layers, error);
 }
 
@@ -213,7 +213,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
         [SCENE_GRADIENT] = RENDER_GRADIENT, [SCENE_DIFFERENCES] = RENDER_DIFFERENCES, [SCENE_VERTEX] = RENDER_VERTEX};
     render_surface_layer *out = &layers->surfaces[index];
     const scene_material *m = &layer->material;
-    *out = (render_surface_layer){.field = place_field(basis->meshes, layers, 2 * index, &layer->field, NULL, true),
+    *out = (render_surface_layer){.field = set_layer_field(basis->meshes, layers, 2 * index, &layer->field, NULL, true),
                                   .value_count = layer->value_count,
                                   .values = layer->values,
                                   .colours = layer->colours,
@@ -223,14 +223,14 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .difference = layer->difference,
                                   .contact = CONTACT,
                                   .clips = layer->clips};
-    if (layer->normals == SCENE_VERTEX) out->gradients = place_gradients(basis->meshes, layers, index, &layer->field);
+    if (layer->normals == SCENE_VERTEX) out->gradients = set_gradients(basis->meshes, layers, index, &layer->field);
     insitu_status status = INSITU_OK;
     if (layer->has_colour_by) {
-        out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, NULL, false);
+        out->colour_field = set_layer_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, NULL, false);
         out->colour_map = &layers->transfers[index].transfer;
         status = make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
     }
-    return status ? status : place_lines(basis, &layer->lines, index, layers, error);
+    return status ? status : set_lines(basis, &layer->lines, index, layers, error);
 }
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
@@ -242,15 +242,15 @@ static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
            session_find_outer(walk->whole, &layer->threshold) == walk->outer;
 }
 
-static render_field place_faces(const session_meshes *meshes, session_layers *layers, int slot,
-                                const scene_surface *layer)
+static render_field set_face_field(const session_meshes *meshes, session_layers *layers, int slot,
+                                   const scene_surface *layer)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     ptrdiff_t at = first;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         const session_mesh *mesh = walk.part;
         if (!is_part(mesh)) continue;
-        layers->fields[at] = absent_field();
+        layers->fields[at] = make_absent_field();
         if (is_shown(&walk, layer)) {
             layers->fields[at] = session_scalar_field(mesh, &mesh->scalars[0]);
             layers->ranges[at] = session_scalar_ranges(mesh, &mesh->scalars[0]);
@@ -260,8 +260,8 @@ static render_field place_faces(const session_meshes *meshes, session_layers *la
     return (render_field){layers->fields + first, layers->ranges + first};
 }
 
-static bool gather(const session_mesh *whole, const session_outer *outer, const session_scalar *scalar, double **values,
-                   grid_field *out)
+static bool gather_values(const session_mesh *whole, const session_outer *outer, const session_scalar *scalar,
+                          double **values, grid_field *out)
 {
     const grid_field field = session_scalar_field(whole, scalar);
     *values = session_gather_outer_values(outer, &field);
@@ -274,16 +274,17 @@ static bool gather(const session_mesh *whole, const session_outer *outer, const 
 
 /* Sets a layer's field to the values at the outer faces, which are gathered from those of the cells. Returns false if
  * memory runs out. */
-static bool place_gathered(const session_meshes *meshes, session_layers *layers, int slot, const scene_surface *layer,
-                           const scene_field *field, render_field *out)
+static bool set_gathered_field(const session_meshes *meshes, session_layers *layers, int slot,
+                               const scene_surface *layer, const scene_field *field, render_field *out)
 {
     ptrdiff_t at = (ptrdiff_t)slot * layers->part_count;
     *out = (render_field){layers->fields + at, layers->ranges + at};
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         if (!is_part(walk.part)) continue;
         const session_scalar *scalar = is_shown(&walk, layer) ? session_find_scalar(walk.whole, field) : NULL;
-        layers->fields[at] = absent_field();
-        if (scalar && !gather(walk.whole, walk.outer, scalar, &layers->gathered[at], &layers->fields[at])) return false;
+        layers->fields[at] = make_absent_field();
+        if (scalar && !gather_values(walk.whole, walk.outer, scalar, &layers->gathered[at], &layers->fields[at]))
+            return false;
         at++;
     }
     return true;
@@ -302,7 +303,7 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
 {
     const scene_material *m = material_of_faces(basis, layer);
     render_surface_layer *out = &layers->surfaces[surface];
-    *out = (render_surface_layer){.field = place_faces(basis->meshes, layers, 2 * surface, layer),
+    *out = (render_surface_layer){.field = set_face_field(basis->meshes, layers, 2 * surface, layer),
                                   .value_count = 1,
                                   .values = &layers->distances[surface],
                                   .colours = layer->colour,
@@ -315,12 +316,12 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
     memcpy(out->edge_colour, layer->edge_colour, sizeof out->edge_colour);
     if (layer->has_colour_by) {
         out->colour_map = &layers->transfers[surface].transfer;
-        if (!place_gathered(basis->meshes, layers, 2 * surface + 1, layer, &layer->colour_by, &out->colour_field))
+        if (!set_gathered_field(basis->meshes, layers, 2 * surface + 1, layer, &layer->colour_by, &out->colour_field))
             session_no_memory(error, 1 << 10, "values at outer faces");
     }
     render_field field = {NULL, NULL};
-    const int slot = lines_slot(layers, basis->image, surface);
-    if (layer->lines.is_given && !place_gathered(basis->meshes, layers, slot, layer, &layer->lines.field, &field))
+    const int slot = find_lines_slot(layers, basis->image, surface);
+    if (layer->lines.is_given && !set_gathered_field(basis->meshes, layers, slot, layer, &layer->lines.field, &field))
         session_no_memory(error, 1 << 10, "values at outer faces");
     if (!layer->has_colour_by && !layer->lines.is_given) return INSITU_OK;
     insitu_status status = session_agree(basis->team->comm, error);
@@ -355,16 +356,16 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
     layers->distances[surface] = session_slice_distance(low, high, basis->half_diagonal);
     warn_of_plane(basis, image, surface, low, high);
     layers->surfaces[surface] = (render_surface_layer){
-        .field = place_field(basis->meshes, layers, 2 * surface, &layer->field, plane, true),
+        .field = set_layer_field(basis->meshes, layers, 2 * surface, &layer->field, plane, true),
         .value_count = 1,
         .values = &layers->distances[surface],
-        .colour_field = place_field(basis->meshes, layers, 2 * surface + 1, &layer->field, NULL, false),
+        .colour_field = set_layer_field(basis->meshes, layers, 2 * surface + 1, &layer->field, NULL, false),
         .colour_map = &transfer->transfer,
         .opacity = layer->opacity,
         .material = {m->ambient, m->diffuse, m->specular, m->shininess},
         .normal = RENDER_GRADIENT,
         .clips = layer->clips};
-    return place_lines(basis, &layer->lines, surface, layers, error);
+    return set_lines(basis, &layer->lines, surface, layers, error);
 }
 
 static insitu_status fill_slices(const session_layer_basis *basis, const scene_image *image, session_layers *layers,
@@ -384,7 +385,7 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     const scene_volume *layer = &image->volumes[index];
     session_transfer *transfer = &layers->transfers[layers->surface_count + index];
     layers->volumes[index] = (render_volume_layer){
-        .field = place_field(basis->meshes, layers, 2 * layers->surface_count + index, &layer->field, NULL, true),
+        .field = set_layer_field(basis->meshes, layers, 2 * layers->surface_count + index, &layer->field, NULL, true),
         .transfer = &transfer->transfer};
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }

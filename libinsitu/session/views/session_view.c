@@ -107,8 +107,8 @@ static double estimate_samples(const session_extent *e, const scene_image *image
     return sum / (PROBES * PROBES) / view->step * rays * image->volume_count;
 }
 
-static insitu_status check_time(const session_extent *e, const char *scene_path, const scene_image *image,
-                                const session_view *view, int threads, base_error *error)
+static insitu_status check_sampling_time(const session_extent *e, const char *scene_path, const scene_image *image,
+                                         const session_view *view, int threads, base_error *error)
 {
     if (image->volume_count == 0 || image->method != SCENE_SAMPLES || e->rank_count == 0) return INSITU_OK;
     const double samples = estimate_samples(e, image, view);
@@ -156,7 +156,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
 }
 
 /* Returns the reason why no data is in view; NULL if some data may be. */
-static const char *why_unseen(const session_extent *e, const render_camera *c)
+static const char *find_unseen_reason(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);
     if (b.behind == 8) return "they are behind it";
@@ -169,7 +169,7 @@ static const char *why_unseen(const session_extent *e, const render_camera *c)
 static void warn_of_view(const session_extent *e, const scene_image *image, const session_view *view,
                          session_report *report)
 {
-    const char *why = e->cell_count ? why_unseen(e, &view->camera) : NULL;
+    const char *why = e->cell_count ? find_unseen_reason(e, &view->camera) : NULL;
     const session_warning warning = {WARNING_VIEW, image->name, NULL, image->variant.view};
     session_warn(report, &warning, why != NULL,
                  "image \"%s\": its camera does not see the cells, which lie between (%g, %g, %g) and (%g, %g, %g): %s",
@@ -189,7 +189,7 @@ insitu_status session_make_view(const session_space *space, const char *scene_pa
     out->clip_count = image->clip_count;
     session_make_clips(&space->extent, image, out->clips);
     session_warn_of_clips(&space->extent, image, out->clips, report);
-    if (check_time(&space->extent, scene_path, image, out, team->threads, error) == INSITU_OK)
+    if (check_sampling_time(&space->extent, scene_path, image, out, team->threads, error) == INSITU_OK)
         warn_of_view(&space->extent, image, out, report);
     return INSITU_OK;
 }
