@@ -32,7 +32,7 @@ char *session_database_file(const scene_database *database, const char *file)
 /* ---- lines ----------------------------------------------------------------------------------------------------- */
 
 /* Ensures that there is space for `more` more bytes and a terminating NUL. Returns false if memory runs out. */
-static bool reserve(session_table *t, size_t more)
+static bool reserve_text(session_table *t, size_t more)
 {
     if (t->size + more < t->capacity) return true;
     const size_t capacity = 2 * t->capacity + more + 4096;
@@ -52,7 +52,7 @@ typedef struct table_line {
 static void add_bytes(table_line *line, const char *bytes, size_t count)
 {
     session_table *t = line->table;
-    line->is_well = line->is_well && reserve(t, count);
+    line->is_well = line->is_well && reserve_text(t, count);
     if (!line->is_well) return;
     memcpy(t->text + t->size, bytes, count);
     t->size += count;
@@ -78,7 +78,7 @@ static void add_text(table_line *line, const char *shield, const char *text, cha
 }
 
 /* Adds an empty field, which in Spec D means that there is no value. */
-static void add_nothing(table_line *line)
+static void add_empty_field(table_line *line)
 {
     add_bytes(line, ",", 1);
 }
@@ -109,12 +109,12 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
         if (image->camera.orbit.view_count)
             add_number(line, i ? image->camera.theta : image->camera.phi);
         else
-            add_nothing(line);
+            add_empty_field(line);
     }
     if (database->has_isovalues && image->has_isovalue) add_number(line, image->isovalue);
-    if (database->has_isovalues && !image->has_isovalue) add_nothing(line);
+    if (database->has_isovalues && !image->has_isovalue) add_empty_field(line);
     if (database->has_planes && image->has_plane) add_number(line, image->variant.plane);
-    if (database->has_planes && !image->has_plane) add_nothing(line);
+    if (database->has_planes && !image->has_plane) add_empty_field(line);
     if (database->has_fields) add_text(line, "'", image->swept_field ? image->swept_field : "", ',');
     add_text(line, "./", file, '\n');
 }
@@ -122,7 +122,7 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
 /* Removes the lines of this cycle and of later ones from the table. */
-static void drop_from(session_table *t, int64_t cycle)
+static void drop_lines_from_cycle(session_table *t, int64_t cycle)
 {
     const char *end = t->size ? memchr(t->text, '\n', t->size) : NULL;
     const size_t header = end ? (size_t)(end + 1 - t->text) : 0;
@@ -131,7 +131,7 @@ static void drop_from(session_table *t, int64_t cycle)
 }
 
 /* Copies those lines of the folder's existing table that belong to cycles before this one. */
-static insitu_status take_over(session_table *t, const file_content *old, int64_t cycle, base_error *error)
+static insitu_status copy_earlier_lines(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
     if (strncmp(old->text, t->text, t->size) != 0)
@@ -142,7 +142,7 @@ static insitu_status take_over(session_table *t, const file_content *old, int64_
     table_line line = {t, true};
     add_bytes(&line, old->text + t->size, old->size - t->size);
     if (!line.is_well) return fail_memory(database, "data.csv", "read", error);
-    drop_from(t, cycle);
+    drop_lines_from_cycle(t, cycle);
     return INSITU_OK;
 }
 
@@ -161,7 +161,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     insitu_status status = INSITU_OK;
     if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
         status = session_fail_database(t->database, "data.csv", "read", &failure, error);
-    if (!status && old.size) status = take_over(t, &old, cycle, error);
+    if (!status && old.size) status = copy_earlier_lines(t, &old, cycle, error);
     base_free(old.text);
     base_free(path);
     t->is_begun = !status;
@@ -194,7 +194,7 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
     session_table *t = &cinema->tables[output->database];
     insitu_status status = t->is_begun ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
     if (status) return status;
-    if (!t->is_open && moment->cycle <= t->last_cycle) drop_from(t, moment->cycle);
+    if (!t->is_open && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
     char *file = scene_expand(output->path + output->folder_bytes, moment);
     if (!file || !c_numbers_begin(&numbers)) {
         base_free(file);
@@ -218,7 +218,7 @@ insitu_status session_note_picture(session_cinema *cinema, const scene *scene, c
 
 /* Returns whether a byte must be escaped in a string of the script. Bytes above 0x7f need not be, since the page's
  * scripts are UTF-8. */
-static bool is_escaped(unsigned char byte)
+static bool must_escape(unsigned char byte)
 {
     return byte == '"' || byte == '\\' || byte < 0x20;
 }
@@ -226,7 +226,7 @@ static bool is_escaped(unsigned char byte)
 static void write_script_line(FILE *file, const char *line, size_t size)
 {
     for (size_t at = 0, end; at < size; at = end) {
-        for (end = at; end < size && !is_escaped((unsigned char)line[end]);) end++;
+        for (end = at; end < size && !must_escape((unsigned char)line[end]);) end++;
         if (end > at)
             fwrite(line + at, 1, end - at, file);
         else
@@ -250,18 +250,18 @@ static void write_script(FILE *file, const void *what)
 
 typedef bool table_writer(const session_table *t, const char *path, file_failure *failure);
 
-static bool put_table(const session_table *t, const char *path, file_failure *failure)
+static bool write_table_file(const session_table *t, const char *path, file_failure *failure)
 {
     return file_replace(path, t->text, t->size, failure);
 }
 
-static bool put_script(const session_table *t, const char *path, file_failure *failure)
+static bool write_script_file(const session_table *t, const char *path, file_failure *failure)
 {
     return text_file_replace(path, write_script, t, failure);
 }
 
 /* Writes the page if it does not exist or has not been written by this session. Its content is always the same. */
-static bool put_page(const session_table *t, const char *path, file_failure *failure)
+static bool write_page_file(const session_table *t, const char *path, file_failure *failure)
 {
     if (t->has_page && file_exists(path)) return true;
     return file_replace(path, (const char *)session_cinema_page, session_cinema_page_size, failure);
@@ -284,9 +284,9 @@ insitu_status session_write_cinema(session_cinema *cinema, base_error *error)
         base_error own = {.status = INSITU_OK};
         t->is_open = false;
         if (!t->is_changed) continue;
-        insitu_status status = write_file(t, "data.csv", put_table, &own);
-        if (!status) status = write_file(t, "data.js", put_script, &own);
-        if (!status) status = write_file(t, "index.html", put_page, &own);
+        insitu_status status = write_file(t, "data.csv", write_table_file, &own);
+        if (!status) status = write_file(t, "data.js", write_script_file, &own);
+        if (!status) status = write_file(t, "index.html", write_page_file, &own);
         t->is_changed = status != INSITU_OK;
         t->has_page = t->has_page || !status;
         if (status && !error->status) *error = own;

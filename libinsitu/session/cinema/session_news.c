@@ -11,7 +11,7 @@
 
 /* ---- warnings and errors --------------------------------------------------------------------------------------- */
 
-static void note_line(session_news *news, int64_t cycle, const char *line, size_t size)
+static void store_line(session_news *news, int64_t cycle, const char *line, size_t size)
 {
     const int64_t at = news->count++ % SESSION_NEWS_LINES;
     base_free(news->lines[at]);
@@ -28,7 +28,7 @@ void session_note_news(session_news *news, const session_report *report, const b
     const char *at = report->warnings.size ? report->warnings.data : "";
     while (*at) {
         const size_t size = strcspn(at, "\n");
-        note_line(news, report->numbers.cycle, at, size);
+        store_line(news, report->numbers.cycle, at, size);
         at += size + (at[size] == '\n');
     }
     if (!error->status && !report->numbers.images) return;
@@ -49,7 +49,7 @@ static void add_bytes(news_text *out, const char *bytes, size_t count)
     out->is_whole = out->is_whole && session_text_append(&out->text, bytes, count);
 }
 
-__attribute__((format(printf, 2, 3))) static void add(news_text *out, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void add_formatted(news_text *out, const char *format, ...)
 {
     char piece[256];
     va_list arguments;
@@ -65,7 +65,7 @@ static void add_quoted(news_text *out, const char *text)
     add_bytes(out, text ? "\"" : "null", text ? 1 : 4);
     for (; text && *text; text++) {
         if ((unsigned char)*text < 0x20) {
-            add(out, "\\u%04x", (unsigned)(unsigned char)*text);
+            add_formatted(out, "\\u%04x", (unsigned)(unsigned char)*text);
             continue;
         }
         if (*text == '"' || *text == '\\') add_bytes(out, "\\", 1);
@@ -78,46 +78,46 @@ static void add_quoted(news_text *out, const char *text)
 static void add_number(news_text *out, double number)
 {
     if (isfinite(number))
-        add(out, "%.17g", number);
+        add_formatted(out, "%.17g", number);
     else
         add_bytes(out, "null", 4);
 }
 
 static void add_scene(news_text *out, const session_news_scene *source)
 {
-    add(out, ",\n \"scene\": {\"path\": ");
+    add_formatted(out, ",\n \"scene\": {\"path\": ");
     add_quoted(out, source->path);
-    add(out, ", \"modified\": ");
+    add_formatted(out, ", \"modified\": ");
     if (source->stamp)
-        add(out, "\"%lld.%09ld\"", (long long)source->stamp->st_mtim.tv_sec, source->stamp->st_mtim.tv_nsec);
+        add_formatted(out, "\"%lld.%09ld\"", (long long)source->stamp->st_mtim.tv_sec, source->stamp->st_mtim.tv_nsec);
     else
         add_quoted(out, NULL);
-    add(out, ", \"error\": ");
+    add_formatted(out, ", \"error\": ");
     add_quoted(out, source->refusal);
-    add(out, "},\n \"parameters\": {");
+    add_formatted(out, "},\n \"parameters\": {");
     for (int i = 0; i < source->scene->parameter_count; i++) {
-        if (i) add(out, ", ");
+        if (i) add_formatted(out, ", ");
         add_quoted(out, source->scene->parameters[i].name);
-        add(out, ": ");
+        add_formatted(out, ": ");
         add_number(out, source->scene->parameters[i].value);
     }
-    add(out, "}");
+    add_formatted(out, "}");
 }
 
 static void add_warnings(news_text *out, const session_news *news)
 {
     const int64_t first = news->count > SESSION_NEWS_LINES ? news->count - SESSION_NEWS_LINES : 0;
     bool is_first = true;
-    add(out, ",\n \"warnings\": [");
+    add_formatted(out, ",\n \"warnings\": [");
     for (int64_t i = first; i < news->count; i++) {
         const int at = (int)(i % SESSION_NEWS_LINES);
         if (!news->lines[at]) continue;
-        add(out, "%s\n  {\"cycle\": %lld, \"text\": ", is_first ? "" : ",", (long long)news->cycles[at]);
+        add_formatted(out, "%s\n  {\"cycle\": %lld, \"text\": ", is_first ? "" : ",", (long long)news->cycles[at]);
         add_quoted(out, news->lines[at]);
-        add(out, "}");
+        add_formatted(out, "}");
         is_first = false;
     }
-    add(out, "]}\n");
+    add_formatted(out, "]}\n");
 }
 
 char *session_make_news(session_news *news, const session_news_scene *source, const insitu_report *report)
@@ -125,9 +125,9 @@ char *session_make_news(session_news *news, const session_news_scene *source, co
     news_text out = {.is_whole = true};
     c_numbers numbers;
     if (!c_numbers_begin(&numbers)) return NULL;
-    add(&out, "{\"cycle\": %lld, \"time\": ", (long long)report->cycle);
+    add_formatted(&out, "{\"cycle\": %lld, \"time\": ", (long long)report->cycle);
     add_number(&out, report->time);
-    add(&out, ", \"error\": ");
+    add_formatted(&out, ", \"error\": ");
     add_quoted(&out, news->error.status ? news->error.message : NULL);
     add_scene(&out, source);
     add_warnings(&out, news);

@@ -7,7 +7,7 @@
 
 /* Computes the hash of a path without "./" and "//", so that different paths to the same file have equal hashes. The
  * result is never 0. */
-static uint64_t hash_of(const char *path)
+static uint64_t hash_path(const char *path)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     bool is_part_begun = false;
@@ -23,7 +23,7 @@ static uint64_t hash_of(const char *path)
     return hash ? hash : 1;
 }
 
-static int outputs_before(const scene *scene, int image)
+static int count_outputs_before(const scene *scene, int image)
 {
     int count = 0;
     for (int i = 0; i < image; i++) count += scene->images[i].output_count;
@@ -31,7 +31,7 @@ static int outputs_before(const scene *scene, int image)
 }
 
 /* Returns the image of the scene that has this output. */
-static const scene_image *image_of(const scene *scene, int output)
+static const scene_image *find_image_of_output(const scene *scene, int output)
 {
     int image = 0;
     while (output >= scene->images[image].output_count) output -= scene->images[image++].output_count;
@@ -40,7 +40,7 @@ static const scene_image *image_of(const scene *scene, int output)
 
 /* Returns the output whose last picture was written to this file; -1: there is none. The same output at the same cycle
  * does not count, because the run has then repeated the step. */
-static int find_written(const session_overwrites *all, uint64_t file, int output, long long cycle)
+static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
         if (all->last[i].file == file && (i != output || all->last[i].cycle != cycle)) return i;
@@ -48,7 +48,7 @@ static int find_written(const session_overwrites *all, uint64_t file, int output
 }
 
 /* Returns the advice that is the last part of the warning. */
-static const char *advice_for(const scene_image *image, const scene_image *before, bool is_same_output)
+static const char *overwrite_advice(const scene_image *image, const scene_image *before, bool is_same_output)
 {
     if (is_same_output) return "put {cycle} into its path to keep a picture of each step";
     if (image->variant.source != before->variant.source)
@@ -56,20 +56,20 @@ static const char *advice_for(const scene_image *image, const scene_image *befor
     return "give each of its pictures a path of its own";
 }
 
-static void warn(const session_overwrites *all, const scene *scene, const scene_image *image, int output, int before,
-                 const char *path, long long cycle, session_report *report)
+static void warn_of_overwrite(const session_overwrites *all, const scene *scene, const scene_image *image, int output,
+                              int before, const char *path, long long cycle, session_report *report)
 {
-    const scene_image *earlier = image_of(scene, before);
+    const scene_image *earlier = find_image_of_output(scene, before);
     session_warn(report, &(session_warning){WARNING_REPLACED, image->name, NULL, 0}, true,
                  "image \"%s\": %.400s, written at cycle %lld by image \"%s\", is overwritten at cycle %lld; %s",
                  image->name, path, all->last[before].cycle, earlier->name, cycle,
-                 advice_for(image, earlier, before == output));
+                 overwrite_advice(image, earlier, before == output));
 }
 
-static bool has_room(session_overwrites *all, const scene *scene)
+static bool reserve_entries(session_overwrites *all, const scene *scene)
 {
     if (all->last) return true;
-    const int count = outputs_before(scene, scene->image_count);
+    const int count = count_outputs_before(scene, scene->image_count);
     all->last = base_calloc((size_t)count, sizeof *all->last);
     all->count = all->last ? count : 0;
     return all->last != NULL;
@@ -80,17 +80,17 @@ void session_note_written(session_overwrites *all, const scene *scene, int image
 {
     const scene_image *drawn = &scene->images[image];
     const scene_moment moment = scene_moment_of(drawn, cycle, time);
-    if (!has_room(all, scene)) return;
-    const int first = outputs_before(scene, image);
+    if (!reserve_entries(all, scene)) return;
+    const int first = count_outputs_before(scene, image);
     for (int i = 0; i < drawn->output_count; i++) {
         const scene_output *output = &drawn->outputs[i];
         if (output->montage >= 0 && output->first_cell + drawn->variant.view > 0)
             continue; /* only the first cell of a montage counts, because all its cells are in the same file */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
-        const uint64_t file = hash_of(path);
-        const int before = find_written(all, file, first + i, cycle);
-        if (before >= 0) warn(all, scene, drawn, first + i, before, path, cycle, report);
+        const uint64_t file = hash_path(path);
+        const int before = find_last_writer(all, file, first + i, cycle);
+        if (before >= 0) warn_of_overwrite(all, scene, drawn, first + i, before, path, cycle, report);
         all->last[first + i] = (session_written){file, cycle};
         base_free(path);
     }

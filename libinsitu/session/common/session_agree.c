@@ -28,7 +28,7 @@ insitu_status session_share_error(MPI_Comm comm, int root, base_error *error)
     return error->status;
 }
 
-static void name_rank(int rank, base_error *error)
+static void prefix_rank(int rank, base_error *error)
 {
     char message[sizeof error->message];
     memcpy(message, error->message, sizeof message);
@@ -37,7 +37,7 @@ static void name_rank(int rank, base_error *error)
              message);
 }
 
-static insitu_status agree(MPI_Comm comm, base_error *error, int with_rank)
+static insitu_status agree_on_error(MPI_Comm comm, base_error *error, int with_rank)
 {
     int rank = 0, ranks = 1, first = 0;
     MPI_Comm_rank(comm, &rank);
@@ -46,16 +46,16 @@ static insitu_status agree(MPI_Comm comm, base_error *error, int with_rank)
     const int code = MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
     if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Allreduce");
     if (first == ranks) return INSITU_OK;
-    if (rank == first && with_rank) name_rank(rank, error);
+    if (rank == first && with_rank) prefix_rank(rank, error);
     return session_share_error(comm, first, error);
 }
 
 insitu_status session_agree(MPI_Comm comm, base_error *error)
 {
-    return agree(comm, error, 1);
+    return agree_on_error(comm, error, 1);
 }
 
 insitu_status session_agree_as_is(MPI_Comm comm, base_error *error)
 {
-    return agree(comm, error, 0);
+    return agree_on_error(comm, error, 0);
 }

@@ -23,7 +23,7 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
 
 /* Marks the cores that belong to OpenMP's places. If there are places, the set of cores of this thread cannot be used,
  * because OpenMP has already bound it to the first place. */
-static void find_places(int32_t may_run[MOST_CORES])
+static void mark_place_cores(int32_t may_run[MOST_CORES])
 {
     for (int place = 0; place < omp_get_num_places(); place++) {
         int cores[MOST_CORES];
@@ -36,13 +36,13 @@ static void find_places(int32_t may_run[MOST_CORES])
 }
 
 /* Marks the cores on which this rank may run. Returns false if the operating system does not provide them. */
-static bool find_cores(int32_t may_run[MOST_CORES])
+static bool find_allowed_cores(int32_t may_run[MOST_CORES])
 {
     cpu_set_t set;
     CPU_ZERO(&set);
     memset(may_run, 0, MOST_CORES * sizeof *may_run);
     if (omp_get_num_places() > 0) {
-        find_places(may_run);
+        mark_place_cores(may_run);
         return true;
     }
     if (sched_getaffinity(0, sizeof set, &set)) return false;
@@ -55,7 +55,7 @@ int session_cores_of_rank(MPI_Comm node)
     int32_t own[MOST_CORES] = {0}, all[MOST_CORES];
     int ranks = 1;
     MPI_Comm_size(node, &ranks);
-    const bool is_known = find_cores(own);
+    const bool is_known = find_allowed_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
         return session_share_of_cores(own, all, MOST_CORES);
     /* If a rank may not run on all cores, it has been bound to its own ones. */

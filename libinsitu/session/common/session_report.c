@@ -96,7 +96,7 @@ void session_report_free(session_report *report)
 
 /* ---- warnings ------------------------------------------------------------------------------------------------ */
 
-static uint64_t key_of(const session_warning *w)
+static uint64_t warning_key(const session_warning *w)
 {
     const char *const texts[2] = {w->image ? w->image : "", w->mesh ? w->mesh : ""};
     const int numbers[2] = {(int)w->kind, w->number};
@@ -107,7 +107,7 @@ static uint64_t key_of(const session_warning *w)
 }
 
 /* Returns the index of a warning that has been reported; told_count if it has not been reported. */
-static int find_told(const session_report *report, uint64_t key)
+static int find_reported(const session_report *report, uint64_t key)
 {
     int at = 0;
     while (at < report->told_count && report->told[at] != key) at++;
@@ -115,7 +115,7 @@ static int find_told(const session_report *report, uint64_t key)
 }
 
 /* Stores that a warning has been reported. If memory runs out, the warning will be reported again. */
-static void add_told(session_report *report, uint64_t key)
+static void add_reported(session_report *report, uint64_t key)
 {
     uint64_t *told = base_realloc(report->told, (size_t)(report->told_count + 1) * sizeof *told);
     if (!told) return;
@@ -123,11 +123,11 @@ static void add_told(session_report *report, uint64_t key)
     told[report->told_count++] = key;
 }
 
-static void warn(session_report *report, session_text *text, const session_warning *warning, bool holds,
-                 const char *format, va_list arguments)
+static void add_warning(session_report *report, session_text *text, const session_warning *warning, bool holds,
+                        const char *format, va_list arguments)
 {
-    const uint64_t key = key_of(warning);
-    const int at = find_told(report, key);
+    const uint64_t key = warning_key(warning);
+    const int at = find_reported(report, key);
     if (holds && at == report->told_count) {
         char line[1024];
 #pragma GCC diagnostic push
@@ -135,7 +135,7 @@ static void warn(session_report *report, session_text *text, const session_warni
         vsnprintf(line, sizeof line, format, arguments);
 #pragma GCC diagnostic pop
         session_text_add(text, "%s", line);
-        add_told(report, key);
+        add_reported(report, key);
     } else if (!holds && at < report->told_count) {
         report->told[at] = report->told[--report->told_count];
     }
@@ -145,7 +145,7 @@ void session_warn(session_report *report, const session_warning *warning, bool h
 {
     va_list arguments;
     va_start(arguments, format);
-    warn(report, &report->warnings, warning, holds, format, arguments);
+    add_warning(report, &report->warnings, warning, holds, format, arguments);
     va_end(arguments);
 }
 
@@ -153,13 +153,13 @@ void session_warn_own(session_report *report, const session_warning *warning, bo
 {
     va_list arguments;
     va_start(arguments, format);
-    warn(report, &report->own, warning, holds, format, arguments);
+    add_warning(report, &report->own, warning, holds, format, arguments);
     va_end(arguments);
 }
 
 bool session_is_warned(const session_report *report, const session_warning *warning)
 {
-    return find_told(report, key_of(warning)) < report->told_count;
+    return find_reported(report, warning_key(warning)) < report->told_count;
 }
 
 void session_forget_warnings(session_report *report)

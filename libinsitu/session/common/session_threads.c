@@ -47,7 +47,7 @@ static team_cap cap_of_team(void)
     return (team_cap){cores > 1 ? cores : 1, "this rank may run on no more cores"};
 }
 
-static int wanted_threads(int asked, int cores)
+static int requested_threads(int asked, int cores)
 {
     const int most = omp_get_max_threads(), usual = cores < most ? cores : most;
     const int wanted = asked > 0 ? asked : usual;
@@ -62,19 +62,19 @@ static pthread_key_t key;
 static bool has_key;
 static atomic_llong ended_count;
 
-static void count_end(void *value)
+static void count_thread_end(void *value)
 {
     (void)value;
     atomic_fetch_add(&ended_count, 1);
 }
 
-static void make_key(void)
+static void create_exit_key(void)
 {
-    has_key = pthread_key_create(&key, count_end) == 0;
+    has_key = pthread_key_create(&key, count_thread_end) == 0;
 }
 
 /* Returns the number of threads that are known to exist. */
-static int living_threads(const session_threads *threads)
+static int count_living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
     return is_same && threads->ended == atomic_load(&ended_count) ? threads->count : 1;
@@ -82,7 +82,7 @@ static int living_threads(const session_threads *threads)
 
 bool session_lacks_threads(const session_threads *threads, int asked, int cores)
 {
-    return wanted_threads(asked, cores) > threads->count || !pthread_equal(threads->caller, pthread_self()) ||
+    return requested_threads(asked, cores) > threads->count || !pthread_equal(threads->caller, pthread_self()) ||
            threads->ended != atomic_load(&ended_count);
 }
 
@@ -95,7 +95,7 @@ typedef struct trial {
     void *room;
 } trial;
 
-static void *pass_gate(void *gate)
+static void *wait_at_gate(void *gate)
 {
     pthread_mutex_lock(gate);
     pthread_mutex_unlock(gate);
@@ -134,7 +134,7 @@ static size_t stack_of_environment(void)
 }
 
 /* Starts up to `wanted` threads. Their number is stored in the trial. */
-static void start_trial(trial *t, int wanted)
+static void start_trial_threads(trial *t, int wanted)
 {
     pthread_attr_t attributes;
     sigset_t all, old;
@@ -148,13 +148,13 @@ static void start_trial(trial *t, int wanted)
     sigfillset(&all);
     /* signals are blocked while threads are started, so that these never receive the caller's signals */
     pthread_sigmask(SIG_SETMASK, &all, &old);
-    while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, pass_gate, &t->gate) == 0)
+    while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->gate) == 0)
         t->count++;
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     pthread_attr_destroy(&attributes);
 }
 
-static void end_trial(trial *t)
+static void join_trial_threads(trial *t)
 {
     pthread_mutex_unlock(&t->gate);
     for (int i = 0; i < t->count; i++) pthread_join(t->threads[i], NULL);
@@ -167,12 +167,12 @@ static void end_trial(trial *t)
  * the same time, since those of a node share its limits. Collective. */
 static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm comm, base_error *error)
 {
-    const int living = living_threads(threads), lacking = wanted - living;
+    const int living = count_living_threads(threads), lacking = wanted - living;
     trial t = {.count = 0};
-    pthread_once(&key_once, make_key);
-    if (lacking > 0) start_trial(&t, lacking + SPARE_THREADS);
+    pthread_once(&key_once, create_exit_key);
+    if (lacking > 0) start_trial_threads(&t, lacking + SPARE_THREADS);
     const insitu_status status = session_agree(comm, error);
-    if (lacking > 0) end_trial(&t);
+    if (lacking > 0) join_trial_threads(&t);
     const int more = t.count > SPARE_THREADS ? t.count - SPARE_THREADS : 0;
     *threads = (session_threads){
         .count = lacking > 0 ? living + more : living, .caller = pthread_self(), .ended = atomic_load(&ended_count)};
@@ -198,7 +198,7 @@ typedef struct thread_stack {
     int64_t left, size;
 } thread_stack;
 
-static thread_stack own_stack(void)
+static thread_stack find_own_stack(void)
 {
     pthread_attr_t attributes;
     void *lowest = NULL;
@@ -220,7 +220,7 @@ static thread_stack least_worker_stack(int threads)
     {
         region_enter();
         if (omp_get_thread_num() > 0) {
-            const thread_stack own = own_stack();
+            const thread_stack own = find_own_stack();
             left = own.left;
             size = own.size;
             if (has_key) pthread_setspecific(key, &key);
@@ -232,7 +232,7 @@ static thread_stack least_worker_stack(int threads)
 
 /* Returns the stack size in kB with which `needed` bytes are free. It includes what is in use now, and a few pages for
  * the operating system. */
-static long long kilobytes_for(const thread_stack *stack, int64_t needed)
+static long long needed_stack_kilobytes(const thread_stack *stack, int64_t needed)
 {
     enum { OF_SYSTEMS = 16 };
     return ((needed + stack->size - stack->left) >> 10) + OF_SYSTEMS;
@@ -242,7 +242,7 @@ static long long kilobytes_for(const thread_stack *stack, int64_t needed)
 static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
                                   base_error *error)
 {
-    const thread_stack own = own_stack();
+    const thread_stack own = find_own_stack();
     session_guard_lend(guard);
     const thread_stack least = least_worker_stack(team->threads);
     session_guard_return();
@@ -250,14 +250,16 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB: expected a "
                   "stack of %lld kB (ulimit -s %lld)",
-                  (long long)own.left >> 10, SESSION_CALLER_STACK >> 10, kilobytes_for(&own, SESSION_CALLER_STACK),
-                  kilobytes_for(&own, SESSION_CALLER_STACK));
+                  (long long)own.left >> 10, SESSION_CALLER_STACK >> 10,
+                  needed_stack_kilobytes(&own, SESSION_CALLER_STACK),
+                  needed_stack_kilobytes(&own, SESSION_CALLER_STACK));
     else if (least.left < SESSION_WORKER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "OpenMP's threads have %lld kB of stack left, a step needs %d kB: expected stacks of %lld kB "
                   "(OMP_STACKSIZE=%lldk)",
-                  (long long)least.left >> 10, SESSION_WORKER_STACK >> 10, kilobytes_for(&least, SESSION_WORKER_STACK),
-                  kilobytes_for(&least, SESSION_WORKER_STACK));
+                  (long long)least.left >> 10, SESSION_WORKER_STACK >> 10,
+                  needed_stack_kilobytes(&least, SESSION_WORKER_STACK),
+                  needed_stack_kilobytes(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
     if (status) threads->count = 0; /* threads are tried again in the next step */
     return status;
@@ -266,7 +268,7 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
 insitu_status session_begin_threads(session_threads *threads, session_team *team, int asked, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error)
 {
-    const int wanted = wanted_threads(asked, team->cores);
+    const int wanted = requested_threads(asked, team->cores);
     insitu_status status = is_new ? try_threads(threads, wanted, team->comm, error) : INSITU_OK;
     if (status) return status;
     team->threads = choose_threads(threads, asked, wanted, report);

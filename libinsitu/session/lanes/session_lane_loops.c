@@ -68,8 +68,8 @@ LANE_INLINE lane_sizes sizes_empty(void)
     return s;
 }
 
-LANE_INLINE lane_source source_of(const lane_cells *cells, const int type, const bool wide_index,
-                                  const bool wide_number)
+LANE_INLINE lane_source make_lane_source(const lane_cells *cells, const int type, const bool wide_index,
+                                         const bool wide_number)
 {
     const grid *g = cells->g;
     lane_source s = {.connectivity = g->connectivity.data + cells->entry * g->connectivity.stride,
@@ -98,7 +98,7 @@ static __attribute__((noinline)) void pack_indices(const char *from, int64_t str
 
 /* Returns a pointer to the contiguous indices of LANES cells. They are read in place if possible, and otherwise copied
  * to `room`. */
-LANE_INLINE const char *list_indices(const lane_source *s, int64_t cell, int64_t room[LANES * GRID_MAX_CELL_VERTICES])
+LANE_INLINE const char *load_indices(const lane_source *s, int64_t cell, int64_t room[LANES * GRID_MAX_CELL_VERTICES])
 {
     const char *from = s->connectivity + cell * s->count * s->connectivity_stride;
     const int64_t size = s->wide_index ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
@@ -109,13 +109,13 @@ LANE_INLINE const char *list_indices(const lane_source *s, int64_t cell, int64_t
     return (const char *)room;
 }
 
-LANE_INLINE int64_t given_index(const lane_source *s, const char *indices, int i)
+LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
 {
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
 /* Returns whether all indices are valid. An index is if both index and (last - index) have a positive sign. */
-LANE_INLINE bool are_wide_vertices(const int64_t *indices, int count, int64_t base, int64_t last)
+LANE_INLINE bool are_valid_wide_indices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;
     for (int i = 0; i < count; i++) {
@@ -125,7 +125,7 @@ LANE_INLINE bool are_wide_vertices(const int64_t *indices, int count, int64_t ba
     return signs >= 0;
 }
 
-LANE_INLINE bool are_narrow_vertices(const uint32_t *indices, int count, int64_t base, int64_t last)
+LANE_INLINE bool are_valid_narrow_indices(const uint32_t *indices, int count, int64_t base, int64_t last)
 {
     const uint32_t narrow_base = (uint32_t)base, narrow_last = last < INT32_MAX ? (uint32_t)last : INT32_MAX;
     uint32_t signs = narrow_last;
@@ -136,11 +136,11 @@ LANE_INLINE bool are_narrow_vertices(const uint32_t *indices, int count, int64_t
     return !(signs >> 31);
 }
 
-LANE_INLINE bool are_vertices(const lane_source *s, const char *indices)
+LANE_INLINE bool are_valid_indices(const lane_source *s, const char *indices)
 {
     return s->wide_index
-               ? are_wide_vertices((const int64_t *)(const void *)indices, LANES * s->count, s->base, s->last)
-               : are_narrow_vertices((const uint32_t *)(const void *)indices, LANES * s->count, s->base, s->last);
+               ? are_valid_wide_indices((const int64_t *)(const void *)indices, LANES * s->count, s->base, s->last)
+               : are_valid_narrow_indices((const uint32_t *)(const void *)indices, LANES * s->count, s->base, s->last);
 }
 
 LANE_INLINE bool has_ghost(const lane_source *s, int64_t cell)
@@ -157,33 +157,33 @@ LANE_INLINE bool has_ghost(const lane_source *s, int64_t cell)
 #define EACH_LANE(OF) OF(0), OF(1), OF(2), OF(3)
 #endif
 
-LANE_INLINE floats take_floats(uintptr_t data, const int64_t *at)
+LANE_INLINE floats gather_floats(uintptr_t data, const int64_t *at)
 {
 #define FLOAT_AT(lane) *(const float *)(data + (uintptr_t)at[lane])
     return (floats){EACH_LANE(FLOAT_AT)};
 #undef FLOAT_AT
 }
 
-LANE_INLINE doubles take_doubles(uintptr_t data, const int64_t *at)
+LANE_INLINE doubles gather_doubles(uintptr_t data, const int64_t *at)
 {
 #define DOUBLE_AT(lane) *(const double *)(data + (uintptr_t)at[lane])
     return (doubles){EACH_LANE(DOUBLE_AT)};
 #undef DOUBLE_AT
 }
 
-LANE_INLINE void take_points(const lane_source *s, const char *indices, int first_lane, lane_points *out)
+LANE_INLINE void gather_points(const lane_source *s, const char *indices, int first_lane, lane_points *out)
 {
     for (int i = 0; i < s->count; i++) {
         int64_t at[LANE_WIDTH];
 #pragma GCC unroll 8
         for (int lane = 0; lane < LANE_WIDTH; lane++)
-            at[lane] = given_index(s, indices, (first_lane + lane) * s->count + i) * s->stride;
+            at[lane] = read_index(s, indices, (first_lane + lane) * s->count + i) * s->stride;
 #pragma GCC unroll 3
         for (int axis = 0; axis < 3; axis++) {
             if (s->wide_number)
-                out->wide[i][axis] = take_doubles(s->axes[axis], at);
+                out->wide[i][axis] = gather_doubles(s->axes[axis], at);
             else
-                out->narrow[i][axis] = take_floats(s->axes[axis], at);
+                out->narrow[i][axis] = gather_floats(s->axes[axis], at);
         }
     }
 }
@@ -212,7 +212,7 @@ LANE_INLINE doubles sum_of_corners(const lane_source *s, const lane_points *poin
     return sum;
 }
 
-LANE_INLINE void grow_bounds(const lane_source *s, const lane_points *points, lane_bounds *b)
+LANE_INLINE void widen_bounds(const lane_source *s, const lane_points *points, lane_bounds *b)
 {
     for (int i = 0; i < s->count; i++)
         for (int axis = 0; axis < 3; axis++) {
@@ -228,20 +228,21 @@ LANE_INLINE void grow_bounds(const lane_source *s, const lane_points *points, la
 
 /* Computes the volumes of cells begin .. end - 1. Stops before a group of cells that contains a ghost or an invalid
  * index, or if less than LANES cells are left. Returns the cell at which it stopped. */
-LANE_INLINE int64_t measure(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds, double *volumes)
+LANE_INLINE int64_t compute_volumes(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds,
+                                    double *volumes)
 {
     lane_bounds b = *bounds;
     int64_t cell = begin;
     for (; cell + LANES <= end; cell += LANES) {
         int64_t room[LANES * GRID_MAX_CELL_VERTICES];
-        const char *const indices = list_indices(s, cell, room);
-        if (!are_vertices(s, indices) || (s->ghosts && has_ghost(s, cell))) break;
+        const char *const indices = load_indices(s, cell, room);
+        if (!are_valid_indices(s, indices) || (s->ghosts && has_ghost(s, cell))) break;
 #pragma GCC unroll 2
         for (int part = 0; part < PARTS; part++) {
             lane_points points;
-            take_points(s, indices, part * LANE_WIDTH, &points);
+            gather_points(s, indices, part * LANE_WIDTH, &points);
             doubles_store(volumes, sum_of_corners(s, &points));
-            grow_bounds(s, &points, &b);
+            widen_bounds(s, &points, &b);
             volumes += LANE_WIDTH;
         }
     }
@@ -284,7 +285,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
 
 /* ---- runs ---------------------------------------------------------------------------------------------------- */
 
-LANE_INLINE void keep_bounds(const lane_bounds *b, lane_sums *out)
+LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
 {
     for (int axis = 0; axis < 3; axis++) {
         const doubles lower = doubles_min(doubles_of(b->narrow_lower[axis]), b->lower[axis]);
@@ -298,7 +299,7 @@ LANE_INLINE void keep_bounds(const lane_bounds *b, lane_sums *out)
     }
 }
 
-LANE_INLINE void keep_sizes(const lane_sizes *s, double shares, double root_of_shares, lane_sums *out)
+LANE_INLINE void store_sizes(const lane_sizes *s, double shares, double root_of_shares, lane_sums *out)
 {
     double sum = 0, least = (double)INFINITY;
     out->inverted = 0;
@@ -312,11 +313,11 @@ LANE_INLINE void keep_sizes(const lane_sizes *s, double shares, double root_of_s
     out->sizes = sum / root_of_shares;
 }
 
-LANE_INLINE int64_t run(const lane_cells *cells, lane_sums *sums, int64_t *alone, const int type, const bool wide_index,
-                        const bool wide_number)
+LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t *alone, const int type,
+                              const bool wide_index, const bool wide_number)
 {
     _Alignas(64) double volumes[BLOCK_CELLS];
-    const lane_source s = source_of(cells, type, wide_index, wide_number);
+    const lane_source s = make_lane_source(cells, type, wide_index, wide_number);
     const double shares = corners_of(type).shares;
     lane_bounds bounds = bounds_empty();
     lane_sizes sizes = sizes_empty();
@@ -324,7 +325,7 @@ LANE_INLINE int64_t run(const lane_cells *cells, lane_sums *sums, int64_t *alone
     *alone = 0;
     while (cell < cells->count && !*alone) {
         const int64_t end = cell + BLOCK_CELLS < cells->count ? cell + BLOCK_CELLS : cells->count;
-        const int64_t next = measure(&s, cell, end, &bounds, volumes);
+        const int64_t next = compute_volumes(&s, cell, end, &bounds, volumes);
         if (!add_sizes(volumes, next - cell, &sizes)) {
             for (const double *good = volumes; add_sizes(good, LANES, &sizes); good += LANES) cell += LANES;
             *alone = LANES;
@@ -333,15 +334,15 @@ LANE_INLINE int64_t run(const lane_cells *cells, lane_sums *sums, int64_t *alone
         cell = next;
         if (cell < end) *alone = end - cell < LANES ? end - cell : LANES;
     }
-    keep_bounds(&bounds, sums);
-    keep_sizes(&sizes, shares, cbrt(shares), sums);
+    store_bounds(&bounds, sums);
+    store_sizes(&sizes, shares, cbrt(shares), sums);
     return cell;
 }
 
 #define DEFINE_RUN(name, type, wide_index, wide_number)                                                                \
     static int64_t name(const lane_cells *cells, lane_sums *sums, int64_t *alone)                                      \
     {                                                                                                                  \
-        return run(cells, sums, alone, type, wide_index, wide_number);                                                 \
+        return sum_cells(cells, sums, alone, type, wide_index, wide_number);                                           \
     }
 
 #define DEFINE_RUNS(name, type)                                                                                        \

@@ -59,15 +59,15 @@ static bool work_create(const scene *scene, int64_t cycle, const session_sound_e
 }
 
 /* Returns whether the condition holds. It does not hold if there are no values. */
-static bool holds(const scene_condition *c, const session_statistics *s)
+static bool condition_holds(const scene_condition *c, const session_statistics *s)
 {
     const double value = c->of == SCENE_MEAN ? s->mean : c->of == SCENE_MINIMUM ? s->least : s->most;
     return s->cells > 0 && value > c->above && value < c->below;
 }
 
 /* Writes all statistics that are due, even if some fail; returns the first error. */
-static void write_due(session_events *events, const scene *scene, const event_work *w, const session_event_time *now,
-                      base_error *error)
+static void write_due_statistics(session_events *events, const scene *scene, const event_work *w,
+                                 const session_event_time *now, base_error *error)
 {
     for (int i = 0; i < w->count; i++) {
         const int at = w->of[i];
@@ -80,12 +80,12 @@ static void write_due(session_events *events, const scene *scene, const event_wo
     }
 }
 
-static void note_conditions(session_events *events, const scene *scene, const event_work *w)
+static void store_conditions(session_events *events, const scene *scene, const event_work *w)
 {
     events->held = 0;
     for (int i = 0; i < w->count; i++) {
         const int image = w->of[i] - scene->statistics_count;
-        if (image >= 0 && holds(&scene->images[image].when, &w->found[i]))
+        if (image >= 0 && condition_holds(&scene->images[image].when, &w->found[i]))
             events->held |= (uint64_t)1 << scene->images[image].variant.source;
     }
 }
@@ -104,8 +104,8 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     status = session_agree(team->comm, error);
     if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.found, error);
     if (!status) {
-        note_conditions(events, scene, &work);
-        if (team->rank == 0) write_due(events, scene, &work, now, error);
+        store_conditions(events, scene, &work);
+        if (team->rank == 0) write_due_statistics(events, scene, &work, now, error);
         status = session_agree_as_is(team->comm, error);
     }
     work_free(&work);

@@ -21,7 +21,7 @@ typedef struct cell_value {
     double least, most, mean, volume;
 } cell_value;
 
-static cell_value value_of(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
+static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
 {
     cell_value out = {grid_is_seen(g, cell), grid_is_shell(g, cell), INFINITY, -INFINITY, 0, 0};
     if (!out.is_there) return out;
@@ -43,14 +43,14 @@ static cell_value value_of(const grid *g, const grid_field *field, int64_t cell,
 
 enum { LOW_BITS = 28, VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
 
-static void add_share(int64_t sum[2], double share)
+static void add_fixed_point(int64_t sum[2], double share)
 {
     const int64_t whole = llrint(share * 0x1p52);
     sum[0] += whole >> LOW_BITS;
     sum[1] += whole & ((1 << LOW_BITS) - 1);
 }
 
-static double sum_of(const int64_t sum[2])
+static double sum_from_fixed_point(const int64_t sum[2])
 {
     return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
@@ -71,7 +71,7 @@ static double share_of_range(double value, double low, double high)
     return fmin(fmax(share, 0), 1);
 }
 
-static int bin_of(const session_statistics *s, double value)
+static int find_bin(const session_statistics *s, double value)
 {
     if (value < s->low || value > s->high) return -1;
     return (int)fmin(share_of_range(value, s->low, s->high) * s->bin_count, s->bin_count - 1);
@@ -83,14 +83,14 @@ static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
     const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
     const double place = share_of_range(cell->mean, s->least, s->most) - b->about;
     if (b->is_second) {
-        add_share(sums, volume * place * place);
+        add_fixed_point(sums, volume * place * place);
         return;
     }
     sums[0]++;
-    add_share(sums + VOLUME, volume);
-    add_share(sums + MOMENT, volume * place);
-    const int bin = s->bin_count ? bin_of(s, cell->mean) : -1;
-    if (bin >= 0) add_share(sums + BINS + 2 * bin, volume);
+    add_fixed_point(sums + VOLUME, volume);
+    add_fixed_point(sums + MOMENT, volume * place);
+    const int bin = s->bin_count ? find_bin(s, cell->mean) : -1;
+    if (bin >= 0) add_fixed_point(sums + BINS + 2 * bin, volume);
 }
 
 /* Data of a pass over one mesh. */
@@ -108,7 +108,7 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-            const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
+            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
             if (value.is_there && value.is_shell == b->is_of_shells) add_cell(b, &value, sums);
         }
         region_leave();
@@ -119,14 +119,14 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
  * then for shells. */
 enum { ENDS = 3, KINDS = 2 };
 
-static void find_ends(const statistics_pass *p, double ends[KINDS * ENDS])
+static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
 {
 #pragma omp parallel num_threads(session_region_threads(p->team->threads, p->g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-            const cell_value value = value_of(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
+            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
             if (!value.is_there) continue;
             double *of = ends + (value.is_shell ? ENDS : 0);
             of[0] = fmin(of[0], value.least);
@@ -155,7 +155,7 @@ typedef struct statistics_work {
 
 /* Sets up a pass over the field of the requested statistics on a mesh of this rank. Returns false if the mesh does not
  * have the field. */
-static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
+static bool set_up_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
     *pass = (statistics_pass){.g = &of->cells, .team = w->team, .rooms = w->rooms};
@@ -163,7 +163,7 @@ static bool find_pass(const statistics_work *w, int wish, int mesh, statistics_p
 }
 
 /* Stores an error if a thread's buffer could not be allocated on any rank. */
-static insitu_status check_rooms(const statistics_work *w, base_error *error)
+static insitu_status check_buffers(const statistics_work *w, base_error *error)
 {
     if (w->ends[KINDS * ENDS * w->count] == 0) return INSITU_OK;
     for (int thread = 0; thread < w->team->threads; thread++)
@@ -179,7 +179,7 @@ static bool is_of_shells(const statistics_work *w, int wish)
     return !(ends[0] <= -ends[1]) && ends[ENDS] <= -ends[ENDS + 1];
 }
 
-static const double *ends_of(const statistics_work *w, int wish)
+static const double *find_wish_ends(const statistics_work *w, int wish)
 {
     return w->ends + KINDS * ENDS * wish + (is_of_shells(w, wish) ? ENDS : 0);
 }
@@ -192,7 +192,7 @@ static insitu_status reduce_ends(const statistics_work *w, base_error *error)
         for (int k = 0; k < KINDS * ENDS; k++) ends[k] = k % ENDS == 2 ? 0 : INFINITY;
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
-            if (find_pass(w, i, m, &pass)) find_ends(&pass, ends);
+            if (set_up_pass(w, i, m, &pass)) find_extremes(&pass, ends);
         }
     }
     w->ends[size] = 0;
@@ -200,7 +200,7 @@ static insitu_status reduce_ends(const statistics_work *w, base_error *error)
         if (w->rooms[thread].is_out_of_memory) w->ends[size] = -1;
     const insitu_status status = session_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, w->ends, size + 1, MPI_DOUBLE, MPI_MIN, w->team->comm), "MPI_Allreduce");
-    return status ? status : check_rooms(w, error);
+    return status ? status : check_buffers(w, error);
 }
 
 static insitu_status reduce_sums(const statistics_work *w, const session_statistics *known, bool is_second,
@@ -211,10 +211,10 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
     for (int i = 0; i < w->count; i++) {
         const double range = known[i].most - known[i].least;
         const double about = is_second && range > 0 ? share_of_range(known[i].mean, known[i].least, known[i].most) : 0;
-        const sum_basis basis = {&known[i], -ends_of(w, i)[2], about, is_second, known[i].is_of_shells};
+        const sum_basis basis = {&known[i], -find_wish_ends(w, i)[2], about, is_second, known[i].is_of_shells};
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
-            if (find_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
+            if (set_up_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
         }
     }
     return session_mpi(error,
@@ -222,10 +222,10 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
                        "MPI_Allreduce");
 }
 
-static void begin(const statistics_work *w, int wish, session_statistics *out)
+static void begin_statistics(const statistics_work *w, int wish, session_statistics *out)
 {
     const session_statistics_wish *of = &w->wishes[wish];
-    const double *ends = ends_of(w, wish);
+    const double *ends = find_wish_ends(w, wish);
     const bool has_range = of->low <= of->high;
     *out = (session_statistics){
         .is_of_shells = is_of_shells(w, wish), .least = ends[0], .most = -ends[1], .bin_count = of->bin_count};
@@ -233,28 +233,28 @@ static void begin(const statistics_work *w, int wish, session_statistics *out)
     out->high = has_range ? of->high : out->most;
 }
 
-static void take_sums(const statistics_work *w, int wish, session_statistics *out)
+static void convert_sums(const statistics_work *w, int wish, session_statistics *out)
 {
     const int64_t *sums = w->sums + MAX_SUMS * wish;
-    const double largest = -ends_of(w, wish)[2], volume = sum_of(sums + VOLUME);
-    const double place = volume > 0 ? sum_of(sums + MOMENT) / volume : 0;
+    const double largest = -find_wish_ends(w, wish)[2], volume = sum_from_fixed_point(sums + VOLUME);
+    const double place = volume > 0 ? sum_from_fixed_point(sums + MOMENT) / volume : 0;
     out->cells = sums[0];
     out->volume = volume * largest;
     out->mean = (1 - place) * out->least + place * out->most;
     for (int bin = 0; bin < out->bin_count; bin++)
-        out->shares[bin] = volume > 0 ? sum_of(sums + BINS + 2 * bin) / volume : 0;
+        out->shares[bin] = volume > 0 ? sum_from_fixed_point(sums + BINS + 2 * bin) / volume : 0;
 }
 
-static insitu_status find_all(const statistics_work *w, session_statistics *out, base_error *error)
+static insitu_status find_all_statistics(const statistics_work *w, session_statistics *out, base_error *error)
 {
     insitu_status status = reduce_ends(w, error);
-    for (int i = 0; i < w->count && !status; i++) begin(w, i, &out[i]);
+    for (int i = 0; i < w->count && !status; i++) begin_statistics(w, i, &out[i]);
     if (!status) status = reduce_sums(w, out, false, error);
-    for (int i = 0; i < w->count && !status; i++) take_sums(w, i, &out[i]);
+    for (int i = 0; i < w->count && !status; i++) convert_sums(w, i, &out[i]);
     if (!status) status = reduce_sums(w, out, true, error);
     for (int i = 0; i < w->count && !status; i++) {
-        const double volume = out[i].volume / -ends_of(w, i)[2], range = out[i].most - out[i].least;
-        out[i].deviation = volume > 0 ? range * sqrt(sum_of(w->sums + 2 * i) / volume) : 0;
+        const double volume = out[i].volume / -find_wish_ends(w, i)[2], range = out[i].most - out[i].least;
+        out[i].deviation = volume > 0 ? range * sqrt(sum_from_fixed_point(w->sums + 2 * i) / volume) : 0;
     }
     return status;
 }
@@ -271,7 +271,7 @@ insitu_status session_find_statistics(const session_meshes *meshes, const sessio
     if (!work.ends || !work.sums || !work.rooms)
         session_no_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = find_all(&work, out, error);
+    if (!status) status = find_all_statistics(&work, out, error);
     for (int thread = 0; work.rooms && thread < team->threads; thread++) session_volume_free(&work.rooms[thread]);
     base_free(work.ends);
     base_free(work.sums);

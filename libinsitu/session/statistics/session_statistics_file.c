@@ -36,7 +36,7 @@ typedef struct new_lines {
 
 /* Returns the number of significant digits with which nine digits of the range's width are resolved, however far it is
  * from 0. It is at most the number of digits of a double. */
-static int digits_for(double low, double high)
+static int count_needed_digits(double low, double high)
 {
     enum { OF_THE_WIDTH = 9, MOST = 17 };
     const double share = (0.5 * high - 0.5 * low) / fmax(fabs(low), fabs(high));
@@ -46,7 +46,7 @@ static int digits_for(double low, double high)
 static void write_line(FILE *file, const new_lines *n)
 {
     const session_statistics *v = n->values;
-    const int digits = digits_for(v->least, v->most), of_bins = digits_for(v->low, v->high);
+    const int digits = count_needed_digits(v->least, v->most), of_bins = count_needed_digits(v->low, v->high);
     fprintf(file, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cells,
             v->volume, digits, v->least, digits, v->most, digits, v->mean, v->deviation);
     if (v->bin_count) fprintf(file, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
@@ -63,14 +63,14 @@ static void write_lines(FILE *file, const void *what)
 }
 
 /* Stores an error for the file and returns its status. what is "read" or "written". */
-static insitu_status fail(const char *path, const char *what, const file_failure *failure, base_error *error)
+static insitu_status fail_at_file(const char *path, const char *what, const file_failure *failure, base_error *error)
 {
     return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "statistics: %.300s: cannot be %s: %s", path, what, failure->reason);
 }
 
 /* Determines which lines of the existing file are kept. */
-static insitu_status keep_lines(const char *path, file_content *old, new_lines *lines, base_error *error)
+static insitu_status select_kept_lines(const char *path, file_content *old, new_lines *lines, base_error *error)
 {
     const size_t header = strlen(lines->header);
     if (strncmp(old->text, lines->header, header) != 0 || old->text[header] != '\n')
@@ -89,10 +89,10 @@ static insitu_status begin_file(const char *path, new_lines *lines, base_error *
     file_content old;
     file_failure failure;
     if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
-        return fail(path, "read", &failure, error);
-    insitu_status status = old.size ? keep_lines(path, &old, lines, error) : INSITU_OK;
+        return fail_at_file(path, "read", &failure, error);
+    insitu_status status = old.size ? select_kept_lines(path, &old, lines, error) : INSITU_OK;
     if (!status && !text_file_replace(path, write_lines, lines, &failure))
-        status = fail(path, "written", &failure, error);
+        status = fail_at_file(path, "written", &failure, error);
     base_free(old.text);
     return status;
 }
@@ -108,7 +108,7 @@ insitu_status session_write_statistics(const char *path, bool is_first, int64_t 
     file_failure failure = {.is_missing = is_first};
     new_lines lines = {.cycle = cycle, .time = time, .values = values};
     if (!is_first && text_file_append(path, write_last, &lines, &failure)) return INSITU_OK;
-    if (!failure.is_missing) return fail(path, "written", &failure, error);
+    if (!failure.is_missing) return fail_at_file(path, "written", &failure, error);
     char *header = make_header(values->bin_count, values->is_of_shells);
     if (!header) return session_no_memory(error, 1 << 12, "a line of statistics");
     lines.header = header;

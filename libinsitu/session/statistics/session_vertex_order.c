@@ -24,7 +24,7 @@ enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, OF_TYPES, CELL_SUMS = OF_TYPES + 
 
 /* Returns whether all corners of the cell have the same sign if its vertices are assumed to be stored in `order`
  * instead of the order in which they are read. */
-static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
+static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_turn(mesh->given.vertex_order, type);
     const signed char *other = session_vertex_turn(order, type);
@@ -40,7 +40,7 @@ static bool fits(const session_mesh *mesh, int64_t cell, int type, insitu_vertex
 
 /* Returns the counts for the type of the cell. Returns NULL if the cell is not counted: it is a ghost, or the caller
  * describes it as a polyhedron, whose faces determine the order. */
-static int64_t *sums_of(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
+static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
     int at = 0;
@@ -56,12 +56,12 @@ static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SU
     const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell += step) {
         const int type = grid_cell_type(&mesh->cells, cell);
-        int64_t *of_type = sums_of(mesh, cell, sums);
+        int64_t *of_type = find_type_sums(mesh, cell, sums);
         if (!of_type) continue;
         of_type[LOOKED_AT]++;
-        of_type[BOTH_SIGNS] += !fits(mesh, cell, type, mesh->given.vertex_order);
+        of_type[BOTH_SIGNS] += !fits_order(mesh, cell, type, mesh->given.vertex_order);
         for (int order = 0; order < ORDERS; order++)
-            of_type[FIT + order] += fits(mesh, cell, type, (insitu_vertex_order)order);
+            of_type[FIT + order] += fits_order(mesh, cell, type, (insitu_vertex_order)order);
     }
 }
 

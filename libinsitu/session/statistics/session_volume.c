@@ -22,7 +22,7 @@ static double determinant(const double u[3], const double v[3], const double w[3
     return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
 }
 
-static void difference(const double a[3], const double b[3], double out[3])
+static void subtract(const double a[3], const double b[3], double out[3])
 {
     for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
 }
@@ -30,9 +30,9 @@ static void difference(const double a[3], const double b[3], double out[3])
 static double tet_volume(double (*p)[3])
 {
     double u[3], v[3], w[3];
-    difference(p[1], p[0], u);
-    difference(p[2], p[0], v);
-    difference(p[3], p[0], w);
+    subtract(p[1], p[0], u);
+    subtract(p[2], p[0], v);
+    subtract(p[3], p[0], w);
     return determinant(u, v, w) / 6;
 }
 
@@ -48,7 +48,7 @@ static double hex_volume(double (*p)[3], const signed char *corner)
 {
     static const signed char ends[6][2] = {{6, 1}, {7, 0}, {6, 3}, {2, 0}, {5, 0}, {6, 4}};
     double d[6][3], sums[3][3];
-    for (int i = 0; i < 6; i++) difference(p[corner[ends[i][0]]], p[corner[ends[i][1]]], d[i]);
+    for (int i = 0; i < 6; i++) subtract(p[corner[ends[i][0]]], p[corner[ends[i][1]]], d[i]);
     for (int axis = 0; axis < 3; axis++) {
         sums[0][axis] = d[0][axis] + d[1][axis];
         sums[1][axis] = d[2][axis] + d[4][axis];
@@ -66,7 +66,7 @@ void session_volume_free(volume_room *room)
     *room = (volume_room){0};
 }
 
-static bool make_room(volume_room *room, size_t size)
+static bool reserve_bytes(volume_room *room, size_t size)
 {
     if (size <= room->size) return true;
     base_free(room->bytes);
@@ -78,7 +78,7 @@ static bool make_room(volume_room *room, size_t size)
 }
 
 /* Reads positions relative to the first vertex, so that digits do not cancel far from the origin. */
-static void take_positions(const grid *g, const closed_faces *c, double (*positions)[3])
+static void read_positions(const grid *g, const closed_faces *c, double (*positions)[3])
 {
     double origin[3];
     grid_vertex(g, c->vertices[0], origin);
@@ -89,7 +89,7 @@ static void take_positions(const grid *g, const closed_faces *c, double (*positi
 }
 
 /* Returns six times the volume of the cone from the origin over the bilinear patch. */
-static double patch_cone(const double (*p)[3], const int v[4])
+static double patch_cone_volume(const double (*p)[3], const int v[4])
 {
     const double *a = p[v[0]], *b = p[v[1]], *c = p[v[2]], *d = p[v[3]];
     return (determinant(a, b, c) + determinant(a, c, d) + determinant(a, b, d) + determinant(b, c, d)) / 2;
@@ -101,14 +101,14 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
     closed_faces c = {0};
     if (!closed_faces_count(&c, g, cell)) return NAN;
     const size_t bytes = 3 * (size_t)c.entry_count * sizeof(double);
-    if (!make_room(room, closed_faces_lay_out(&c, NULL) + bytes)) return NAN;
+    if (!reserve_bytes(room, closed_faces_lay_out(&c, NULL) + bytes)) return NAN;
     double(*places)[3] = (double(*)[3])(void *)(room->bytes + closed_faces_lay_out(&c, room->bytes));
     const double(*positions)[3] = (const double(*)[3])places;
     closed_faces_read(&c, g, cell);
     room->vertices = c.vertices;
     room->vertex_count = c.vertex_count;
     if (!c.vertex_count) return 0;
-    take_positions(g, &c, places);
+    read_positions(g, &c, places);
     closed_faces_turn(&c);
     closed_faces_cut(&c, positions);
     closed_faces_turn_outward(&c, positions, origin);
@@ -117,20 +117,20 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
         if (!closed_face_is_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;
     for (int face = 0; face < c.face_count; face++)
         if (closed_face_is_patch(&c, face, positions))
-            volume += c.turn[face] * patch_cone(positions, c.entry + c.first[face]);
+            volume += c.turn[face] * patch_cone_volume(positions, c.entry + c.first[face]);
     return fabs(volume) / 6;
 }
 
 /* ---- shells ---------------------------------------------------------------------------------------------------- */
 
 /* Lists the vertices of the shell in the buffer. Returns false if memory runs out. */
-static bool take_vertices(const grid *g, int64_t cell, volume_room *room)
+static bool read_vertices(const grid *g, int64_t cell, volume_room *room)
 {
     grid_walk walk = grid_walk_cell(g, cell);
     const int64_t count = walk.end - walk.next;
     int64_t *vertices = room->corners;
     if (count > GRID_MAX_CELL_VERTICES) {
-        if (!make_room(room, (size_t)count * sizeof *vertices)) return false;
+        if (!reserve_bytes(room, (size_t)count * sizeof *vertices)) return false;
         vertices = (int64_t *)(void *)room->bytes;
     }
     for (int64_t i = 0; i < count; i++) grid_walk_next(&walk, &vertices[i]);
@@ -142,12 +142,12 @@ static bool take_vertices(const grid *g, int64_t cell, volume_room *room)
 static double shell_area(const grid *g, int64_t cell, volume_room *room)
 {
     double first[3], last[3], next[3], sum[3] = {0, 0, 0};
-    if (!take_vertices(g, cell, room)) return NAN;
+    if (!read_vertices(g, cell, room)) return NAN;
     grid_vertex(g, room->vertices[0], first);
     for (int i = 1; i < room->vertex_count; i++) {
         double place[3];
         grid_vertex(g, room->vertices[i], place);
-        difference(place, first, next);
+        subtract(place, first, next);
         for (int a = 0; a < 3 && i > 1; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
             sum[a] += last[b] * next[c] - last[c] * next[b];
