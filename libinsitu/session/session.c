@@ -76,8 +76,8 @@ static void free_session(insitu_session *session)
 }
 
 /* Creates a session, on all ranks or on none. If this fails, the caller frees the team's communicators. */
-static insitu_status create(const session_team *team, const session_scene_source *source, insitu_session **out,
-                            base_error *error)
+static insitu_status create_session(const session_team *team, const session_scene_source *source, insitu_session **out,
+                                    base_error *error)
 {
     insitu_session *session = base_calloc(1, sizeof *session);
     if (session) {
@@ -122,7 +122,7 @@ static insitu_status open_session(MPI_Comm comm, const session_scene_source *sou
     session_guard_begin(&guard);
     session_team team;
     insitu_status status = session_team_create(comm, &team, error);
-    if (!status) status = create(&team, source, out, error);
+    if (!status) status = create_session(&team, source, out, error);
     if (status) session_team_free(&team);
     session_guard_end(&guard);
     return status;
@@ -146,7 +146,7 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
 
 /* Stores the error of a failed call; a successful call keeps the message of the last failed one, until a step
  * begins. */
-static insitu_status keep_error(insitu_session *session, const base_error *error)
+static insitu_status store_error(insitu_session *session, const base_error *error)
 {
     if (error->status) session->error = *error;
     return error->status;
@@ -157,7 +157,7 @@ insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, co
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_mesh")) return INSITU_ERROR_ARGUMENT;
     session_set_mesh(&session->meshes, mesh_name, SESSION_WHOLE, mesh, &error);
-    return keep_error(session, &error);
+    return store_error(session, &error);
 }
 
 insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, const insitu_field *field)
@@ -165,7 +165,7 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, SESSION_WHOLE, field, &error);
-    return keep_error(session, &error);
+    return store_error(session, &error);
 }
 
 insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, int64_t block, const insitu_mesh *mesh)
@@ -173,7 +173,7 @@ insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, i
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_block")) return INSITU_ERROR_ARGUMENT;
     session_set_mesh(&session->meshes, mesh_name, block, mesh, &error);
-    return keep_error(session, &error);
+    return store_error(session, &error);
 }
 
 insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_name, int64_t block,
@@ -182,7 +182,7 @@ insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_n
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_set_block_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, block, field, &error);
-    return keep_error(session, &error);
+    return store_error(session, &error);
 }
 
 insitu_status insitu_parameter(insitu_session *session, const char *name, double *value)
@@ -190,7 +190,7 @@ insitu_status insitu_parameter(insitu_session *session, const char *name, double
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
     session_read_parameter(&session->scene_file, &session->asked, name, value, &error);
-    return keep_error(session, &error);
+    return store_error(session, &error);
 }
 
 insitu_status insitu_keep_pictures(insitu_session *session, int keep)
@@ -201,7 +201,7 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
     int is_on = keep != 0;
     if (session_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
         session->kept.is_on = is_on;
-    return keep_error(session, &error);
+    return store_error(session, &error);
 }
 
 const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count)

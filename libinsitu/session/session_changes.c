@@ -36,14 +36,14 @@ enum change_word {
 /* An upper bound of the number of ranks, by which a rank and another number are packed into one word. */
 static const int64_t more_ranks = (int64_t)1 << 32;
 
-static int64_t bits_of(double value)
+static int64_t bits_from_double(double value)
 {
     int64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
 
-static double double_of(int64_t bits)
+static double double_from_bits(int64_t bits)
 {
     double value;
     memcpy(&value, &bits, sizeof value);
@@ -58,7 +58,7 @@ static bool has_filled_field(const session_meshes *meshes)
     return false;
 }
 
-static void fill_words(const insitu_session *session, int64_t cycle, double time, int64_t words[CHANGE_WORDS])
+static void pack_changes(const insitu_session *session, int64_t cycle, double time, int64_t words[CHANGE_WORDS])
 {
     const session_team *team = &session->team;
     const session_meshes *meshes = &session->meshes;
@@ -80,20 +80,20 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[ISA_LOW] = -(render_isa_level() * more_ranks + team->rank);
     words[ISA_HIGH] = render_isa_level();
     words[TELLING] = session_telling_word(&session->report, team);
-    words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
+    words[ROOT_TIME] = team->rank == 0 ? bits_from_double(time) : INT64_MIN;
 }
 
 insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
                                    base_error *error)
 {
     int64_t mine[CHANGE_WORDS], all[CHANGE_WORDS];
-    fill_words(session, cycle, time, mine);
+    pack_changes(session, cycle, time, mine);
     const insitu_status status = session_mpi(
         error, MPI_Allreduce(mine, all, CHANGE_WORDS, MPI_INT64_T, MPI_MAX, session->team.comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_changes){.cycle = all[CYCLE_HIGH],
                              .lowest_cycle = ~all[CYCLE_LOW],
-                             .time = double_of(all[ROOT_TIME]),
+                             .time = double_from_bits(all[ROOT_TIME]),
                              .failed_rank = all[FAILED] ? session->team.ranks - (int)all[FAILED] : -1,
                              .of_scene = all[SCENE_CHANGED],
                              .of_cells = all[CELLS_CHANGED],
@@ -111,7 +111,7 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
     return INSITU_OK;
 }
 
-static void tell_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *told)
+static void report_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *told)
 {
     const base_error *mine = session_pending_error(meshes);
     if (team->rank == root && mine) base_fail(told, mine->status, "rank %d: %.900s", root, mine->message);
@@ -121,7 +121,7 @@ static void tell_pending_error(int root, const session_meshes *meshes, const ses
 insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,
                                   const session_team *team, base_error *refused, base_error *error)
 {
-    if (changes->failed_rank >= 0) tell_pending_error(changes->failed_rank, meshes, team, refused);
+    if (changes->failed_rank >= 0) report_pending_error(changes->failed_rank, meshes, team, refused);
     if (changes->cycle == changes->lowest_cycle) return INSITU_OK;
     if (refused->status) *error = *refused;
     return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",

@@ -2,7 +2,7 @@
 
 #include "session_hash.h"
 
-static uint64_t hash_of(const char *name)
+static uint64_t hash_name(const char *name)
 {
     uint64_t key = SESSION_HASH_BEGIN;
     session_hash_text(&key, name);
@@ -11,16 +11,16 @@ static uint64_t hash_of(const char *name)
 
 static bool is_asked(const session_asked *asked, const char *name)
 {
-    const uint64_t key = hash_of(name);
+    const uint64_t key = hash_name(name);
     for (int i = 0; i < asked->count && i < SESSION_MOST_ASKED; i++)
         if (asked->names[i] == key) return true;
     return asked->count > SESSION_MOST_ASKED;
 }
 
-static void note_asked(session_asked *asked, const char *name)
+static void add_asked(session_asked *asked, const char *name)
 {
     if (is_asked(asked, name)) return;
-    if (asked->count < SESSION_MOST_ASKED) asked->names[asked->count] = hash_of(name);
+    if (asked->count < SESSION_MOST_ASKED) asked->names[asked->count] = hash_name(name);
     asked->count++;
 }
 
@@ -30,7 +30,7 @@ insitu_status session_read_parameter(const session_scene_file *file, session_ask
     char others[512];
     if (!name || !value)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: %s is NULL", name ? "value" : "name");
-    note_asked(asked, name);
+    add_asked(asked, name);
     const scene_parameter *found = scene_find_parameter(&file->scene, name);
     if (found) {
         *value = found->value;

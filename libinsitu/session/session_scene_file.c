@@ -46,7 +46,7 @@ static insitu_status read_attachment(const char *path, char **text, int64_t *siz
 }
 
 /* Sends rank 0's bytes to all ranks; *data is allocated on the others. Collective. */
-static insitu_status share_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
+static insitu_status broadcast_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
 {
     insitu_status status = session_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, team->comm), "MPI_Bcast");
     if (status) return status;
@@ -60,7 +60,7 @@ static insitu_status share_bytes(const session_team *team, char **data, int64_t 
 }
 
 /* Sends the files that rank 0's scene names to all ranks. Collective. */
-static insitu_status share_attachments(const session_team *team, scene_attachments *files, base_error *error)
+static insitu_status broadcast_attachments(const session_team *team, scene_attachments *files, base_error *error)
 {
     int count = files->count;
     insitu_status status = session_mpi(error, MPI_Bcast(&count, 1, MPI_INT, 0, team->comm), "MPI_Bcast");
@@ -76,24 +76,24 @@ static insitu_status share_attachments(const session_team *team, scene_attachmen
     for (int i = 0; i < count && !status; i++) {
         scene_attachment *file = &files->items[i];
         int64_t length = team->rank == 0 ? (int64_t)strlen(file->path) + 1 : 0;
-        status = share_bytes(team, &file->path, &length, error);
-        if (!status) status = share_bytes(team, &file->text, &file->size, error);
+        status = broadcast_bytes(team, &file->path, &length, error);
+        if (!status) status = broadcast_bytes(team, &file->text, &file->size, error);
     }
     return status;
 }
 
 /* Parses the scene. Rank 0 parses first, and reads the files that the scene names; all others parse the text that it
  * has read. */
-static insitu_status parse_shared(const char *path, const session_team *team, scene_file_text *text, scene *out,
-                                  base_error *error)
+static insitu_status parse_on_all_ranks(const char *path, const session_team *team, scene_file_text *text, scene *out,
+                                        base_error *error)
 {
     scene parsed = {0};
     scene_attachments files = {.read = read_attachment};
     if (team->rank == 0) scene_parse(text->data, (size_t)text->size, path, &files, &parsed, error);
     files.read = NULL;
     insitu_status status = session_agree_as_is(team->comm, error);
-    if (!status) status = share_bytes(team, &text->data, &text->size, error);
-    if (!status) status = share_attachments(team, &files, error);
+    if (!status) status = broadcast_bytes(team, &text->data, &text->size, error);
+    if (!status) status = broadcast_attachments(team, &files, error);
     if (!status && team->rank != 0) scene_parse(text->data, (size_t)text->size, path, &files, &parsed, error);
     if (!status) status = session_agree_as_is(team->comm, error);
     scene_attachments_free(&files);
@@ -134,7 +134,7 @@ static insitu_status read_scene(session_scene_file *file, const session_team *te
             read_file(file->path, &text, error);
     }
     insitu_status status = session_agree_as_is(team->comm, error);
-    if (status == INSITU_OK) status = parse_shared(file->path, team, &text, out, error);
+    if (status == INSITU_OK) status = parse_on_all_ranks(file->path, team, &text, out, error);
     if (team->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
         file->stamp = text.stamp;
         file->has_stamp = true;
@@ -143,8 +143,8 @@ static insitu_status read_scene(session_scene_file *file, const session_team *te
     return status;
 }
 
-static insitu_status share_path(session_scene_file *file, const session_team *team, const session_scene_source *source,
-                                base_error *error)
+static insitu_status broadcast_path(session_scene_file *file, const session_team *team,
+                                    const session_scene_source *source, base_error *error)
 {
     const char *path = source->text ? SESSION_SCENE_TEXT : source->path;
     int64_t size = 0;
@@ -158,14 +158,14 @@ static insitu_status share_path(session_scene_file *file, const session_team *te
     }
     const insitu_status status = session_agree(team->comm, error);
     if (status) return status;
-    return share_bytes(team, &file->path, &size, error);
+    return broadcast_bytes(team, &file->path, &size, error);
 }
 
 insitu_status session_load_scene(session_scene_file *file, const session_team *team, const session_scene_source *source,
                                  base_error *error)
 {
     file->is_text = source->text;
-    const insitu_status status = share_path(file, team, source, error);
+    const insitu_status status = broadcast_path(file, team, source, error);
     return status ? status : read_scene(file, team, source->text, &file->scene, error);
 }
 

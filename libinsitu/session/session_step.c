@@ -227,8 +227,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
 }
 
 /* Performs all phases of a step after the first reduction; draws images if any are due. */
-static insitu_status step(insitu_session *s, const session_changes *changes, const session_guard *guard,
-                          base_error *error)
+static insitu_status run_phases(insitu_session *s, const session_changes *changes, const session_guard *guard,
+                                base_error *error)
 {
     s->report.numbers.time = changes->time;
     if (changes->of_scene) {
@@ -257,7 +257,7 @@ static insitu_status step(insitu_session *s, const session_changes *changes, con
 
 /* Returns the error of earlier steps' pictures that could not be written, unless this step has another error.
  * Collective. */
-static insitu_status tell_unwritten(insitu_session *s, base_error *error)
+static insitu_status report_unwritten(insitu_session *s, base_error *error)
 {
     base_error told = {.status = INSITU_OK};
     if (s->team.rank == 0) told = session_writer_failure(&s->writer);
@@ -268,7 +268,7 @@ static insitu_status tell_unwritten(insitu_session *s, base_error *error)
 
 /* Passes the step's report.json, for the databases, to the writer. Used on rank 0; an error is returned by the next
  * step. */
-static void tell_news(insitu_session *s)
+static void queue_news(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;
     const session_news_scene source = {&file->scene, file->path, file->has_stamp ? &file->stamp : NULL, file->warning};
@@ -306,11 +306,11 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     if (!status && changes.telling_rank >= 0)
         status = session_share_lines(&session->report, changes.telling_rank, &session->team, &session->error);
     if (!status) {
-        status = step(session, &changes, &guard, &session->error);
+        status = run_phases(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);
-        if (!status && changes.are_unwritten) status = tell_unwritten(session, &session->error);
+        if (!status && changes.are_unwritten) status = report_unwritten(session, &session->error);
     }
-    tell_news(session);
+    queue_news(session);
     session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
                       &session->report);
     session_forget_filled(&session->meshes);

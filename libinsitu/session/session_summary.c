@@ -77,7 +77,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     reasons->bytes[at] += bytes;
 }
 
-static void tell_copied(const copied_reasons *reasons, const char *mesh, session_report *out)
+static void report_copied(const copied_reasons *reasons, const char *mesh, session_report *out)
 {
     for (int i = 0; i < reasons->count; i++) {
         out->numbers.bytes_copied += reasons->bytes[i];
@@ -230,7 +230,7 @@ static void report_parts(session_report *out, const session_parts *parts)
 {
     copied_reasons copied = {.count = 0};
     for (int i = 0; i < parts->count; i++) report_part(out, &copied, parts->items[i]);
-    tell_copied(&copied, parts->items[0]->name, out);
+    report_copied(&copied, parts->items[0]->name, out);
     report_left_out(out, parts);
 }
 
