@@ -69,7 +69,7 @@ static void unite_any(const bounds_source *source, const uint32_t *cells, int co
     for (int i = 0; i < count; i++) fetch_box_any_cell(box, source->g, cells[i]);
 }
 
-static void read_given(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)
+static void read_given_boxes(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)
 {
     for (int i = 0; i < count; i++) {
         for (int axis = 0; axis < 3; axis++) {
@@ -79,13 +79,13 @@ static void read_given(const bounds_source *source, const uint32_t *cells, int c
     }
 }
 
-static void unite_given(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
-                        fetch_box *box)
+static void unite_given_boxes(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
+                              fetch_box *box)
 {
     (void)later;
     for (int i = 0; i < count; i++) {
         fetch_box given;
-        read_given(source, cells + i, 1, &given);
+        read_given_boxes(source, cells + i, 1, &given);
         fetch_box_unite(box, &given);
     }
 }
@@ -97,8 +97,8 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
     static bounds_read_float_boxes *const reads_float_boxes[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(read_float_boxes);
     static bounds_unite *const unites[FETCH_SHAPES][2][2] = FETCH_TABLE(unite);
     bounds_source s = {.g = g, .scale = scale, .lower = lower, .upper = upper, .box_count = count};
-    s.read = g ? read_any : read_given;
-    s.unite = g ? unite_any : unite_given;
+    s.read = g ? read_any : read_given_boxes;
+    s.unite = g ? unite_any : unite_given_boxes;
     for (int axis = 0; axis < 3; axis++) s.origin[axis] = origin[axis];
     if (!g || !fetch_is_plain(g)) return s;
     s.read = reads[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
@@ -128,7 +128,7 @@ static void array_range_any(const grid_array *a, int64_t count, int threads, dou
     *most = high;
 }
 
-static inline float float_at(const char *p)
+static inline float load_float(const char *p)
 {
     return *(const float *)(const void *)p;
 }
@@ -140,12 +140,12 @@ MMBVH_INLINE void array_range_floats(const char *data, const int64_t stride, int
     vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY);
     const char *p = data;
     for (int64_t i = 0; i + LANES <= count; i += LANES, p += LANES * stride) {
-        const vec4 x = {float_at(p), float_at(p + stride), float_at(p + 2 * stride), float_at(p + 3 * stride)};
+        const vec4 x = {load_float(p), load_float(p + stride), load_float(p + 2 * stride), load_float(p + 3 * stride)};
         low = vec4_min(x, low);
         high = vec4_max(x, high);
     }
     for (int64_t i = count / LANES * LANES; i < count; i++, p += stride) {
-        const vec4 x = vec4_set1(float_at(p));
+        const vec4 x = vec4_set1(load_float(p));
         low = vec4_min(x, low);
         high = vec4_max(x, high);
     }
@@ -226,7 +226,7 @@ item_grid item_grid_make(const double lower[3], const double upper[3])
     return grid;
 }
 
-static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BLOCK])
+static int list_block_cells(const item *items, int64_t count, uint32_t cells[BOUNDS_BLOCK])
 {
     const int n = (int)(count < BOUNDS_BLOCK ? count : BOUNDS_BLOCK);
     for (int i = 0; i < n; i++) cells[i] = item_index(items[i]);
@@ -251,7 +251,7 @@ static float_mapping float_mapping_make(const bounds_source *source, const item_
 }
 
 /* Rounds to the nearest step. NaN becomes 0. */
-static inline ivec4 steps_of(const float_mapping *m, vec4 x)
+static inline ivec4 round_to_steps(const float_mapping *m, vec4 x)
 {
     const vec4 steps = (x - m->origin) * m->factor + 0.5f;
     return vec4_truncate(vec4_min(vec4_max(steps, (vec4){0}), vec4_set1(ITEM_TOP)));
@@ -259,18 +259,18 @@ static inline ivec4 steps_of(const float_mapping *m, vec4 x)
 
 static inline item item_of_float_box(const float_mapping *m, const fetch_float_box *float_box, uint32_t index)
 {
-    const lanes box = lanes_pack(ITEM_TOP - steps_of(m, float_box->lower), steps_of(m, float_box->upper));
+    const lanes box = lanes_pack(ITEM_TOP - round_to_steps(m, float_box->lower), round_to_steps(m, float_box->upper));
     return (box & (lanes){-1, -1, -1, 0, -1, -1, -1, 0}) | item_of_index(index);
 }
 
-static void place_float_boxes(const bounds_source *source, const item_grid *grid, item *items, int64_t count,
-                              item_set *set, fetch_float_box *exact)
+static void quantize_float_boxes(const bounds_source *source, const item_grid *grid, item *items, int64_t count,
+                                 item_set *set, fetch_float_box *exact)
 {
     uint32_t cells[BOUNDS_BLOCK];
     fetch_float_box float_boxes[BOUNDS_BLOCK];
     const float_mapping m = float_mapping_make(source, grid);
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
-        const int n = list_block(items + begin, count - begin, cells);
+        const int n = list_block_cells(items + begin, count - begin, cells);
         source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
             fetch_float_box_unite(exact, &float_boxes[i]);
@@ -280,13 +280,13 @@ static void place_float_boxes(const bounds_source *source, const item_grid *grid
     }
 }
 
-static void place_boxes(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
-                        fetch_box *exact)
+static void quantize_boxes(const bounds_source *source, const item_grid *grid, item *items, int64_t count,
+                           item_set *set, fetch_box *exact)
 {
     uint32_t cells[BOUNDS_BLOCK];
     fetch_box boxes[BOUNDS_BLOCK];
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
-        const int n = list_block(items + begin, count - begin, cells);
+        const int n = list_block_cells(items + begin, count - begin, cells);
         source->read(source, cells, n, boxes);
         for (int i = 0; i < n; i++) {
             fetch_box_unite(exact, &boxes[i]);
@@ -305,10 +305,10 @@ void bounds_fill_items(const bounds_source *source, const item_grid *grid, item 
     fetch_box_empty(&box);
     if (source->read_float_boxes) {
         fetch_float_box float_box = fetch_float_box_empty();
-        place_float_boxes(source, grid, items, count, &own, &float_box);
+        quantize_float_boxes(source, grid, items, count, &own, &float_box);
         box = fetch_float_box_widen(&float_box);
     } else {
-        place_boxes(source, grid, items, count, &own, &box);
+        quantize_boxes(source, grid, items, count, &own, &box);
     }
     item_set_merge(set, &own);
     if (exact) fetch_box_unite(exact, &box);

@@ -224,7 +224,7 @@ static insitu_status check_complete(const check_state *w)
     return INSITU_OK;
 }
 
-static mmbvh_statistics statistics_of(const check_state *w)
+static mmbvh_statistics make_statistics(const check_state *w)
 {
     mmbvh_statistics s = {.leaves = w->leaves, .depth = w->depth, .cost = mmbvh_cost(w->tree, NULL)};
     const int64_t inner = w->tree->node_count - w->leaves;
@@ -245,6 +245,6 @@ insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *fi
     insitu_status status = tree->node_count > 0 ? check_nodes(&w) : INSITU_OK;
     if (!status) status = check_complete(&w);
     base_free(w.seen);
-    if (!status && out) *out = statistics_of(&w);
+    if (!status && out) *out = make_statistics(&w);
     return status;
 }

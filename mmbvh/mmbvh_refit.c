@@ -36,7 +36,7 @@ static sweep_sum run_with_followers(const sweep *s, int64_t first, int64_t end)
 }
 
 /* Returns the index of the first descendant of the pair's right node; `end` if that node is a leaf. */
-static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
+static int64_t find_right_subtree(const sweep *s, int64_t first, int64_t end)
 {
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
@@ -45,7 +45,7 @@ static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
 static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->run_max || end - first <= s->run_max) return run_with_followers(s, first, end);
-    const int64_t right_first = right_begin(s, first, end);
+    const int64_t right_first = find_right_subtree(s, first, end);
     sweep_sum left = {0}, right = {0};
     if (sweep_visits(s, first + 1)) right = sweep_runs(s, right_first, end);
     if (sweep_visits(s, first)) left = sweep_runs(s, first + 2, right_first);
@@ -56,7 +56,7 @@ static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
-    const int64_t right_first = right_begin(s, first, end);
+    const int64_t right_first = find_right_subtree(s, first, end);
     sweep_sum left = {0}, right = {0};
     if (sweep_visits(s, first)) {
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)

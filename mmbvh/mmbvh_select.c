@@ -84,8 +84,8 @@ typedef struct pass_constants {
 } pass_constants;
 
 /* Returns the address of the value at vertex number `at` of a cell. */
-MMBVH_INLINE uintptr_t value_place(const selector *s, int64_t cell, int at, const pass_constants pass,
-                                   const int64_t stride)
+MMBVH_INLINE uintptr_t value_address(const selector *s, int64_t cell, int at, const pass_constants pass,
+                                     const int64_t stride)
 {
     const grid_array *connectivity = &s->g->connectivity;
     const uintptr_t data = (uintptr_t)s->values.data - (uintptr_t)(connectivity->base * stride);
@@ -107,7 +107,7 @@ MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const
     four_ranges r = {vec4_set1(INFINITY), vec4_set1(-INFINITY), {0}};
     for (int at = 0; at < fetch_vertex_count(s->g, cell, pass.shape); at++) {
         float v[4];
-        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_place(s, cell + i, at, pass, stride);
+        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_address(s, cell + i, at, pass, stride);
         const vec4 values = {v[0], v[1], v[2], v[3]};
         r.low = vec4_min(values, r.low);
         r.high = vec4_max(values, r.high);
@@ -126,8 +126,8 @@ MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, cons
         high[pair] = -low[pair];
         for (int at = 0; at < fetch_vertex_count(s->g, cell, pass.shape); at++) {
             const int64_t first = cell + 2 * pair;
-            const vec2 values = {*(const double *)value_place(s, first, at, pass, stride),
-                                 *(const double *)value_place(s, first + 1, at, pass, stride)};
+            const vec2 values = {*(const double *)value_address(s, first, at, pass, stride),
+                                 *(const double *)value_address(s, first + 1, at, pass, stride)};
             low[pair] = vec2_min(values, low[pair]);
             high[pair] = vec2_max(values, high[pair]);
             nonfinite[pair] += values - values;

@@ -41,7 +41,7 @@ void bins_merge(bins *b, const bins *other, int count)
 
 /* Returns the byte offsets of the bins of two items: lanes 0 to 2 hold those of `a` on each axis, lanes 4 to 6 those of
  * `b`. */
-static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
+static inline ulanes find_lane_offsets(const bin_mapping *m, item a, item b)
 {
     const lanes upper = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
     const lanes lower = __builtin_shufflevector(
@@ -52,7 +52,7 @@ static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
 
 /* Adds an item to its bin on each axis. Lane 3 of a box counts the items, so that one load and one store per bin
  * suffice. */
-static inline void add(bins *b, const uint16_t offsets[3], item i)
+static inline void add_item(bins *b, const uint16_t offsets[3], item i)
 {
     const lanes counted = i & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     for (int axis = 0; axis < 3; axis++) {
@@ -83,14 +83,14 @@ static void bin_run(bins *b, const bin_mapping *mapping, const item *items, int6
     uint16_t offsets[8];
     for (int64_t i = 0; i < half; i++) {
         const item first = items[i * stride], second = halves[i * stride];
-        *(ulanes *)(void *)offsets = offsets_of(&m, first, second);
-        add(b, offsets, first);
-        add(b, offsets + 4, second);
+        *(ulanes *)(void *)offsets = find_lane_offsets(&m, first, second);
+        add_item(b, offsets, first);
+        add_item(b, offsets + 4, second);
     }
     if (!(count & 1)) return;
     const item last = items[(count - 1) * stride];
-    *(ulanes *)(void *)offsets = offsets_of(&m, last, last);
-    add(b, offsets, last);
+    *(ulanes *)(void *)offsets = find_lane_offsets(&m, last, last);
+    add_item(b, offsets, last);
 }
 
 void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride)

@@ -121,7 +121,7 @@ static bool misplaced_advance(misplaced_items *w)
     return true;
 }
 
-static void exchange(item *a, item *b, int64_t count)
+static void exchange_items(item *a, item *b, int64_t count)
 {
     for (int64_t i = 0; i < count; i++) {
         const item kept = a[i];
@@ -139,7 +139,7 @@ static void exchange_misplaced(node_split *s)
         const int64_t count = rights < lefts ? rights : lefts;
         item *a = s->items + right.next, *b = s->items + left.next;
 #pragma omp task if (s->chunk_count > 1) default(none) firstprivate(a, b, count)
-        exchange(a, b, count);
+        exchange_items(a, b, count);
         right.next += count;
         left.next += count;
     }
@@ -153,14 +153,14 @@ static void partition_items(node_split *s, const branch_builder *builder)
     exchange_misplaced(s);
 }
 
-static void halve(node_split *s)
+static void halve_items(node_split *s)
 {
     s->left_count = s->count / 2;
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
 }
 
 /* Chooses the plane from a sample of the items, or from all items if the sample allows no split. */
-static void choose(node_split *s, const branch_builder *builder)
+static void choose_splits(node_split *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);
     for (s->stride = bins_stride(s->count);; s->stride = 1) {
@@ -181,9 +181,9 @@ static void split_branch(node_split *s, const branch_builder *builder)
     }
     s->split = (bin_split){.axis = -1};
     s->sides[0] = s->sides[1] = item_set_empty();
-    if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) choose(s, builder);
+    if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) choose_splits(s, builder);
     if (s->split.axis < 0) {
-        halve(s);
+        halve_items(s);
     } else {
         partition_items(s, builder);
     }

@@ -21,7 +21,7 @@ enum {
     SORT_LEFT_BITS = 2  /* log2 of the number of keys per digit, if they are spread evenly */
 };
 
-static int bits_of(uint64_t x)
+static int count_significant_bits(uint64_t x)
 {
     return x ? 64 - __builtin_clzll(x) : 0;
 }
@@ -50,7 +50,7 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
 {
     int axes[CODE_BITS_MAX], counts[3];
     memset(coder, 0, sizeof *coder);
-    coder->index_bits = bits_of((uint64_t)index_count);
+    coder->index_bits = count_significant_bits((uint64_t)index_count);
     coder->code_bits = 64 - coder->index_bits < CODE_BITS_MAX ? 64 - coder->index_bits : CODE_BITS_MAX;
     choose_axes(lower, upper, coder->code_bits, axes, counts);
     int left[3];
@@ -84,7 +84,7 @@ static inline uint64_t code_of_steps(const morton_coder *coder, const int32_t st
 }
 
 /* Returns the Morton code of a box whose centre is given in the source's coordinates. */
-static inline uint64_t code_of(const bounds_source *source, const morton_coder *coder, const double centre[3])
+static inline uint64_t morton_code(const bounds_source *source, const morton_coder *coder, const double centre[3])
 {
     int32_t steps[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -121,7 +121,8 @@ static inline uint64_t code_of_float_box(const sum_mapping *m, const morton_code
     return code_of_steps(coder, steps);
 }
 
-static int list_block(const morton_coder *coder, const uint64_t *keys, int64_t count, uint32_t cells[BOUNDS_BLOCK])
+static int list_block_cells(const morton_coder *coder, const uint64_t *keys, int64_t count,
+                            uint32_t cells[BOUNDS_BLOCK])
 {
     const uint64_t mask = (UINT64_C(1) << coder->index_bits) - 1;
     const int n = (int)(count < BOUNDS_BLOCK ? count : BOUNDS_BLOCK);
@@ -129,14 +130,14 @@ static int list_block(const morton_coder *coder, const uint64_t *keys, int64_t c
     return n;
 }
 
-static fetch_box place_float_boxes(const bounds_source *source, const morton_coder *coder, uint64_t *keys,
-                                   int64_t count)
+static fetch_box make_float_box_keys(const bounds_source *source, const morton_coder *coder, uint64_t *keys,
+                                     int64_t count)
 {
     uint32_t cells[BOUNDS_BLOCK];
     fetch_float_box float_boxes[BOUNDS_BLOCK], all = fetch_float_box_empty();
     const sum_mapping m = sum_mapping_make(source, coder);
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
-        const int n = list_block(coder, keys + begin, count - begin, cells);
+        const int n = list_block_cells(coder, keys + begin, count - begin, cells);
         source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
             fetch_float_box_unite(&all, &float_boxes[i]);
@@ -146,19 +147,19 @@ static fetch_box place_float_boxes(const bounds_source *source, const morton_cod
     return fetch_float_box_widen(&all);
 }
 
-static fetch_box place_boxes(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count)
+static fetch_box make_box_keys(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count)
 {
     uint32_t cells[BOUNDS_BLOCK];
     fetch_box boxes[BOUNDS_BLOCK], all;
     fetch_box_empty(&all);
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
-        const int n = list_block(coder, keys + begin, count - begin, cells);
+        const int n = list_block_cells(coder, keys + begin, count - begin, cells);
         source->read(source, cells, n, boxes);
         for (int i = 0; i < n; i++) {
             double centre[3];
             for (int axis = 0; axis < 3; axis++) centre[axis] = 0.5 * (boxes[i].lower[axis] + boxes[i].upper[axis]);
             fetch_box_unite(&all, &boxes[i]);
-            keys[begin + i] = code_of(source, coder, centre) | cells[i];
+            keys[begin + i] = morton_code(source, coder, centre) | cells[i];
         }
     }
     return all;
@@ -167,8 +168,8 @@ static fetch_box place_boxes(const bounds_source *source, const morton_coder *co
 void morton_make_keys(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
                       fetch_box *exact)
 {
-    const fetch_box all = source->read_float_boxes ? place_float_boxes(source, coder, keys, count)
-                                                   : place_boxes(source, coder, keys, count);
+    const fetch_box all = source->read_float_boxes ? make_float_box_keys(source, coder, keys, count)
+                                                   : make_box_keys(source, coder, keys, count);
     fetch_box_unite(exact, &all);
 }
 
@@ -186,7 +187,7 @@ typedef struct sorting {
     digit_counts *counts;
 } sorting;
 
-static inline int digit_of(uint64_t key, int shift)
+static inline int extract_digit(uint64_t key, int shift)
 {
     return (int)(key >> shift & (DIGITS - 1));
 }
@@ -201,7 +202,7 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
             int64_t *of = s->counts->of[chunk];
             memset(of, 0, sizeof s->counts->of[chunk]);
             const int64_t end = count * (chunk + 1) / s->chunks;
-            for (int64_t i = count * chunk / s->chunks; i < end; i++) of[digit_of(keys[i], shift)]++;
+            for (int64_t i = count * chunk / s->chunks; i < end; i++) of[extract_digit(keys[i], shift)]++;
         }
         region_leave();
     }
@@ -231,7 +232,8 @@ static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, in
         for (int chunk = 0; chunk < s->chunks; chunk++) {
             int64_t *places = s->counts->of[chunk];
             const int64_t end = count * (chunk + 1) / s->chunks;
-            for (int64_t i = count * chunk / s->chunks; i < end; i++) to[places[digit_of(from[i], shift)]++] = from[i];
+            for (int64_t i = count * chunk / s->chunks; i < end; i++)
+                to[places[extract_digit(from[i], shift)]++] = from[i];
         }
         region_leave();
     }
@@ -258,7 +260,8 @@ static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_
     }
     uint64_t differing = 0;
     for (int64_t i = 1; i < count; i++) differing |= from[i] ^ from[0];
-    const int top = bits_of(differing), wanted = bits_of((uint64_t)count) - SORT_LEFT_BITS;
+    const int top = count_significant_bits(differing),
+              wanted = count_significant_bits((uint64_t)count) - SORT_LEFT_BITS;
     const int bits = wanted < DIGIT_BITS ? wanted : DIGIT_BITS, shift = top > bits ? top - bits : 0;
     const uint64_t mask = (UINT64_C(1) << bits) - 1;
     uint32_t ends[DIGITS];
@@ -322,7 +325,7 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
  * order. */
 static int64_t find_split(const uint64_t *keys, int64_t count)
 {
-    const int bit = bits_of(keys[0] ^ keys[count - 1]) - 1;
+    const int bit = count_significant_bits(keys[0] ^ keys[count - 1]) - 1;
     const uint64_t border = keys[count - 1] >> bit << bit;
     int64_t low = 0, high = count - 1; /* invariant: keys[low] is below the border, keys[high] is not */
     while (high - low > 1) {

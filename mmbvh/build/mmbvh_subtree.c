@@ -29,7 +29,7 @@ typedef struct subtree {
 } subtree;
 
 /* Chooses the plane from a sample if there are many items, or from all items if the sample allows no split. */
-static bin_split choose(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
+static bin_split choose_split(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
 {
     *mapping = bin_mapping_make(centroids, count);
     for (int64_t stride = bins_stride(count);; stride = 1) {
@@ -45,7 +45,7 @@ static bool is_certainly_leaf(const item *items, int64_t count, lanes bounds)
     return count <= MMBVH_MAX_LEAF && !bins_is_split_cheaper(bins_least_cost(items, count), count, bounds);
 }
 
-static topology_link build(subtree *s, int64_t first, int64_t count, const item_grid *grid, int depth)
+static topology_link build_node(subtree *s, int64_t first, int64_t count, const item_grid *grid, int depth)
 {
     if (count == 1) return topology_leaf(first, 1);
     item *items = s->items + first;
@@ -60,13 +60,13 @@ static topology_link build(subtree *s, int64_t first, int64_t count, const item_
     if (is_certainly_leaf(items, count, set.bounds)) return topology_leaf(first, count);
     bin_mapping mapping;
     bin_split split = {.axis = -1, .cost = INFINITY};
-    if (depth < TOPOLOGY_MEDIAN_DEPTH) split = choose(s, set.centroids, items, count, &mapping);
+    if (depth < TOPOLOGY_MEDIAN_DEPTH) split = choose_split(s, set.centroids, items, count, &mapping);
     if (!bins_is_split_cheaper(split.cost, count, set.bounds)) return topology_leaf(first, count);
 
     const int64_t left_count = split.axis < 0 ? count / 2 : bins_partition(&mapping, split, items, count);
     const int64_t pair = topology_new_pair(s->scratch);
-    const topology_link left = build(s, first, left_count, grid, depth + 1);
-    const topology_link right = build(s, first + left_count, count - left_count, grid, depth + 1);
+    const topology_link left = build_node(s, first, left_count, grid, depth + 1);
+    const topology_link right = build_node(s, first + left_count, count - left_count, grid, depth + 1);
     s->scratch->links[pair] = left;
     s->scratch->links[pair + 1] = right;
     return topology_inner(pair);
@@ -77,5 +77,5 @@ topology_link subtree_build(topology_scratch *scratch, const bounds_source *sour
 {
     subtree s = {.scratch = scratch, .source = source, .items = items};
     scratch->count = 0;
-    return build(&s, 0, count, grid, depth);
+    return build_node(&s, 0, count, grid, depth);
 }

@@ -76,7 +76,7 @@ static void write_links(topology *t, const mmbvh *tree, int64_t below)
 
 /* Writes the root of t to the node `slot` and its descendants to the nodes from `below` on; returns the index behind
  * the last one. */
-static int64_t write(topology *t, const mmbvh *tree, int64_t slot, int64_t below)
+static int64_t write_nodes(topology *t, const mmbvh *tree, int64_t slot, int64_t below)
 {
     if (!t->children[0]) {
         write_link(tree, slot, t, t->root, below);
@@ -86,8 +86,8 @@ static int64_t write(topology *t, const mmbvh *tree, int64_t slot, int64_t below
         return end;
     }
     store_link(tree, slot, below, 0);
-    const int64_t right = write(t->children[0], tree, below, below + 2);
-    return write(t->children[1], tree, below + 1, right);
+    const int64_t right = write_nodes(t->children[0], tree, below, below + 2);
+    return write_nodes(t->children[1], tree, below + 1, right);
 }
 
 void topology_write(topology *t, const mmbvh *tree, int threads)
@@ -96,7 +96,7 @@ void topology_write(topology *t, const mmbvh *tree, int threads)
     {
         region_enter();
 #pragma omp single
-        write(t, tree, 0, 1);
+        write_nodes(t, tree, 0, 1);
         region_leave();
     }
 }
