@@ -30,8 +30,8 @@ typedef struct composition {
     uint64_t *loads; /* load of each rank: number of fragments that it owns */
 } composition;
 
-static composition composition_of(const comp_group *group, const float background[4], image *out,
-                                  comp_statistics *statistics)
+static composition make_composition(const comp_group *group, const float background[4], image *out,
+                                    comp_statistics *statistics)
 {
     return (composition){.group = group,
                          .merged = {.background = background, .is_folded = out->is_folded},
@@ -210,7 +210,7 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     comp_statistics ignored;
     if (!statistics) statistics = &ignored;
     *statistics = (comp_statistics){0};
-    composition c = composition_of(group, background, out, statistics);
+    composition c = make_composition(group, background, out, statistics);
     int64_t none = 0;
     const insitu_status status = begin_composite(&c, items, threads, error);
     return status ? status : composite(&c, items, &none, error);
@@ -237,7 +237,7 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
     if (!statistics) statistics = &ignored;
     *statistics = (comp_statistics){0};
     *overlaps = (comp_overlaps){0, NULL};
-    composition c = composition_of(group, background, out, statistics);
+    composition c = make_composition(group, background, out, statistics);
     base_error here = {INSITU_OK, ""};
     if (!error) error = &here;
     insitu_status status = begin_composite(&c, items, threads, error);

@@ -9,7 +9,7 @@ const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11}
 enum { TILE_PIXELS = 256 };
 
 /* Returns the number of partners to which a rank sends fragments in a round. */
-static double partners_of(const comp_route *route, int round, const comp_load *load)
+static double count_partners(const comp_route *route, int round, const comp_load *load)
 {
     const uint32_t together = load->block_pixels < TILE_PIXELS ? load->block_pixels : TILE_PIXELS;
     const double all = route->radix[round] - 1, own = ceil((double)load->fragments / together);
@@ -24,7 +24,7 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
         const bool is_within = i == 0 && route->nodes.ranks > 1;
         const double latency = is_within ? m->node_latency : m->latency;
         const double overhead = is_within ? m->node_overhead : m->overhead;
-        const double partners = partners_of(route, i, load), share = 1 - 1.0 / route->radix[i];
+        const double partners = count_partners(route, i, load), share = 1 - 1.0 / route->radix[i];
         cost.messages += partners;
         cost.bytes += share * bytes;
         cost.seconds += latency + 2 * overhead * partners + (is_within ? m->node_gap : m->gap) * share * bytes;

@@ -14,7 +14,7 @@ enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
 /* ---- on the owner ----------------------------------------------------------------------------------------------- */
 
 /* Ensures space for one more item; returns false if memory ran out. */
-static bool reserve(void **items, int64_t count, int64_t *capacity, size_t size)
+static bool reserve_item(void **items, int64_t count, int64_t *capacity, size_t size)
 {
     if (count < *capacity) return true;
     const int64_t more = *capacity ? 2 * *capacity : 1024;
@@ -34,7 +34,7 @@ static void add_interval(void *state, const fragment *f)
                                        f->t_out < f->t_in ? f->t_in : f->t_out};
     if (sample.rgba[3] == 0 && sample.rgba[0] == 0 && sample.rgba[1] == 0 && sample.rgba[2] == 0) return;
     void *items = list->samples;
-    if (!reserve(&items, list->sample_count, &list->sample_capacity, sizeof sample)) {
+    if (!reserve_item(&items, list->sample_count, &list->sample_capacity, sizeof sample)) {
         list->lacks_memory = true;
         return;
     }
@@ -46,7 +46,7 @@ void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool i
 {
     const int64_t first = list->sample_count;
     void *items = list->pixels;
-    if (!reserve(&items, list->pixel_count, &list->pixel_capacity, sizeof *list->pixels)) {
+    if (!reserve_item(&items, list->pixel_count, &list->pixel_capacity, sizeof *list->pixels)) {
         list->lacks_memory = true;
         return;
     }
@@ -107,7 +107,7 @@ static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t 
 }
 
 /* Stores the positions of the samples of these pixels. */
-static void place_pixels(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
+static void store_sample_offsets(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
 {
     for (int64_t i = 0; i < count; i++) {
         out->first[pixels[i].pixel] = at;
@@ -116,10 +116,10 @@ static void place_pixels(deep_image *out, const comp_deep_pixel *pixels, int64_t
     }
 }
 
-static void copy_own(deep_image *out, const comp_deep_list *lists, int count)
+static void copy_own_samples(deep_image *out, const comp_deep_list *lists, int count)
 {
     for (int i = 0; i < count; i++) {
-        place_pixels(out, lists[i].pixels, lists[i].pixel_count, out->count);
+        store_sample_offsets(out, lists[i].pixels, lists[i].pixel_count, out->count);
         if (lists[i].sample_count)
             memcpy(out->samples + out->count, lists[i].samples,
                    (size_t)lists[i].sample_count * sizeof *lists[i].samples);
@@ -141,7 +141,7 @@ static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
         const int64_t pixels = in->counts[rank][0], samples = in->counts[rank][1];
         code = receive_items(comm, rank, tag_deep_pixels, in->pixels, pixels, sizeof *in->pixels);
         if (code != MPI_SUCCESS) break;
-        place_pixels(out, in->pixels, pixels, out->count);
+        store_sample_offsets(out, in->pixels, pixels, out->count);
         code = receive_items(comm, rank, tag_deep_samples, out->samples + out->count, samples, sizeof *out->samples);
         out->count += samples;
     }
@@ -171,7 +171,8 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
                      (long long)samples, (long long)samples * (long long)sizeof *out->samples);
 }
 
-static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int count, deep_inbox *in, base_error *error)
+static insitu_status count_all_samples(MPI_Comm comm, const comp_deep_list *lists, int count, deep_inbox *in,
+                                       base_error *error)
 {
     int64_t own[2] = {0, 0};
     bool lacks_memory = false;
@@ -189,14 +190,14 @@ static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int c
     return comp_mpi_status(MPI_Gather(own, 2, MPI_INT64_T, in->counts, 2, MPI_INT64_T, 0, comm), error);
 }
 
-static insitu_status gather(MPI_Comm comm, int rank, const comp_deep_list *lists, int list_count, deep_inbox *in,
-                            deep_image *out, base_error *error)
+static insitu_status gather_lists(MPI_Comm comm, int rank, const comp_deep_list *lists, int list_count, deep_inbox *in,
+                                  deep_image *out, base_error *error)
 {
-    insitu_status status = count_all(comm, lists, list_count, in, error);
+    insitu_status status = count_all_samples(comm, lists, list_count, in, error);
     if (!status && rank == 0) status = open_inbox(in, out, error);
     status = comp_agree(comm, status, NULL, error);
     if (status) return status;
-    if (rank == 0) copy_own(out, lists, list_count);
+    if (rank == 0) copy_own_samples(out, lists, list_count);
     const int code = rank == 0 ? receive_all(comm, in, out) : send_lists(comm, lists, list_count);
     return comp_agree(comm, comp_mpi_status(code, error), NULL, error);
 }
@@ -209,7 +210,7 @@ insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_co
     MPI_Comm_rank(comm, &rank);
     MPI_Comm_size(comm, &in.ranks);
     in.counts = base_alloc((size_t)(rank == 0 ? in.ranks : 1) * sizeof *in.counts);
-    const insitu_status status = gather(comm, rank, lists, list_count, &in, out, error);
+    const insitu_status status = gather_lists(comm, rank, lists, list_count, &in, out, error);
     for (int i = 0; i < list_count && rank != 0 && !status; i++)
         *sent_bytes += lists[i].pixel_count * (int64_t)sizeof *lists[i].pixels +
                        lists[i].sample_count * (int64_t)sizeof *lists[i].samples;

@@ -11,14 +11,14 @@ enum { ROWS = 32 };
 
 /* Stores for each channel, in one byte each, whether two rows of pixels differ. sRGB codes are nearly the square root
  * of the light, and |root a - root b| > c if (a - b)^2 > 2 c^2 (a + b), which needs no square root. */
-static void compare(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
+static void compare_rows(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;
     for (int64_t i = 0; i < 4 * pixels; i++) out[i] = (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
 }
 
 /* Marks a pixel in its byte. If two threads may mark the row, both do so atomically. */
-static void mark(unsigned char *pixel, bool is_shared)
+static void mark_pixel(unsigned char *pixel, bool is_shared)
 {
     if (is_shared) {
 #pragma omp atomic write
@@ -35,8 +35,8 @@ static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned cha
         uint32_t channels;
         memcpy(&channels, differ + 4 * p, sizeof channels);
         if (!channels) continue;
-        mark(own + p, is_own_shared);
-        mark(other + p, is_other_shared);
+        mark_pixel(own + p, is_own_shared);
+        mark_pixel(other + p, is_other_shared);
     }
 }
 
@@ -48,14 +48,14 @@ static void mark_row(const image *picture, int64_t y, unsigned char *differ, uns
     const float *row = picture->rgba + 4 * width * y, *next = row + 4 * width;
     unsigned char *own = marks + width * y, *below = own + width;
     const bool is_shared = y % ROWS == 0, is_next_shared = (y + 1) % ROWS == 0;
-    compare(row, row + 4, width - 1, differ);
+    compare_rows(row, row + 4, width - 1, differ);
     mark_pairs(differ, width - 1, own, is_shared, own + 1, is_shared);
     if (y + 1 == picture->height) return;
-    compare(row, next, width, differ);
+    compare_rows(row, next, width, differ);
     mark_pairs(differ, width, own, is_shared, below, is_next_shared);
-    compare(row + 4, next, width - 1, differ);
+    compare_rows(row + 4, next, width - 1, differ);
     mark_pairs(differ, width - 1, own + 1, is_shared, below, is_next_shared);
-    compare(row, next + 4, width - 1, differ);
+    compare_rows(row, next + 4, width - 1, differ);
     mark_pairs(differ, width - 1, own, is_shared, below + 1, is_next_shared);
 }
 

@@ -55,7 +55,7 @@ comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
     return g;
 }
 
-static uint32_t hash(uint32_t x)
+static uint32_t hash_word(uint32_t x)
 {
     x = (x ^ (x >> 16)) * 0x7feb352du;
     x = (x ^ (x >> 15)) * 0x846ca68bu;
@@ -65,7 +65,7 @@ static uint32_t hash(uint32_t x)
 int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
-    const uint32_t drawn = hash(hash(block + 1) + (uint32_t)rank);
+    const uint32_t drawn = hash_word(hash_word(block + 1) + (uint32_t)rank);
     const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* random number between 0 and 1; may be rounded to 1 */
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
     const int steps = (int)(16 * (chance + 3)); /* logarithm in steps of 1/16, between 0 and 1800 */

@@ -51,7 +51,7 @@ static void sift_down(fragment *items, int64_t root, int64_t count)
 
 /* Sorts by heap sort, which needs no memory and no recursion, and has no bad case if a partition produces thousands of
  * fragments in a pixel. */
-static void sort(fragment *items, int64_t count)
+static void heap_sort(fragment *items, int64_t count)
 {
     if (count <= insertion_limit) {
         insertion_sort(items, count);
@@ -79,7 +79,7 @@ static bool is_sample(const fragment *f)
 }
 
 /* Counts the samples at the position of the first; returns 1 if the first is not a sample. */
-static int64_t samples_at(const fragment *sorted, int64_t count)
+static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
 {
     int64_t n = 1;
     while (n < count && is_sample(&sorted[0]) && is_sample(&sorted[n]) && sorted[n].t_in == sorted[0].t_in) n++;
@@ -138,7 +138,7 @@ bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
     int64_t next = 0;
     for (int64_t i = 0, n; i < count; i += n) {
         const fragment *f = &sorted[i];
-        n = samples_at(f, count - i);
+        n = count_coincident_samples(f, count - i);
         const bool is_surface = f->kind >= FRAGMENT_SURFACE;
         if (is_surface) before = furthest_end_before(sorted, &next, f->t_in, before);
         if (f->t_in <= (is_surface ? before : reach) && f->t_out >= f->t_in) return true;
@@ -205,7 +205,7 @@ static void blend_mixed(blend *b, const fragment *items, int64_t count, float fr
     b->transmittance *= exp(-depth);
 }
 
-static void exchange(fragment *items, int64_t a, int64_t b)
+static void swap_fragments(fragment *items, int64_t a, int64_t b)
 {
     const fragment kept = items[a];
     items[a] = items[b];
@@ -217,7 +217,7 @@ static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
     for (int64_t i = 0; i < count; i++)
-        if (items[i].t_out > depth) exchange(items, open++, i);
+        if (items[i].t_out > depth) swap_fragments(items, open++, i);
     return open;
 }
 
@@ -272,7 +272,7 @@ static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const interv
     for (;;) {
         for (; end < count && sorted[end].t_in <= at; end++) {
             if (has_length(&sorted[end])) {
-                exchange(sorted, open++, end);
+                swap_fragments(sorted, open++, end);
             } else {
                 blend_over(b, &sorted[end]);
                 if (sink->callback) sink->callback(sink->state, &sorted[end]);
@@ -285,7 +285,7 @@ static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const interv
         blend_cut(b, sorted, open, at, to, sink);
         at = to;
     }
-    sort(sorted, end);
+    heap_sort(sorted, end);
     return end;
 }
 
@@ -302,7 +302,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
                                                    float out_rgba[4], float *out_depth)
 {
     static const interval_sink nobody = {NULL, NULL};
-    sort(items, count);
+    heap_sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
@@ -313,7 +313,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
             transmittance *= (float)run.transmittance;
             continue;
         }
-        n = samples_at(items + i, count - i);
+        n = count_coincident_samples(items + i, count - i);
         const fragment f = n == 1 ? items[i] : mix_samples(items + i, n);
         for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];
         transmittance *= f.transmittance;
@@ -344,7 +344,7 @@ static bool is_dark(float transmittance, const fragment *before, const fragment 
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth)
 {
-    sort(items, count);
+    heap_sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &items[i - 1], &items[i])); i += n) {
@@ -377,7 +377,7 @@ void comp_merge_cut(fragment *sorted, int64_t count, comp_interval_callback *cal
             transmittance *= (float)run.transmittance;
             continue;
         }
-        n = samples_at(sorted + i, count - i);
+        n = count_coincident_samples(sorted + i, count - i);
         const fragment f = n == 1 ? sorted[i] : mix_samples(sorted + i, n);
         callback(state, &f);
         transmittance *= f.transmittance;

@@ -24,7 +24,7 @@ typedef struct merge_scratch {
 } merge_scratch;
 
 /* Ensures space for this number of fragments; the contents of the list are kept. */
-static bool reserve(fragment_list *list, int64_t count)
+static bool reserve_fragments(fragment_list *list, int64_t count)
 {
     if (count <= list->capacity) return true;
     fragment *grown = base_realloc(list->items, (size_t)(count + count / 2) * sizeof *grown);
@@ -48,7 +48,7 @@ static void mark_mixed(merge_scratch *m, uint32_t at)
 static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
 {
     fragment_list *const left = &m->remaining;
-    if (left->count == left->capacity && !reserve(left, left->count + 256)) return false;
+    if (left->count == left->capacity && !reserve_fragments(left, left->count + 256)) return false;
     left->items[left->count] = *item;
     left->items[left->count++].pixel = at;
     mark_mixed(m, at);
@@ -133,7 +133,7 @@ static bool list_pixels(merge_scratch *m)
         sum += m->counts[k];
         m->ends[k] = sum;
     }
-    if (!reserve(&m->listed, sum)) return false;
+    if (!reserve_fragments(&m->listed, sum)) return false;
     for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1))
         m->listed.items[--m->ends[k]] = comp_sheet_get(&m->all, k, k);
     for (int64_t i = 0; i < m->remaining.count; i++)

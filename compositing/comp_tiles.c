@@ -36,7 +36,7 @@ struct comp_tile_scratch {
     char padding[64]; /* prevents two threads from writing to the same cache line */
 };
 
-static void *reserve(buffer *r, int64_t count, size_t size)
+static void *reserve_buffer(buffer *r, int64_t count, size_t size)
 {
     const size_t bytes = (size_t)count * size;
     if (bytes <= r->bytes) return r->data;
@@ -92,7 +92,7 @@ static void store_background(const comp_tiles *tiles, int64_t pixel)
     if (tiles->out->depth) tiles->out->depth[pixel] = INFINITY;
 }
 
-static void clear(const comp_tiles *tiles, const pixel_area *area)
+static void clear_tile(const comp_tiles *tiles, const pixel_area *area)
 {
     const int64_t width = tiles->out->width;
     float row[4 * ROW_PIXELS];
@@ -108,7 +108,7 @@ static void clear(const comp_tiles *tiles, const pixel_area *area)
 
 /* Fills a tile without fragments. The stores bypass the caches, which then neither read the overwritten lines nor evict
  * lines that later tiles need. */
-static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
+static void clear_empty_tile(const comp_tiles *tiles, const pixel_area *area)
 {
 #if defined(__SSE2__)
     const int64_t width = tiles->out->width;
@@ -125,7 +125,7 @@ static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
         return;
     }
 #endif
-    clear(tiles, area);
+    clear_tile(tiles, area);
 }
 
 /* Returns the pixel's index in the area, row by row. The division gives the correct integer, because adding half a
@@ -156,12 +156,12 @@ static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const
 static fragment *copy_pixel(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];
-    fragment *pixel_fragments = reserve(&own->pixel_fragments, count, sizeof *pixel_fragments);
+    fragment *pixel_fragments = reserve_buffer(&own->pixel_fragments, count, sizeof *pixel_fragments);
     for (int64_t i = 0; i < count && pixel_fragments; i++) pixel_fragments[i] = items[order[i]];
     return pixel_fragments;
 }
 
-static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64_t count)
+static void blend_pixel(const comp_tiles *tiles, int64_t pixel, fragment *items, int64_t count)
 {
     float depth;
     (tiles->out->is_folded ? comp_merge_folded_pixel : comp_merge_pixel)(items, count, tiles->background,
@@ -178,12 +178,12 @@ static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragm
     const int64_t pixels = (int64_t)area->width * area->height;
     unsigned char seen[MOST_PIXELS] = {0};
     if (count > pixels || pixels > MOST_PIXELS) return false;
-    if (count < pixels) clear(tiles, area);
+    if (count < pixels) clear_tile(tiles, area);
     for (int64_t i = 0; i < count; i++) {
         const uint32_t place = index_in_area(tiles, area, items[i].pixel);
         if (seen[place]) return false;
         seen[place] = 1;
-        blend(tiles, items[i].pixel, &items[i], 1);
+        blend_pixel(tiles, items[i].pixel, &items[i], 1);
     }
     return true;
 }
@@ -193,8 +193,8 @@ static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pi
 {
     if (blend_singles(tiles, area, items, count)) return true;
     const int64_t pixels = (int64_t)area->width * area->height;
-    int64_t *starts = reserve(&own->starts, pixels + 1, sizeof *starts);
-    int64_t *order = reserve(&own->order, count, sizeof *order);
+    int64_t *starts = reserve_buffer(&own->starts, pixels + 1, sizeof *starts);
+    int64_t *order = reserve_buffer(&own->order, count, sizeof *order);
     if (!starts || !order) return false;
     sort_by_pixel(tiles, area, items, count, starts, order);
     for (int64_t k = 0; k < pixels; k++) {
@@ -206,7 +206,7 @@ static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pi
         }
         fragment *collected = copy_pixel(own, items, order + starts[k], own_count);
         if (!collected) return false;
-        blend(tiles, pixel, collected, own_count);
+        blend_pixel(tiles, pixel, collected, own_count);
     }
     return true;
 }
@@ -220,7 +220,7 @@ bool comp_tiles_take(void *state, int thread, const pixel_area *area, fragment *
     if (count)
         is_ok = blend_tile(tiles, own, area, items, count);
     else
-        clear_empty(tiles, area);
+        clear_empty_tile(tiles, area);
     own->fragments += count;
     own->seconds += omp_get_wtime() - start;
     return is_ok;

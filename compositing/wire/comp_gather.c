@@ -46,7 +46,7 @@ static void send_to_parent(parent_link *link, const unsigned char *message, int 
 
 /* Sends this rank's finished pixels, in batches of COMP_LONGEST_DENSE messages because the request buffer has no more
  * entries. */
-static void send_own(parent_link *link, const comp_messages *finished)
+static void send_own_pixels(parent_link *link, const comp_messages *finished)
 {
     MPI_Request *const requests = link->transport->reserved_requests;
     for (comp_message *m = finished->first; m && link->code == MPI_SUCCESS;) {
@@ -66,7 +66,7 @@ static void send_own(parent_link *link, const comp_messages *finished)
 
 /* ---- from the children ------------------------------------------------------------------------------------------ */
 
-static int receive(comp_transport *transport, int *bytes)
+static int receive_message(comp_transport *transport, int *bytes)
 {
     MPI_Status status;
     const int code = MPI_Recv(transport->receive_buffer, COMP_MESSAGE_BYTES, MPI_BYTE, MPI_ANY_SOURCE, TAG_PIXELS,
@@ -95,7 +95,7 @@ static int receive_at_root(comp_transport *transport, int children, const comp_c
     int code = MPI_SUCCESS;
     while (children > 0 && code == MPI_SUCCESS) {
         int bytes = 0;
-        code = receive(transport, &bytes);
+        code = receive_message(transport, &bytes);
         if (code != MPI_SUCCESS) break;
         children -= !transport->receive_buffer[0];
         store_message(transport, bytes, canvas);
@@ -108,7 +108,7 @@ static void forward_children(parent_link *link, int children)
     comp_transport *const transport = link->transport;
     while (children > 0 && link->code == MPI_SUCCESS) {
         int bytes = 0;
-        link->code = receive(transport, &bytes);
+        link->code = receive_message(transport, &bytes);
         if (link->code != MPI_SUCCESS) break;
         children -= !transport->receive_buffer[0];
         if (bytes == COMP_MESSAGE_HEAD) continue;
@@ -126,7 +126,7 @@ insitu_status comp_gather(comp_transport *transport, const comp_route *route, co
     int code = MPI_SUCCESS;
     if (place < route->owners && place > 0) {
         parent_link link = {transport, comp_route_rank(route, comp_gather_parent(route, place)), MPI_SUCCESS};
-        if (!status) send_own(&link, finished);
+        if (!status) send_own_pixels(&link, finished);
         forward_children(&link, comp_gather_children(route, place));
         code = link.code;
     } else if (place == 0) {

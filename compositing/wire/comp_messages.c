@@ -59,13 +59,13 @@ static bool add_message(comp_writer *w, size_t bytes)
     return true;
 }
 
-static void put_head(comp_message *m, size_t parcel, uint32_t owner, uint32_t records)
+static void write_head(comp_message *m, size_t parcel, uint32_t owner, uint32_t records)
 {
     const uint32_t head[3] = {owner, records, (uint32_t)((size_t)m->bytes - parcel - COMP_PARCEL_HEAD)};
     memcpy(m->data + parcel, head, sizeof head);
 }
 
-static uint32_t owner_of(const comp_writer *w)
+static uint32_t find_parcel_owner(const comp_writer *w)
 {
     uint32_t owner;
     memcpy(&owner, w->messages.last->data + w->parcel, sizeof owner);
@@ -79,10 +79,10 @@ unsigned char *comp_writer_reserve(comp_writer *w, uint32_t owner, size_t bytes,
         if (!add_message(w, wanted < COMP_MESSAGE_BYTES ? wanted : COMP_MESSAGE_BYTES)) return NULL;
     }
     comp_message *const m = w->messages.last;
-    if (!w->parcel || owner_of(w) != owner) {
+    if (!w->parcel || find_parcel_owner(w) != owner) {
         w->parcel = (size_t)m->bytes;
         m->bytes += COMP_PARCEL_HEAD;
-        put_head(m, w->parcel, owner, 0);
+        write_head(m, w->parcel, owner, 0);
     }
     return m->data + m->bytes;
 }
@@ -93,7 +93,7 @@ void comp_writer_commit(comp_writer *w, unsigned char *end, uint32_t records)
     uint32_t head[3];
     memcpy(head, m->data + w->parcel, sizeof head);
     m->bytes = (int)(end - m->data);
-    put_head(m, w->parcel, head[0], head[1] + records);
+    write_head(m, w->parcel, head[0], head[1] + records);
 }
 
 /* ---- rounds ----------------------------------------------------------------------------------------------------- */
@@ -142,7 +142,7 @@ static void check_mpi(round *r, int code)
     if (code != MPI_SUCCESS && r->status == INSITU_OK) r->status = comp_mpi_status(code, r->error);
 }
 
-static void send(round *r, const unsigned char *data, int bytes, int rank)
+static void send_data(round *r, const unsigned char *data, int bytes, int rank)
 {
     MPI_Request *const request = &r->requests[r->request_count++];
     check_mpi(r, r->is_sparse ? MPI_Issend(data, bytes, MPI_BYTE, rank, r->tag, r->transport->comm, request)
@@ -165,7 +165,7 @@ static void make_requests(round *r, comp_messages *out, int partners)
 }
 
 /* Receives a message that MPI_Mprobe() or MPI_Improbe() has matched. If there is no memory for it, it is discarded. */
-static void receive(round *r, MPI_Message *found, const MPI_Status *status)
+static void receive_message(round *r, MPI_Message *found, const MPI_Status *status)
 {
     int bytes = 0;
     MPI_Get_count(status, MPI_BYTE, &bytes);
@@ -192,7 +192,7 @@ static void receive_dense(round *r)
         const int code = MPI_Mprobe(MPI_ANY_SOURCE, r->tag, r->transport->comm, &found, &status);
         check_mpi(r, code);
         if (code != MPI_SUCCESS) return;
-        receive(r, &found, &status);
+        receive_message(r, &found, &status);
     }
     check_mpi(r, MPI_Waitall(r->request_count, r->requests, MPI_STATUSES_IGNORE));
 }
@@ -206,7 +206,7 @@ static void receive_sparse(round *r)
         MPI_Message found;
         MPI_Status status;
         code = MPI_Improbe(MPI_ANY_SOURCE, r->tag, r->transport->comm, &is_there, &found, &status);
-        if (code == MPI_SUCCESS && is_there) receive(r, &found, &status);
+        if (code == MPI_SUCCESS && is_there) receive_message(r, &found, &status);
         if (code == MPI_SUCCESS && is_in_barrier) {
             code = MPI_Test(&barrier, &is_over, MPI_STATUS_IGNORE);
         } else if (code == MPI_SUCCESS) {
@@ -233,7 +233,7 @@ static bool mark_last(const comp_messages *out, int rank)
 
 static insitu_status run_round(round *r, comp_messages *out)
 {
-    for (const comp_message *m = out->first; m; m = m->next) send(r, m->data, m->bytes, m->rank);
+    for (const comp_message *m = out->first; m; m = m->next) send_data(r, m->data, m->bytes, m->rank);
     if (r->is_sparse)
         receive_sparse(r);
     else
@@ -259,7 +259,7 @@ insitu_status comp_messages_round(comp_transport *transport, const comp_route *r
     for (int i = 1; i <= partners && !r.is_sparse; i++) {
         const int digit = (own + i) % route->radix[number];
         const int rank = comp_route_rank(route, comp_route_partner(route, number, stride, place, digit));
-        if (!mark_last(out, rank)) send(&r, last_message, LAST_MESSAGE_BYTES, rank);
+        if (!mark_last(out, rank)) send_data(&r, last_message, LAST_MESSAGE_BYTES, rank);
     }
     return run_round(&r, out);
 }
@@ -278,6 +278,6 @@ insitu_status comp_messages_fold(comp_transport *transport, const comp_route *ro
     if (!sends_all && !receives_all) return status;
     make_requests(&r, out, 1);
     const int partner = sends_all ? comp_route_rank(route, place - route->owners) : 0;
-    if (sends_all && !mark_last(out, partner)) send(&r, last_message, LAST_MESSAGE_BYTES, partner);
+    if (sends_all && !mark_last(out, partner)) send_data(&r, last_message, LAST_MESSAGE_BYTES, partner);
     return run_round(&r, out);
 }

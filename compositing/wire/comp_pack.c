@@ -8,7 +8,7 @@
 /* Estimated bytes per fragment, which determine the size of a new message. Fragments of most pictures take fewer. */
 enum { EXPECTED_BYTES = 16 };
 
-static insitu_status no_memory(base_error *error, const char *what)
+static insitu_status fail_for_memory(base_error *error, const char *what)
 {
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory to %s fragments", what);
 }
@@ -128,7 +128,7 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
     if (is_ok) return INSITU_OK;
     comp_messages_free(out);
     comp_messages_free(kept);
-    return no_memory(error, "send");
+    return fail_for_memory(error, "send");
 }
 
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
@@ -166,7 +166,7 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
         comp_messages_append(out, &writer.messages);
         if (is_ok) continue;
         comp_messages_free(out);
-        return no_memory(error, "pass on");
+        return fail_for_memory(error, "pass on");
     }
     return INSITU_OK;
 }
@@ -210,7 +210,7 @@ insitu_status comp_received_find(const comp_grid *grid, int owner, const comp_me
         return INSITU_OK;
     }
     comp_received_free(out);
-    return no_memory(error, "receive");
+    return fail_for_memory(error, "receive");
 }
 
 void comp_received_free(comp_received *arrivals)

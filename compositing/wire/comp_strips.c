@@ -80,7 +80,7 @@ static insitu_status gather_parts(const part *parts, int count, comp_strips *out
     return INSITU_OK;
 }
 
-static int parts_of(const comp_grid *grid, int64_t count)
+static int choose_part_count(const comp_grid *grid, int64_t count)
 {
     const int64_t most = count / LEAST_PART + 1, threads = grid->threads < MOST_PARTS ? grid->threads : MOST_PARTS;
     return (int)(most < threads ? most : threads);
@@ -90,7 +90,7 @@ insitu_status comp_strips_make(const comp_grid *grid, const fragment_list *list,
 {
     comp_strips made = {.grid = grid, .items = list->items};
     part parts[MOST_PARTS] = {{NULL, 0, 0, INSITU_OK}};
-    const int count = parts_of(grid, list->count);
+    const int count = choose_part_count(grid, list->count);
     if (list->count > UINT32_MAX)
         return base_fail(error, INSITU_ERROR_MEMORY,
                          "compositing: %lld fragments of one rank are more than can be composited",
